@@ -1,0 +1,109 @@
+//! The one error type of the crate: what happened, where, and which exit code it deserves.
+//!
+//! A message is one sentence for the user: what is wrong, where (file, page, line, brick), what to do about it.
+//! Kernels return no errors; storage, input, output and pipelines do.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The result of everything in this crate that can fail.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What kind of failure an [`Error`] is; decides the exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The command line or a setting makes no sense (exit code 2).
+    Usage,
+    /// An input cannot be used: unreadable, malformed, empty, hostile (exit code 2).
+    Input,
+    /// The run failed: disk full, unwritable output, too small a budget (exit code 1).
+    Failed,
+    /// SIGINT or SIGTERM asked the run to end (exit code 130 or 143).
+    Interrupted {
+        /// The signal's number: 2 or 15.
+        signal: i32,
+    },
+}
+
+/// What went wrong, in one sentence, with the file it concerns.
+#[derive(Debug)]
+pub struct Error {
+    kind: ErrorKind,
+    message: String,
+    path: Option<PathBuf>,
+}
+
+impl Error {
+    /// A wrong setting or argument.
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Usage, message)
+    }
+
+    /// An input that cannot be used.
+    pub fn input(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Input, message)
+    }
+
+    /// A run that cannot go on.
+    pub fn failed(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Failed, message)
+    }
+
+    /// A run that a signal ended.
+    #[must_use]
+    pub fn interrupted(signal: i32) -> Self {
+        Self::new(ErrorKind::Interrupted { signal }, "interrupted; nothing was left half-written")
+    }
+
+    /// An input/output failure of the operating system while doing `what`.
+    #[must_use]
+    pub fn from_io(what: &str, error: &io::Error) -> Self {
+        Self::failed(format!("{what}: {error}"))
+    }
+
+    fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
+        Self { kind, message: message.into(), path: None }
+    }
+
+    /// Names the file that the error concerns; the first name given stays.
+    #[must_use]
+    pub fn at(mut self, path: &Path) -> Self {
+        self.path.get_or_insert_with(|| path.to_path_buf());
+        self
+    }
+
+    /// The kind of failure.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
+    }
+
+    /// The file the error concerns, where there is one.
+    #[must_use]
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
+    /// The exit code of the design: 1 the run failed, 2 unusable input or usage, 130 and 143 interrupted.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self.kind {
+            ErrorKind::Usage | ErrorKind::Input => 2,
+            ErrorKind::Failed => 1,
+            ErrorKind::Interrupted { signal } => u8::try_from(128 + signal).unwrap_or(130),
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.path {
+            Some(path) => write!(f, "{}: {}", path.display(), self.message),
+            None => f.write_str(&self.message),
+        }
+    }
+}
+
+impl std::error::Error for Error {}

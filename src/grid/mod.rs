@@ -1,0 +1,18 @@
+//! Integers, spacing, points and triangles: index arithmetic without any field data.
+//!
+//! Index and coordinate triples are `[x, y, z]` everywhere in the crate; arrays lie `[z][y][x]`, x fastest.
+//! Indices are 64 bit: a product of extents may pass 2^31.
+
+mod box3;
+mod brick_grid;
+mod brick_set;
+mod geometry;
+mod sources;
+mod stencil;
+
+pub use box3::Box3;
+pub use brick_grid::{BrickGrid, BrickId};
+pub use brick_set::{BrickSet, Slot};
+pub use geometry::Geometry;
+pub use sources::PointCloud;
+pub use stencil::{FACES, Face, NEIGHBOURS_26};

@@ -1,0 +1,49 @@
+//! The traits that join files, bricks and pipelines: read or write any box of voxels, or one plane of a stack.
+
+use super::{Element, ElementType, SamplesMut};
+use crate::error::Result;
+use crate::grid::Box3;
+
+/// Something from which any box of a volume can be read, from any thread.
+pub trait BoxSource<T: Element>: Sync {
+    /// Voxels along each axis, `[x, y, z]`.
+    fn shape(&self) -> [i64; 3];
+
+    /// Fills `out`, dense `[z][y][x]` over `part`; `part` lies inside the shape.
+    ///
+    /// # Errors
+    /// When the data behind it cannot be read.
+    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()>;
+
+    /// The one value that all voxels of `part` are known to have, where that can be told without reading them.
+    fn constant_in(&self, _part: &Box3) -> Option<T> {
+        None
+    }
+}
+
+/// Something into which any box of a volume can be written, from any thread.
+pub trait BoxSink<T: Element>: Sync {
+    /// Voxels along each axis, `[x, y, z]`.
+    fn shape(&self) -> [i64; 3];
+
+    /// Writes `data`, dense `[z][y][x]` over `part`; `part` lies inside the shape.
+    ///
+    /// # Errors
+    /// When the data cannot be written.
+    fn write_box(&self, part: &Box3, data: &[T]) -> Result<()>;
+}
+
+/// A stack of planes that can be decoded one at a time, in any order and from any thread.
+pub trait PlaneSource: Sync {
+    /// Voxels along each axis, `[x, y, z]`.
+    fn shape(&self) -> [i64; 3];
+
+    /// The type that samples are handed out in.
+    fn element(&self) -> ElementType;
+
+    /// Decodes plane `z` into `out`, dense `[y][x]`, of the type that [`PlaneSource::element`] names.
+    ///
+    /// # Errors
+    /// When the plane cannot be read or decoded: names file, page and reason.
+    fn read_plane(&self, z: i64, out: SamplesMut<'_>) -> Result<()>;
+}

@@ -1,0 +1,5 @@
+//! The integration suite: one binary, so that it links once.
+#![allow(missing_docs)]
+
+#[path = "../common/mod.rs"]
+mod common;

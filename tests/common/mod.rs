@@ -1,0 +1,1 @@
+//! Shapes, files and slow plain references that several tests share.
