@@ -1,7 +1,12 @@
 //! A field on disk: bricks in memory-mapped scratch files, and the traits by which boxes of voxels are read and written.
 
+mod brick_array;
 mod element;
+mod slot_file;
 mod stream;
+mod window;
 
+pub use brick_array::{BrickArray, Scratch};
 pub use element::{Element, ElementType, SamplesMut};
 pub use stream::{BoxSink, BoxSource, PlaneSource};
+pub use window::{Traffic, Window};

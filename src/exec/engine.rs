@@ -1,0 +1,231 @@
+//! The engine: the one loop over bricks, run on all cores, and the record of what each stage cost.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::budget::{Budget, peak_resident};
+use super::cancel::Cancel;
+use super::comm::{Comm, SelfComm};
+use super::progress::Progress;
+use crate::error::{Error, Result};
+use crate::store::{Scratch, Traffic};
+
+/// What one stage of a run cost.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StageReport {
+    /// What was done.
+    pub name: String,
+    /// Wall time.
+    pub seconds: f64,
+    /// Bricks that were not resident when they were used.
+    pub brick_loads: u64,
+    /// Bricks computed, each time counted.
+    pub bricks: u64,
+    /// Voxels the stage worked on.
+    pub voxels: u64,
+    /// Bytes read out of bricks and faces.
+    pub bytes_read: u64,
+    /// Bytes written into bricks and faces.
+    pub bytes_written: u64,
+    /// Passes, sweeps or solver iterations, whatever the stage repeats.
+    pub iterations: u64,
+    /// What was left when the stage stopped; 0 where nothing is iterated.
+    pub residual: f64,
+    /// The most memory the process has had resident when the stage ended.
+    pub peak_rss_bytes: u64,
+}
+
+/// Runs kernels over bricks: threads, cancellation, progress, scratch and the account of all that.
+pub struct Engine {
+    pool: rayon::ThreadPool,
+    cancel: Cancel,
+    progress: Arc<dyn Progress>,
+    comm: Box<dyn Comm>,
+    scratch: Scratch,
+    budget: Budget,
+    reports: Mutex<Vec<StageReport>>,
+}
+
+impl Engine {
+    /// An engine of `threads` threads with one rank.
+    ///
+    /// # Errors
+    /// When the threads cannot be started.
+    pub fn new(
+        threads: usize,
+        scratch: Scratch,
+        budget: Budget,
+        cancel: Cancel,
+        progress: Arc<dyn Progress>,
+    ) -> Result<Self> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|n| format!("strandline-{n}"))
+            .build()
+            .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")))?;
+        Ok(Self { pool, cancel, progress, comm: Box::new(SelfComm), scratch, budget, reports: Mutex::default() })
+    }
+
+    /// Number of threads.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// Where fields are stored.
+    #[must_use]
+    pub fn scratch(&self) -> &Scratch {
+        &self.scratch
+    }
+
+    /// The run's memory budget.
+    #[must_use]
+    pub fn budget(&self) -> Budget {
+        self.budget
+    }
+
+    /// The ranks of the run.
+    #[must_use]
+    pub fn comm(&self) -> &dyn Comm {
+        self.comm.as_ref()
+    }
+
+    /// Leaves `held` bytes of the budget to what is kept in memory, the rest to mapped pages.
+    ///
+    /// # Errors
+    /// When the budget is too small.
+    pub fn reserve(&self, held: u64) -> Result<()> {
+        self.scratch.set_window(self.budget.window(held)?);
+        Ok(())
+    }
+
+    /// Tells the user one line.
+    pub fn note(&self, line: &str) {
+        self.progress.note(line);
+    }
+
+    /// Goes on unless the run was asked to end.
+    ///
+    /// # Errors
+    /// When a signal asked for it.
+    pub fn check(&self) -> Result<()> {
+        self.cancel.check()
+    }
+
+    /// Begins a stage of about `total` steps; the report is made when the stage is finished.
+    #[must_use]
+    pub fn stage(&self, name: &str, total: u64) -> Stage<'_> {
+        self.progress.begin(name, total);
+        Stage {
+            engine: self,
+            started: Instant::now(),
+            before: self.scratch.traffic(),
+            report: Mutex::new(StageReport { name: name.into(), ..StageReport::default() }),
+        }
+    }
+
+    /// What the finished stages cost, in the order they ended.
+    #[must_use]
+    pub fn reports(&self) -> Vec<StageReport> {
+        self.reports.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// A stage under way.
+pub struct Stage<'a> {
+    engine: &'a Engine,
+    started: Instant,
+    before: Traffic,
+    report: Mutex<StageReport>,
+}
+
+impl Stage<'_> {
+    /// The one loop over bricks: `work` for each item of a wave, in parallel; results in the wave's order.
+    ///
+    /// An item is a brick's slot, a shard's box, a plane of a stack: whatever one thread computes in one go.
+    ///
+    /// # Errors
+    /// The first failure of `work`, or the signal that ended the run.
+    pub fn run<I, W, R>(
+        &self,
+        wave: &[I],
+        workers: &Workers<W>,
+        work: impl Fn(&mut W, &I) -> Result<R> + Sync,
+    ) -> Result<Vec<R>>
+    where
+        I: Sync,
+        W: Send,
+        R: Send,
+    {
+        let engine = self.engine;
+        let results = engine.pool.install(|| {
+            wave.par_iter()
+                .map(|item| {
+                    engine.cancel.check()?;
+                    let done = workers.with(|worker| work(worker, item));
+                    engine.progress.advance(1);
+                    done
+                })
+                .collect::<Result<Vec<R>>>()
+        })?;
+        self.report.lock().unwrap_or_else(PoisonError::into_inner).bricks += wave.len() as u64;
+        Ok(results)
+    }
+
+    /// Says what the stage repeated and what was left.
+    pub fn iterated(&self, iterations: u64, residual: f64) {
+        let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        report.iterations += iterations;
+        report.residual = residual;
+    }
+
+    /// Says how many voxels the stage works on.
+    pub fn voxels(&self, voxels: u64) {
+        self.report.lock().unwrap_or_else(PoisonError::into_inner).voxels = voxels;
+    }
+
+    /// Ends the stage and keeps its report.
+    pub fn finish(self) -> StageReport {
+        let moved = self.engine.scratch.traffic().since(&self.before);
+        let mut report = self.report.into_inner().unwrap_or_else(PoisonError::into_inner);
+        report.seconds = self.started.elapsed().as_secs_f64();
+        report.brick_loads = moved.brick_loads;
+        report.bytes_read = moved.bytes_read;
+        report.bytes_written = moved.bytes_written;
+        report.peak_rss_bytes = peak_resident();
+        self.engine.progress.end();
+        self.engine.reports.lock().unwrap_or_else(PoisonError::into_inner).push(report.clone());
+        report
+    }
+}
+
+/// One set of work buffers for each thread, made when first needed.
+pub struct Workers<W> {
+    idle: Mutex<Vec<W>>,
+    make: Box<dyn Fn() -> W + Send + Sync>,
+}
+
+impl<W: Send> Workers<W> {
+    /// Buffers made by `make`, at most one set for each thread.
+    pub fn new(make: impl Fn() -> W + Send + Sync + 'static) -> Self {
+        Self { idle: Mutex::default(), make: Box::new(make) }
+    }
+
+    fn with<R>(&self, f: impl FnOnce(&mut W) -> R) -> R {
+        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut worker = idle.unwrap_or_else(|| (self.make)());
+        let result = f(&mut worker);
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(worker);
+        result
+    }
+}
+
+impl Workers<()> {
+    /// For work that needs no buffers.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::new(|| ())
+    }
+}

@@ -1,0 +1,27 @@
+//! `Progress`: who wants to know how far a run is. The command line draws bars; tests and libraries stay silent.
+
+/// Hears how stages begin, advance and end. Called from one thread at a time, `advance` from many.
+pub trait Progress: Send + Sync {
+    /// A stage begins; it has about `total` steps, 0 when that is not known.
+    fn begin(&self, name: &str, total: u64);
+
+    /// `steps` more steps are done.
+    fn advance(&self, steps: u64);
+
+    /// Something the user should know now, one line.
+    fn note(&self, line: &str);
+
+    /// The stage is over.
+    fn end(&self);
+}
+
+/// Hears nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&self, _name: &str, _total: u64) {}
+    fn advance(&self, _steps: u64) {}
+    fn note(&self, _line: &str) {}
+    fn end(&self) {}
+}

@@ -1,0 +1,299 @@
+//! `BrickArray<T>`: one field, brick by brick, in memory-mapped scratch.
+//!
+//! A brick is `edge`^3 voxels, contiguous, `[z][y][x]`; bricks at the far ends of the domain have the same room and
+//! leave the rest unused. Bricks hold no halo. The six faces of every brick are kept a second time, in an arena of
+//! their own, so that filling a neighbour's halo never touches this brick's pages:
+//!
+//! ```text
+//! faces of one brick | -x [z][y] | +x [z][y] | -y [z][x] | +y [z][x] | -z [y][x] | +z [y][x] |    edge^2 each
+//! ```
+//!
+//! Bricks outside of the set are not stored: each has one constant value for all its voxels.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::slot_file::SlotFile;
+use super::window::{Traffic, Window};
+use super::{BoxSink, BoxSource, Element};
+use crate::error::Result;
+use crate::grid::{Box3, BrickId, BrickSet, FACES, Face, Slot};
+
+/// Where scratch files are made, and the window of pages they share.
+#[derive(Clone)]
+pub struct Scratch {
+    dir: PathBuf,
+    window: Arc<Window>,
+}
+
+impl Scratch {
+    /// Scratch files in `dir`, at most `window_bytes` of them resident.
+    #[must_use]
+    pub fn new(dir: &Path, window_bytes: u64) -> Self {
+        Self { dir: dir.to_path_buf(), window: Window::new(window_bytes) }
+    }
+
+    /// What moved between scratch and memory so far.
+    #[must_use]
+    pub fn traffic(&self) -> Traffic {
+        self.window.traffic()
+    }
+
+    /// Changes how many bytes may be resident.
+    pub fn set_window(&self, bytes: u64) {
+        self.window.set_limit(bytes);
+    }
+
+    /// The folder the files are in.
+    #[must_use]
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+}
+
+/// One field over a set of bricks.
+pub struct BrickArray<T: Element> {
+    set: Arc<BrickSet>,
+    bricks: SlotFile<T>,
+    faces: Option<SlotFile<T>>,
+    absent: Vec<T>,
+}
+
+impl<T: Element> BrickArray<T> {
+    /// A field of zeros without faces: for what is read and written by boxes, or voxel by voxel.
+    ///
+    /// # Errors
+    /// When the scratch folder cannot hold it.
+    pub fn new(scratch: &Scratch, set: &Arc<BrickSet>) -> Result<Self> {
+        let bricks = SlotFile::create(&scratch.dir, &scratch.window, set.grid().brick_len(), set.len())?;
+        Ok(Self { set: set.clone(), bricks, faces: None, absent: vec![T::default(); set.grid().len() as usize] })
+    }
+
+    /// A field of zeros with faces: for what kernels read with a halo.
+    ///
+    /// # Errors
+    /// When the scratch folder cannot hold it.
+    pub fn with_faces(scratch: &Scratch, set: &Arc<BrickSet>) -> Result<Self> {
+        let mut array = Self::new(scratch, set)?;
+        let edge = set.grid().edge() as usize;
+        array.faces = Some(SlotFile::create(&scratch.dir, &scratch.window, 6 * edge * edge, set.len())?);
+        Ok(array)
+    }
+
+    /// The bricks that are stored.
+    #[must_use]
+    pub fn set(&self) -> &Arc<BrickSet> {
+        &self.set
+    }
+
+    /// Gives a brick that is not stored its constant value.
+    pub fn set_absent(&mut self, id: BrickId, value: T) {
+        self.absent[id as usize] = value;
+    }
+
+    /// The constant value of a brick that is not stored.
+    #[must_use]
+    pub fn absent(&self, id: BrickId) -> T {
+        self.absent[id as usize]
+    }
+
+    /// Lends out a brick's voxels, `edge`^3, for reading.
+    pub fn read<R>(&self, slot: Slot, f: impl FnOnce(&[T]) -> R) -> R {
+        self.bricks.read(slot as usize, 0..self.set.grid().brick_len(), f)
+    }
+
+    /// Lends out a brick's voxels for writing. The faces follow with [`BrickArray::write_faces`].
+    pub fn write<R>(&self, slot: Slot, f: impl FnOnce(&mut [T]) -> R) -> R {
+        self.bricks.write(slot as usize, f)
+    }
+
+    /// Lends out one face of a brick, `edge`^2 voxels.
+    ///
+    /// # Panics
+    /// When the array was made without faces.
+    pub fn read_face<R>(&self, slot: Slot, face: Face, f: impl FnOnce(&[T]) -> R) -> R {
+        let area = (self.set.grid().edge() * self.set.grid().edge()) as usize;
+        let faces = self.faces.as_ref().expect("halos are read from arrays made with faces");
+        faces.read(slot as usize, face.index() * area..(face.index() + 1) * area, f)
+    }
+
+    /// Lends out the six faces of a brick for writing.
+    ///
+    /// # Panics
+    /// When the array was made without faces.
+    pub fn write_faces<R>(&self, slot: Slot, f: impl FnOnce(&mut [T]) -> R) -> R {
+        self.faces.as_ref().expect("halos are read from arrays made with faces").write(slot as usize, f)
+    }
+
+    /// True when neighbours can read this array's faces.
+    #[must_use]
+    pub fn has_faces(&self) -> bool {
+        self.faces.is_some()
+    }
+
+    /// Copies a brick's outermost layers into the face arena.
+    pub fn refresh_faces(&self, slot: Slot) {
+        let edge = self.set.grid().edge() as usize;
+        let shape = self.set.grid().brick_box(self.set.id(slot)).shape().map(|n| n as usize);
+        self.read(slot, |brick| self.write_faces(slot, |faces| copy_faces(brick, edge, shape, faces)));
+    }
+}
+
+/// Copies the six outermost layers of a brick, whose valid extents are `shape`, into `faces`.
+fn copy_faces<T: Element>(brick: &[T], edge: usize, shape: [usize; 3], faces: &mut [T]) {
+    let area = edge * edge;
+    for face in FACES {
+        let out = &mut faces[face.index() * area..][..area];
+        let layer = if face.upper { shape[face.axis] - 1 } else { 0 };
+        match face.axis {
+            0 => (0..area).for_each(|row| out[row] = brick[row * edge + layer]),
+            1 => (0..edge)
+                .for_each(|z| out[z * edge..][..edge].copy_from_slice(&brick[z * area + layer * edge..][..edge])),
+            _ => out.copy_from_slice(&brick[layer * area..][..area]),
+        }
+    }
+}
+
+impl<T: Element> BoxSource<T> for BrickArray<T> {
+    fn shape(&self) -> [i64; 3] {
+        self.set.grid().shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
+        let grid = *self.set.grid();
+        for id in grid.bricks_in(part) {
+            let shared = grid.brick_box(id).intersect(part);
+            let width = shared.shape()[0] as usize;
+            let rows = RowsOf { brick_lo: grid.coords(id).map(|c| c * grid.edge()), edge: grid.edge() };
+            match self.set.slot(id) {
+                None => shared.rows().for_each(|(y, z)| {
+                    out[part.offset_of([shared.lo[0], y, z])..][..width].fill(self.absent(id));
+                }),
+                Some(slot) => self.read(slot, |brick| {
+                    for (y, z) in shared.rows() {
+                        let from = rows.offset([shared.lo[0], y, z]);
+                        out[part.offset_of([shared.lo[0], y, z])..][..width].copy_from_slice(&brick[from..][..width]);
+                    }
+                }),
+            }
+        }
+        Ok(())
+    }
+
+    fn constant_in(&self, part: &Box3) -> Option<T> {
+        let mut ids = self.set.grid().bricks_in(part);
+        let first = ids.next().filter(|&id| self.set.slot(id).is_none()).map(|id| self.absent(id))?;
+        ids.all(|id| self.set.slot(id).is_none() && self.absent(id) == first).then_some(first)
+    }
+}
+
+impl<T: Element> BoxSink<T> for BrickArray<T> {
+    fn shape(&self) -> [i64; 3] {
+        self.set.grid().shape()
+    }
+
+    /// Writes the voxels of stored bricks; those of other bricks are passed over.
+    fn write_box(&self, part: &Box3, data: &[T]) -> Result<()> {
+        let grid = *self.set.grid();
+        for (id, slot) in grid.bricks_in(part).filter_map(|id| Some((id, self.set.slot(id)?))) {
+            let shared = grid.brick_box(id).intersect(part);
+            let width = shared.shape()[0] as usize;
+            let rows = RowsOf { brick_lo: grid.coords(id).map(|c| c * grid.edge()), edge: grid.edge() };
+            self.write(slot, |brick| {
+                for (y, z) in shared.rows() {
+                    let to = rows.offset([shared.lo[0], y, z]);
+                    brick[to..][..width].copy_from_slice(&data[part.offset_of([shared.lo[0], y, z])..][..width]);
+                }
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Where a voxel of the domain lies inside its brick's storage.
+struct RowsOf {
+    brick_lo: [i64; 3],
+    edge: i64,
+}
+
+impl RowsOf {
+    fn offset(&self, voxel: [i64; 3]) -> usize {
+        let [x, y, z]: [i64; 3] = std::array::from_fn(|a| voxel[a] - self.brick_lo[a]);
+        ((z * self.edge + y) * self.edge + x) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::BrickGrid;
+
+    fn numbered(shape: [i64; 3]) -> Vec<f32> {
+        (0..Box3::from_shape(shape).len()).map(|n| n as f32).collect()
+    }
+
+    #[test]
+    fn boxes_come_back_as_written_for_any_brick_and_window() {
+        let dir = tempfile::tempdir().unwrap();
+        let shape = [37, 21, 18];
+        let whole = Box3::from_shape(shape);
+        for (edge, window) in [(4, 1 << 30), (8, 0), (16, 1 << 20), (64, 1 << 30)] {
+            let set = Arc::new(BrickSet::dense(BrickGrid::new(shape, edge)));
+            let array = BrickArray::<f32>::new(&Scratch::new(dir.path(), window), &set).unwrap();
+            array.write_box(&whole, &numbered(shape)).unwrap();
+            let part = Box3::new([3, 5, 1], [37, 20, 18]);
+            let mut out = vec![0.0; part.len()];
+            array.read_box(&part, &mut out).unwrap();
+            for (y, z) in part.rows() {
+                for x in part.lo[0]..part.hi[0] {
+                    assert_eq!(out[part.offset_of([x, y, z])], whole.offset_of([x, y, z]) as f32);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_window_bounds_what_is_resident() {
+        let dir = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new(dir.path(), 4 << 20);
+        let set = Arc::new(BrickSet::dense(BrickGrid::new([128, 128, 256], 32)));
+        let array = BrickArray::<f32>::new(&scratch, &set).unwrap();
+        for slot in 0..set.len() as Slot {
+            array.write(slot, |b| b.fill(slot as f32));
+            assert!(scratch.window.resident() <= 4 << 20);
+        }
+        for slot in 0..set.len() as Slot {
+            array.read(slot, |b| assert!(b.iter().all(|&v| v == slot as f32)));
+        }
+        assert!(scratch.traffic().brick_loads >= 16, "the first bricks were dropped and loaded again");
+        drop(array);
+        assert_eq!(scratch.window.resident(), 0);
+    }
+
+    #[test]
+    fn absent_bricks_are_constant() {
+        let dir = tempfile::tempdir().unwrap();
+        let set = Arc::new(BrickSet::from_fn(BrickGrid::new([32, 16, 16], 16), |id| id == 0));
+        let mut array = BrickArray::<f32>::new(&Scratch::new(dir.path(), 1 << 30), &set).unwrap();
+        array.set_absent(1, 7.0);
+        assert_eq!(array.constant_in(&Box3::new([16, 0, 0], [32, 16, 16])), Some(7.0));
+        assert_eq!(array.constant_in(&Box3::new([15, 0, 0], [32, 16, 16])), None);
+        let mut out = vec![0.0; 2];
+        array.read_box(&Box3::new([15, 3, 3], [17, 4, 4]), &mut out).unwrap();
+        assert_eq!(out, [0.0, 7.0]);
+    }
+
+    #[test]
+    fn faces_are_the_outermost_valid_layers() {
+        let dir = tempfile::tempdir().unwrap();
+        let shape = [10, 8, 8];
+        let set = Arc::new(BrickSet::dense(BrickGrid::new(shape, 8)));
+        let array = BrickArray::<f32>::with_faces(&Scratch::new(dir.path(), 1 << 30), &set).unwrap();
+        array.write_box(&Box3::from_shape(shape), &numbered(shape)).unwrap();
+        array.refresh_faces(1);
+        let value = |x: i64, y: i64, z: i64| Box3::from_shape(shape).offset_of([x, y, z]) as f32;
+        array.read_face(1, FACES[1], |face| assert_eq!(face[3 * 8 + 2], value(9, 2, 3)));
+        array.read_face(1, FACES[2], |face| assert_eq!(face[3 * 8 + 1], value(9, 0, 3)));
+        array.read_face(1, FACES[5], |face| assert_eq!(face[2 * 8 + 1], value(9, 2, 7)));
+    }
+}
