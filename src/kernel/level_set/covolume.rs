@@ -1,0 +1,368 @@
+//! Coefficients of the semi-implicit co-volume scheme on one cell (Kósa PhD, eq. 3.12, 3.14; algorithms: section 5).
+//!
+//! The scheme for a voxel p with face neighbours q is `u_p + sum a_pq (u_q - u_p) = u_p^old`. With `c_pq = -a_pq >= 0`
+//!
+//! ```text
+//! c_pq = tau / h_s^2 * ( max(theta (d_q - d_p) + r_p (g_q - g_p), 0) + delta / 4 * M_p * S_pq )
+//! S_pq = sum over the face's tetrahedra of 1 / sqrt(eps^2 + G_T^2)      M_p = sqrt(eps^2 + (mean of the 24 G_T)^2)
+//! r_p  = rho / |grad g_p|_eps   (rho where the edge term is not normalised)
+//! ```
+//!
+//! which is the printed scheme with `A_q / m = 1 / h_s` and the velocity written out. The solver gets it divided by
+//! the diagonal, `u_p = r_p + sum w_pq u_q` with `w = c / (1 + sum c)`: an average, so the maximum principle is plain
+//! to see. Voxels outside of the band have w = 0 and keep their value; faces on the domain's border have c = 0.
+//!
+//! In: grown cells of u, d, g (f32; d in physical units, g in 0..1). Halo 1, all 26 directions for u. Work buffers:
+//! a few planes. Cost: 12 tetrahedra norms and about 60 operations per voxel.
+
+use super::gradients::{FLAT, FaceNorms, Metric, vertex_plane, x_faces, y_faces, z_faces};
+use super::{CELL, CELL_LEN, GROWN, PLANE};
+use crate::kernel::vectorised;
+
+/// What moves the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Velocity {
+    /// Weight of the attraction to the points, `-grad d`.
+    pub theta: f32,
+    /// Weight of the attraction to the image's edges, `-grad g`.
+    pub rho: f32,
+    /// Weight of the curvature, a length.
+    pub delta: f32,
+    /// Regularisation of gradient norms, in units of one over length.
+    pub epsilon: f32,
+    /// Length of the time step.
+    pub tau: f32,
+    /// True when the edge term is divided by the norm of grad g.
+    pub normalised: bool,
+}
+
+/// The fields of one grown cell. The edge detector may be empty when `rho` is 0.
+#[derive(Clone, Copy, Debug)]
+pub struct Fields<'a> {
+    /// Segmentation function at the old time step.
+    pub u: &'a [f32],
+    /// Distance to the cloud, physical.
+    pub d: &'a [f32],
+    /// Edge detector.
+    pub g: &'a [f32],
+}
+
+/// Which voxels of a cell are solved, and where the domain ends.
+#[derive(Clone, Debug)]
+pub struct CellMask {
+    /// 1 for voxels of the band, 0 for voxels that keep their value; dense over the cell.
+    pub solved: Vec<u8>,
+    /// Weights of the lower and upper neighbour along each axis: 0 at the domain's border, else 1.
+    pub open: [[[f32; CELL]; 2]; 3],
+    /// Rows (y) and planes (z) that hold solved voxels, half open.
+    pub rows: [usize; 2],
+    /// See `rows`.
+    pub planes: [usize; 2],
+    /// Number of solved voxels.
+    pub count: u32,
+}
+
+impl CellMask {
+    /// A mask in which nothing is solved.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { solved: vec![0; CELL_LEN], open: [[[1.0; CELL]; 2]; 3], rows: [0; 2], planes: [0; 2], count: 0 }
+    }
+
+    /// Takes over a cell's flags; `valid` voxels along each axis are inside the domain, and `border[axis]` says
+    /// whether the domain ends at the cell's lower and upper side.
+    pub fn set(&mut self, solved: &[u8], valid: [usize; 3], border: [[bool; 2]; 3]) {
+        self.solved.copy_from_slice(solved);
+        self.count = 0;
+        (self.rows, self.planes) = ([CELL, 0], [CELL, 0]);
+        for (row, flags) in solved.chunks_exact(CELL).enumerate() {
+            let count: u32 = flags.iter().map(|&f| u32::from(f)).sum();
+            if count > 0 {
+                let (y, z) = (row % CELL, row / CELL);
+                self.rows = [self.rows[0].min(y), self.rows[1].max(y + 1)];
+                self.planes = [self.planes[0].min(z), self.planes[1].max(z + 1)];
+                self.count += count;
+            }
+        }
+        self.open = [[[1.0; CELL]; 2]; 3];
+        for axis in 0..3 {
+            if border[axis][0] {
+                self.open[axis][0][0] = 0.0;
+            }
+            if border[axis][1] {
+                self.open[axis][1][valid[axis] - 1] = 0.0;
+            }
+        }
+    }
+}
+
+impl Default for CellMask {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The scheme of one cell, divided by its diagonal; arrays dense over the cell.
+#[derive(Clone, Debug)]
+pub struct Coefficients {
+    /// Weights of the neighbours across -x, +x, -y, +y, -z, +z.
+    pub weights: [Vec<f32>; 6],
+    /// The old value divided by the diagonal.
+    pub right: Vec<f32>,
+    /// Sum over the solved voxels of `M_p`, the norm of the gradient of u.
+    pub gradient_sum: f64,
+}
+
+impl Coefficients {
+    /// Room for one cell.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { weights: std::array::from_fn(|_| vec![0.0; CELL_LEN]), right: vec![0.0; CELL_LEN], gradient_sum: 0.0 }
+    }
+}
+
+impl Default for Coefficients {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Planes that the assembly rolls through.
+#[derive(Clone, Debug)]
+pub struct Planes {
+    low: Vec<f32>,
+    high: Vec<f32>,
+    x: FaceNorms,
+    y: FaceNorms,
+    z_low: FaceNorms,
+    z_high: FaceNorms,
+}
+
+impl Planes {
+    /// Room for one cell.
+    #[must_use]
+    pub fn new() -> Self {
+        let plane = || vec![0.0; PLANE];
+        let norms = FaceNorms::new;
+        Self { low: plane(), high: plane(), x: norms(), y: norms(), z_low: norms(), z_high: norms() }
+    }
+}
+
+impl Default for Planes {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Assembles the scheme of one cell, on the widest vector unit the processor has (the bits are the same on any).
+///
+/// # Panics
+/// When a field is not a grown cell (g may be empty when `rho` is 0).
+pub fn assemble(
+    fields: Fields<'_>,
+    mask: &CellMask,
+    spacing: [f64; 3],
+    velocity: &Velocity,
+    work: &mut Planes,
+    out: &mut Coefficients,
+) {
+    vectorised!({ fields: Fields<'_>, mask: &CellMask, spacing: [f64; 3], velocity: &Velocity, work: &mut Planes,
+        out: &mut Coefficients } => assemble_cell);
+}
+
+#[inline(always)]
+fn assemble_cell(
+    fields: Fields<'_>,
+    mask: &CellMask,
+    spacing: [f64; 3],
+    velocity: &Velocity,
+    work: &mut Planes,
+    out: &mut Coefficients,
+) {
+    let metric = Metric {
+        inverse_spacing: spacing.map(|h| (1.0 / h) as f32),
+        epsilon_squared: velocity.epsilon * velocity.epsilon,
+    };
+    let step = spacing.map(|h| (f64::from(velocity.tau) / (h * h)) as f32);
+    let mut sums = [0.0f32; CELL];
+    let [first, end] = mask.planes;
+    if first < end {
+        vertex_plane(fields.u, first, &mut work.low);
+        z_faces(fields.u, first, &work.low, &metric, &mut work.z_low);
+    }
+    for z in first..end {
+        vertex_plane(fields.u, z + 1, &mut work.high);
+        x_faces(fields.u, z, &work.low, &work.high, &metric, &mut work.x);
+        y_faces(fields.u, z, &work.low, &work.high, &metric, &mut work.y);
+        z_faces(fields.u, z + 1, &work.high, &metric, &mut work.z_high);
+        for y in mask.rows[0]..mask.rows[1] {
+            let row = Row { y, z, work, mask, metric: &metric, step, velocity };
+            if velocity.rho == 0.0 {
+                row.assemble::<false>(fields, out, &mut sums);
+            } else {
+                row.assemble::<true>(fields, out, &mut sums);
+            }
+        }
+        std::mem::swap(&mut work.low, &mut work.high);
+        std::mem::swap(&mut work.z_low, &mut work.z_high);
+    }
+    out.gradient_sum = sums.iter().map(|&s| f64::from(s)).sum();
+}
+
+/// One row of voxels of the cell being assembled.
+struct Row<'a> {
+    y: usize,
+    z: usize,
+    work: &'a Planes,
+    mask: &'a CellMask,
+    metric: &'a Metric,
+    step: [f32; 3],
+    velocity: &'a Velocity,
+}
+
+/// `N` consecutive values from `start`.
+#[inline(always)]
+fn window<const N: usize>(values: &[f32], start: usize) -> &[f32; N] {
+    values[start..start + N].first_chunk().expect("the slice has N values")
+}
+
+impl Row<'_> {
+    #[inline(always)]
+    fn assemble<const EDGES: bool>(&self, fields: Fields<'_>, out: &mut Coefficients, sums: &mut [f32; CELL]) {
+        let (y, z, mask, v) = (self.y, self.z, self.mask, self.velocity);
+        let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
+        let flat = y * GROWN;
+        let places = [center - 1, center + 1, center - GROWN, center + GROWN, center - PLANE, center + PLANE];
+        let d = window::<CELL>(fields.d, center);
+        let d_q: [&[f32; CELL]; 6] = places.map(|p| window(fields.d, p));
+        let mean = self.mean_norms(flat);
+        let s: [&[f32; CELL]; 6] = self.face_inverses(flat);
+        let pull = if EDGES { self.edge_pull(fields.g, center, &places) } else { [[0.0; CELL]; 6] };
+        let at = (z * CELL + y) * CELL;
+        let solved: &[u8; CELL] = mask.solved[at..at + CELL].first_chunk().expect("a row of the cell");
+        let u = window::<CELL>(fields.u, center);
+        let mut c = [[0.0f32; CELL]; 6];
+        let mut diagonal = [1.0f32; CELL];
+        for q in 0..6 {
+            let (axis, side) = (q / 2, q % 2);
+            let open = &mask.open[axis][side];
+            let step = self.step[axis];
+            for x in 0..CELL {
+                let beyond = [open[x], open[y], open[z]][axis];
+                let on = f32::from(solved[x]) * beyond * step;
+                let attraction = v.theta * (d_q[q][x] - d[x]) + pull[q][x];
+                let curvature = 0.25 * v.delta * mean[x] * s[q][x];
+                c[q][x] = on * (attraction.max(0.0) + curvature);
+                diagonal[x] += c[q][x];
+            }
+        }
+        for x in 0..CELL {
+            sums[x] += f32::from(solved[x]) * mean[x];
+            diagonal[x] = 1.0 / diagonal[x];
+        }
+        for (weights, c) in out.weights.iter_mut().zip(&c) {
+            let weights = &mut weights[at..at + CELL];
+            for x in 0..CELL {
+                weights[x] = c[x] * diagonal[x];
+            }
+        }
+        let right = &mut out.right[at..at + CELL];
+        for x in 0..CELL {
+            right[x] = u[x] * diagonal[x];
+        }
+    }
+
+    /// `M_p` along the row: the mean over the tetrahedra of the six faces, regularised.
+    #[inline(always)]
+    fn mean_norms(&self, flat: usize) -> [f32; CELL] {
+        let work = self.work;
+        let faces: [&[f32; CELL]; 6] = [
+            window(&work.x.norm, flat),
+            window(&work.x.norm, flat + 1),
+            window(&work.y.norm, flat),
+            window(&work.y.norm, flat + GROWN),
+            window(&work.z_low.norm, flat),
+            window(&work.z_high.norm, flat),
+        ];
+        let mut mean = [0.0f32; CELL];
+        for x in 0..CELL {
+            let sum = (faces[0][x] + faces[1][x]) + (faces[2][x] + faces[3][x]) + (faces[4][x] + faces[5][x]);
+            let m = sum * (1.0 / 24.0);
+            mean[x] = (self.metric.epsilon_squared + m * m).sqrt();
+        }
+        mean
+    }
+
+    #[inline(always)]
+    fn face_inverses(&self, flat: usize) -> [&[f32; CELL]; 6] {
+        let work = self.work;
+        [
+            window(&work.x.inverse, flat),
+            window(&work.x.inverse, flat + 1),
+            window(&work.y.inverse, flat),
+            window(&work.y.inverse, flat + GROWN),
+            window(&work.z_low.inverse, flat),
+            window(&work.z_high.inverse, flat),
+        ]
+    }
+
+    /// `r_p (g_q - g_p)` towards the six neighbours.
+    #[inline(always)]
+    fn edge_pull(&self, g: &[f32], center: usize, places: &[usize; 6]) -> [[f32; CELL]; 6] {
+        let here = window::<CELL>(g, center);
+        let mut pull: [[f32; CELL]; 6] = places.map(|p| *window(g, p));
+        let mut square = [0.0f32; CELL];
+        for (q, pull) in pull.iter_mut().enumerate() {
+            let inverse = self.metric.inverse_spacing[q / 2];
+            for x in 0..CELL {
+                pull[x] -= here[x];
+                let slope = pull[x] * inverse;
+                square[x] += slope * slope;
+            }
+        }
+        for x in 0..CELL {
+            let norm = if self.velocity.normalised {
+                (self.metric.epsilon_squared + 0.5 * square[x]).sqrt()
+            } else {
+                1.0
+            };
+            square[x] = self.velocity.rho / norm;
+        }
+        for pull in &mut pull {
+            for x in 0..CELL {
+                pull[x] *= square[x];
+            }
+        }
+        pull
+    }
+}
+
+/// The mean of the 24 tetrahedral gradient norms of every voxel of a grown cell: what the edge detector is made of.
+///
+/// # Panics
+/// When `u` is not a grown cell or `out` not a cell.
+pub fn mean_gradient(u: &[f32], spacing: [f64; 3], work: &mut Planes, out: &mut [f32]) {
+    vectorised!({ u: &[f32], spacing: [f64; 3], work: &mut Planes, out: &mut [f32] } => mean_gradient_cell);
+}
+
+#[inline(always)]
+fn mean_gradient_cell(u: &[f32], spacing: [f64; 3], work: &mut Planes, out: &mut [f32]) {
+    let metric = Metric { inverse_spacing: spacing.map(|h| (1.0 / h) as f32), epsilon_squared: f32::MIN_POSITIVE };
+    let mask = CellMask::new();
+    let velocity = Velocity { theta: 0.0, rho: 0.0, delta: 0.0, epsilon: 0.0, tau: 0.0, normalised: false };
+    vertex_plane(u, 0, &mut work.low);
+    z_faces(u, 0, &work.low, &metric, &mut work.z_low);
+    for z in 0..CELL {
+        vertex_plane(u, z + 1, &mut work.high);
+        x_faces(u, z, &work.low, &work.high, &metric, &mut work.x);
+        y_faces(u, z, &work.low, &work.high, &metric, &mut work.y);
+        z_faces(u, z + 1, &work.high, &metric, &mut work.z_high);
+        for y in 0..CELL {
+            let row = Row { y, z, work, mask: &mask, metric: &metric, step: [0.0; 3], velocity: &velocity };
+            out[(z * CELL + y) * CELL..][..CELL].copy_from_slice(&row.mean_norms(y * GROWN));
+        }
+        std::mem::swap(&mut work.low, &mut work.high);
+        std::mem::swap(&mut work.z_low, &mut work.z_high);
+    }
+    debug_assert!(FLAT <= PLANE);
+}

@@ -1,0 +1,129 @@
+//! Gradient norms on the tetrahedra of the co-volume mesh (Kósa 2015, sec. 3.3; algorithms: section 5).
+//!
+//! Each face between voxels p and q carries four tetrahedra, one for each of its edges (z1, z2). With vertex values
+//! the mean of the eight voxels around the vertex, the gradient on a tetrahedron has the components
+//! `(u_q - u_p) / h_pq`, `(u_z2 - u_z1) / h_edge` and `(u_x - u_y) / (h_across / 2)`, where `u_x` is the mean of p and
+//! q at the face's centre and `u_y` the mean of z1 and z2 at the edge's centre. A face belongs to both its voxels, so
+//! twelve norms for each voxel (its three lower faces) serve all 24.
+//!
+//! Everything runs along flat planes with the grown cell's row pitch: at the row ends a few values are computed that
+//! nobody reads, and in return no row has a remainder that would not fill a vector. In: one grown cell of f32.
+//! Cost per face: 8 square roots, one division.
+
+use super::{CELL, GROWN, PLANE};
+
+/// What the coefficients need of the four tetrahedra of a face, for one plane of faces at grown-cell pitch.
+#[derive(Clone, Debug)]
+pub(crate) struct FaceNorms {
+    /// Sum over the four tetrahedra of `1 / sqrt(eps^2 + G_T^2)`.
+    pub(crate) inverse: Vec<f32>,
+    /// Sum over the four tetrahedra of `G_T`.
+    pub(crate) norm: Vec<f32>,
+}
+
+impl FaceNorms {
+    pub(crate) fn new() -> Self {
+        Self { inverse: vec![0.0; PLANE], norm: vec![0.0; PLANE] }
+    }
+}
+
+/// One over the spacing along each axis, and the square of the regularisation `eps`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Metric {
+    pub(crate) inverse_spacing: [f32; 3],
+    pub(crate) epsilon_squared: f32,
+}
+
+/// Rows of a plane that hold voxels or their upper faces, as a flat length.
+pub(crate) const FLAT: usize = (CELL + 1) * GROWN;
+
+/// Vertex values of plane `k` of vertices: the mean of the eight voxels around each.
+///
+/// Vertex (i, j, k) is the lower corner of voxel (i, j, k); its place in `out` is that voxel's in a grown plane.
+#[inline(always)]
+pub(crate) fn vertex_plane(u: &[f32], k: usize, out: &mut [f32]) {
+    let below = &u[k * PLANE..][..PLANE];
+    let above = &u[(k + 1) * PLANE..][..PLANE];
+    // Local voxel (i, j) lies at (i + 1, j + 1): the four voxels around vertex (i, j) start at flat place n.
+    // The very last place would be a vertex that nobody reads.
+    let out = &mut out[..FLAT - 1];
+    for n in 0..FLAT - 1 {
+        let low = (below[n] + below[n + 1]) + (below[n + GROWN] + below[n + GROWN + 1]);
+        let high = (above[n] + above[n + 1]) + (above[n + GROWN] + above[n + GROWN + 1]);
+        out[n] = 0.125 * (low + high);
+    }
+}
+
+/// The four tetrahedra of one face: `step` across the face; `v00, v10, v01, v11` its vertices, first index along the
+/// first tangent, second along the second; `mean` the value at its centre. Inverse spacings of the two tangents.
+#[inline(always)]
+fn face_sums(step: f32, mean: f32, v: [f32; 4], inverse: [f32; 2], epsilon_squared: f32) -> (f32, f32) {
+    let [v00, v10, v01, v11] = v;
+    let square = step * step;
+    // Edges along the first tangent, at the lower and the upper end of the second, then the other way round.
+    let g = [
+        tetrahedron(square, v00, v10, mean, inverse[0], inverse[1]),
+        tetrahedron(square, v01, v11, mean, inverse[0], inverse[1]),
+        tetrahedron(square, v00, v01, mean, inverse[1], inverse[0]),
+        tetrahedron(square, v10, v11, mean, inverse[1], inverse[0]),
+    ];
+    let norm = (g[0].sqrt() + g[1].sqrt()) + (g[2].sqrt() + g[3].sqrt());
+    let r = g.map(|square| (epsilon_squared + square).sqrt());
+    // 1/a + 1/b + 1/c + 1/d over one common denominator: one division in place of four.
+    let (ab, cd) = (r[0] * r[1], r[2] * r[3]);
+    let sum = ((r[0] + r[1]) * cd + (r[2] + r[3]) * ab) / (ab * cd);
+    (sum, norm)
+}
+
+/// The squared gradient norm on the tetrahedron of the edge from `z1` to `z2`.
+#[inline(always)]
+fn tetrahedron(across: f32, z1: f32, z2: f32, mean: f32, inverse_edge: f32, inverse_side: f32) -> f32 {
+    let along = (z2 - z1) * inverse_edge;
+    let inward = (mean - 0.5 * (z1 + z2)) * (2.0 * inverse_side);
+    across + along * along + inward * inward
+}
+
+/// Norms of the lower x-faces of voxel plane `k`: place n holds the face between voxels (i - 1, j) and (i, j).
+#[inline(always)]
+pub(crate) fn x_faces(u: &[f32], k: usize, low: &[f32], high: &[f32], metric: &Metric, out: &mut FaceNorms) {
+    let u = &u[(k + 1) * PLANE + GROWN..][..FLAT];
+    let [ix, iy, iz] = metric.inverse_spacing;
+    let (inverse, norm) = (&mut out.inverse[..FLAT], &mut out.norm[..FLAT]);
+    let (low, high) = (&low[..FLAT + GROWN], &high[..FLAT + GROWN]);
+    for n in 0..CELL * GROWN {
+        let (p, q) = (u[n + 1], u[n]);
+        let vertices = [low[n], low[n + GROWN], high[n], high[n + GROWN]];
+        (inverse[n], norm[n]) =
+            face_sums((q - p) * ix, 0.5 * (p + q), vertices, [iy, iz], metric.epsilon_squared);
+    }
+}
+
+/// Norms of the lower y-faces of voxel plane `k`, the upper ones of the last row included.
+#[inline(always)]
+pub(crate) fn y_faces(u: &[f32], k: usize, low: &[f32], high: &[f32], metric: &Metric, out: &mut FaceNorms) {
+    let u = &u[(k + 1) * PLANE..][..PLANE];
+    let [ix, iy, iz] = metric.inverse_spacing;
+    let (inverse, norm) = (&mut out.inverse[..FLAT], &mut out.norm[..FLAT]);
+    let (low, high) = (&low[..FLAT + 1], &high[..FLAT + 1]);
+    for n in 0..FLAT - 1 {
+        let (p, q) = (u[n + GROWN + 1], u[n + 1]);
+        let vertices = [low[n], low[n + 1], high[n], high[n + 1]];
+        (inverse[n], norm[n]) =
+            face_sums((q - p) * iy, 0.5 * (p + q), vertices, [ix, iz], metric.epsilon_squared);
+    }
+}
+
+/// Norms of the lower z-faces of voxel plane `k`; `k == CELL` gives the upper ones of the last plane.
+#[inline(always)]
+pub(crate) fn z_faces(u: &[f32], k: usize, vertices: &[f32], metric: &Metric, out: &mut FaceNorms) {
+    let below = &u[k * PLANE + GROWN..][..FLAT];
+    let above = &u[(k + 1) * PLANE + GROWN..][..FLAT];
+    let [ix, iy, iz] = metric.inverse_spacing;
+    let (inverse, norm) = (&mut out.inverse[..FLAT], &mut out.norm[..FLAT]);
+    let v = &vertices[..FLAT + GROWN];
+    for n in 0..CELL * GROWN - 1 {
+        let (p, q) = (above[n + 1], below[n + 1]);
+        let corners = [v[n], v[n + 1], v[n + GROWN], v[n + GROWN + 1]];
+        (inverse[n], norm[n]) = face_sums((q - p) * iz, 0.5 * (p + q), corners, [ix, iy], metric.epsilon_squared);
+    }
+}

@@ -1,0 +1,17 @@
+//! The level set equation `u_t + v . grad u - delta |grad u| div(grad u / |grad u|) = 0` on one cell.
+//!
+//! A *cell* is a box of [`CELL`]^3 voxels of the grid: the unit on which the band is stored, solved and judged, the
+//! same whatever the brick size. Source: Kósa 2015, chapter 3; Kósa PhD, chapter 3 (algorithms: section 5).
+
+pub mod covolume;
+pub mod gradients;
+pub mod sor;
+
+/// Voxels along the edge of a cell.
+pub const CELL: usize = 16;
+/// Voxels of a cell.
+pub const CELL_LEN: usize = CELL * CELL * CELL;
+/// Voxels along the edge of a cell grown by its halo.
+pub(crate) const GROWN: usize = CELL + 2;
+/// Voxels of one plane of the grown cell.
+pub(crate) const PLANE: usize = GROWN * GROWN;
