@@ -62,6 +62,19 @@ impl HaloPlan {
         let shape = self.grid.brick_box(id).shape().map(|n| n as usize);
         tile.set_valid(shape);
         array.read(slot, |brick| copy_brick(brick, shape, tile));
+        self.gather_halo(array, slot, boundary, tile);
+    }
+
+    /// Fills only the halo of `tile`, which already holds the brick (or another field's values for it).
+    pub fn gather_halo<T: Element>(
+        &self,
+        array: &BrickArray<T>,
+        slot: Slot,
+        boundary: Boundary<T>,
+        tile: &mut HaloTile<T>,
+    ) {
+        let id = array.set().id(slot);
+        let shape = tile.valid();
         for link in &self.links {
             let Some(neighbour) = self.grid.neighbour(id, link.offset) else { continue };
             let ghosts = ghost_box(shape, link.offset);

@@ -7,6 +7,7 @@ mod box3;
 mod brick_grid;
 mod brick_set;
 mod geometry;
+mod point_bins;
 mod sources;
 mod stencil;
 
@@ -14,5 +15,6 @@ pub use box3::Box3;
 pub use brick_grid::{BrickGrid, BrickId};
 pub use brick_set::{BrickSet, Slot};
 pub use geometry::Geometry;
+pub use point_bins::PointBins;
 pub use sources::PointCloud;
 pub use stencil::{FACES, Face, NEIGHBOURS_26};

@@ -30,7 +30,6 @@ macro_rules! vectorised {
         pulp::Arch::new().dispatch(Call(Arguments(($($name,)*))))
     }};
 }
-pub(crate) use vectorised;
 
 pub mod distance;
 pub mod level_set;

@@ -17,7 +17,6 @@
 
 use super::gradients::{FLAT, FaceNorms, Metric, vertex_plane, x_faces, y_faces, z_faces};
 use super::{CELL, CELL_LEN, GROWN, PLANE};
-use crate::kernel::vectorised;
 
 /// What moves the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -321,11 +320,8 @@ impl Row<'_> {
             }
         }
         for x in 0..CELL {
-            let norm = if self.velocity.normalised {
-                (self.metric.epsilon_squared + 0.5 * square[x]).sqrt()
-            } else {
-                1.0
-            };
+            let norm =
+                if self.velocity.normalised { (self.metric.epsilon_squared + 0.5 * square[x]).sqrt() } else { 1.0 };
             square[x] = self.velocity.rho / norm;
         }
         for pull in &mut pull {

@@ -93,8 +93,7 @@ pub(crate) fn x_faces(u: &[f32], k: usize, low: &[f32], high: &[f32], metric: &M
     for n in 0..CELL * GROWN {
         let (p, q) = (u[n + 1], u[n]);
         let vertices = [low[n], low[n + GROWN], high[n], high[n + GROWN]];
-        (inverse[n], norm[n]) =
-            face_sums((q - p) * ix, 0.5 * (p + q), vertices, [iy, iz], metric.epsilon_squared);
+        (inverse[n], norm[n]) = face_sums((q - p) * ix, 0.5 * (p + q), vertices, [iy, iz], metric.epsilon_squared);
     }
 }
 
@@ -108,8 +107,7 @@ pub(crate) fn y_faces(u: &[f32], k: usize, low: &[f32], high: &[f32], metric: &M
     for n in 0..FLAT - 1 {
         let (p, q) = (u[n + GROWN + 1], u[n + 1]);
         let vertices = [low[n], low[n + 1], high[n], high[n + 1]];
-        (inverse[n], norm[n]) =
-            face_sums((q - p) * iy, 0.5 * (p + q), vertices, [ix, iz], metric.epsilon_squared);
+        (inverse[n], norm[n]) = face_sums((q - p) * iy, 0.5 * (p + q), vertices, [ix, iz], metric.epsilon_squared);
     }
 }
 

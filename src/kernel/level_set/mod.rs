@@ -3,7 +3,9 @@
 //! A *cell* is a box of [`CELL`]^3 voxels of the grid: the unit on which the band is stored, solved and judged, the
 //! same whatever the brick size. Source: Kósa 2015, chapter 3; Kósa PhD, chapter 3 (algorithms: section 5).
 
+pub mod basins;
 pub mod covolume;
+pub mod flood;
 pub mod gradients;
 pub mod sor;
 

@@ -7,7 +7,6 @@
 
 use super::covolume::{CellMask, Coefficients};
 use super::{CELL, GROWN, PLANE};
-use crate::kernel::vectorised;
 
 /// Sums over the solved voxels of a cell after it was relaxed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

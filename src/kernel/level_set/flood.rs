@@ -1,0 +1,49 @@
+//! The bottleneck flood on one tile (algorithms: section 5, "Automatic beta").
+//!
+//! `b_p` is the largest threshold at which a flood from the domain's border through voxels with `d >= threshold` still
+//! reaches p: the fixed point of `b_p = max(b_p, min(d_p, max over face neighbours b_q))`. Only comparisons, so the
+//! fixed point is reached exactly, in any order, for any bricks. Voxels with `d > b` lie in basins.
+
+use crate::tile::HaloTile;
+
+/// Relaxes the tile until nothing rises. `d` is dense over the brick; ghosts of `b` are current. Returns whether
+/// anything rose.
+pub fn relax(b: &mut HaloTile<f32>, d: &[f32]) -> bool {
+    let mut rose = false;
+    loop {
+        let forward = pass(b, d, true);
+        let backward = forward && pass(b, d, false);
+        rose |= forward;
+        if !backward {
+            return rose;
+        }
+    }
+}
+
+fn pass(b: &mut HaloTile<f32>, d: &[f32], upward: bool) -> bool {
+    let (edge, pitch, valid) = (b.edge(), b.pitch(), b.valid());
+    let mut rose = false;
+    let rows = valid[1] * valid[2];
+    for n in 0..rows {
+        let row = if upward { n } else { rows - 1 - n };
+        let (y, z) = (row % valid[1], row / valid[1]);
+        let start = b.at(0, y as isize, z as isize);
+        let limits = &d[(z * edge + y) * edge..][..valid[0]];
+        let b = b.data_mut();
+        for m in 0..valid[0] {
+            let x = if upward { m } else { valid[0] - 1 - m };
+            let at = start + x;
+            if b[at] >= limits[x] {
+                continue;
+            }
+            let along = b[at - 1].max(b[at + 1]);
+            let across = b[at - pitch].max(b[at + pitch]).max(b[at - pitch * pitch]).max(b[at + pitch * pitch]);
+            let reached = limits[x].min(along.max(across));
+            if reached > b[at] {
+                b[at] = reached;
+                rose = true;
+            }
+        }
+    }
+    rose
+}

@@ -1,0 +1,186 @@
+//! The narrow band and its start (algorithms: section 5, "Initial condition", "Narrow band").
+//!
+//! Start: u = 0 where the flood reaches at threshold beta, 1 elsewhere. Solved are the voxels within `inner` of the
+//! cloud on the inside and within `outer` on the outside; all others keep their start value. Only cells that hold a
+//! solved voxel, or touch one, are stored; the others are constant.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers, one_wave};
+use crate::grid::{BrickSet, NEIGHBOURS_26, Slot};
+use crate::kernel::level_set::covolume::CellMask;
+use crate::store::{BoxSource, BrickArray};
+
+/// How far the band reaches, and where the start surface lies. Physical lengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reaches {
+    /// The start surface lies at this distance outside of the cloud.
+    pub beta: f32,
+    /// The band's reach on the inside.
+    pub inner: f32,
+    /// The band's reach on the outside.
+    pub outer: f32,
+}
+
+/// The fields of the band before the first time step; all over the same set of cells.
+pub struct Band {
+    /// Segmentation function, two time levels; the first holds the start.
+    pub u: [BrickArray<f32>; 2],
+    /// Distance to the cloud.
+    pub distance: BrickArray<f32>,
+    /// 1 where a voxel is solved.
+    pub solved: BrickArray<u8>,
+    /// Number of solved voxels.
+    pub voxels: u64,
+}
+
+/// What a voxel is at the start.
+#[inline]
+fn classify(d: f32, level: f32, reaches: &Reaches) -> (f32, bool) {
+    if level >= reaches.beta { (0.0, d <= reaches.outer) } else { (1.0, d <= reaches.inner) }
+}
+
+/// Makes the band from the distance and the flood's level, both over the same cells.
+///
+/// # Errors
+/// When scratch runs out or the run is interrupted.
+pub fn make_band(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    distance: &BrickArray<f32>,
+    level: &BrickArray<f32>,
+    reaches: &Reaches,
+) -> Result<Band> {
+    let set = Arc::new(band_cells(stage, distance, level, reaches)?);
+    let new = || BrickArray::<f32>::with_faces(engine.scratch(), &set);
+    let mut band =
+        Band { u: [new()?, new()?], distance: new()?, solved: BrickArray::new(engine.scratch(), &set)?, voxels: 0 };
+    for id in 0..set.grid().len() {
+        let inside = f32::from(start_of_cell(distance, level, id, reaches) > 0.5);
+        band.u.iter_mut().for_each(|u| u.set_absent(id, inside));
+        band.distance.set_absent(id, distance.absent(id));
+    }
+    let counts = stage
+        .run(&one_wave(&set), &Workers::none(), |(), &slot| Ok(fill_cell(&band, distance, level, reaches, slot)))?;
+    band.voxels = counts.iter().sum();
+    stage.voxels(band.voxels);
+    Ok(band)
+}
+
+/// The start value of a cell that is constant, told from its first voxel.
+fn start_of_cell(distance: &BrickArray<f32>, level: &BrickArray<f32>, id: u64, reaches: &Reaches) -> f32 {
+    match distance.set().slot(id) {
+        None => classify(distance.absent(id), level.absent(id), reaches).0,
+        Some(slot) => level.read(slot, |b| distance.read(slot, |d| classify(d[0], b[0], reaches).0)),
+    }
+}
+
+fn fill_cell(band: &Band, distance: &BrickArray<f32>, level: &BrickArray<f32>, reaches: &Reaches, slot: Slot) -> u64 {
+    let set = band.solved.set();
+    let id = set.id(slot);
+    // A cell of the band's rim may lie where the distance is not stored: it is constant there.
+    let fill = |d: &[f32], b: &[f32]| {
+        band.distance.write(slot, |out| out.copy_from_slice(d));
+        band.u[0].write(slot, |u| {
+            u.iter_mut().zip(d.iter().zip(b)).for_each(|(u, (&d, &b))| *u = classify(d, b, reaches).0)
+        });
+        let valid = set.grid().brick_box(id).shape().map(|n| n as usize);
+        let edge = set.grid().edge() as usize;
+        band.solved.write(slot, |solved| {
+            let mut count = 0;
+            for (place, flag) in solved.iter_mut().enumerate() {
+                let at = [place % edge, place / edge % edge, place / (edge * edge)];
+                let inside = (0..3).all(|a| at[a] < valid[a]);
+                *flag = u8::from(inside && classify(d[place], b[place], reaches).1);
+                count += u64::from(*flag);
+            }
+            count
+        })
+    };
+    let count = match distance.set().slot(id) {
+        Some(from) => distance.read(from, |d| level.read(from, |b| fill(d, b))),
+        None => {
+            let len = set.grid().brick_len();
+            fill(&vec![distance.absent(id); len], &vec![level.absent(id); len])
+        }
+    };
+    band.distance.refresh_faces(slot);
+    band.u[0].refresh_faces(slot);
+    count
+}
+
+/// The cells that hold a solved voxel or have one right beside them.
+fn band_cells(
+    stage: &Stage<'_>,
+    distance: &BrickArray<f32>,
+    level: &BrickArray<f32>,
+    reaches: &Reaches,
+) -> Result<BrickSet> {
+    let set = distance.set();
+    let grid = *set.grid();
+    let edge = grid.edge() as usize;
+    let hulls = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+        let valid = grid.brick_box(set.id(slot)).shape().map(|n| n as usize);
+        Ok(distance.read(slot, |d| {
+            level.read(slot, |b| {
+                let mut hull: Option<[[usize; 2]; 3]> = None;
+                for place in 0..d.len() {
+                    let at = [place % edge, place / edge % edge, place / (edge * edge)];
+                    if (0..3).all(|a| at[a] < valid[a]) && classify(d[place], b[place], reaches).1 {
+                        let hull = hull.get_or_insert(at.map(|v| [v, v]));
+                        (0..3).for_each(|a| hull[a] = [hull[a][0].min(at[a]), hull[a][1].max(at[a])]);
+                    }
+                }
+                hull
+            })
+        }))
+    })?;
+    let mut keep = vec![false; grid.len() as usize];
+    for (slot, hull) in hulls.iter().enumerate().filter_map(|(s, h)| Some((s as Slot, h.as_ref()?))) {
+        let id = set.id(slot);
+        keep[id as usize] = true;
+        for offset in NEIGHBOURS_26 {
+            let touches = (0..3).all(|a| match offset[a] {
+                -1 => hull[a][0] == 0,
+                1 => hull[a][1] == edge - 1,
+                _ => true,
+            });
+            if let Some(neighbour) = grid.neighbour(id, offset).filter(|_| touches) {
+                keep[neighbour as usize] = true;
+            }
+        }
+    }
+    Ok(BrickSet::from_fn(grid, |id| keep[id as usize]))
+}
+
+/// Reads a cell's flags into `mask`, with the domain's borders.
+pub fn read_mask(solved: &BrickArray<u8>, slot: Slot, mask: &mut CellMask) {
+    let grid = solved.set().grid();
+    let id = solved.set().id(slot);
+    let (at, counts) = (grid.coords(id), grid.counts());
+    let border = std::array::from_fn(|a| [at[a] == 0, at[a] == counts[a] - 1]);
+    let valid = grid.brick_box(id).shape().map(|n| n as usize);
+    solved.read(slot, |flags| mask.set(flags, valid, border));
+}
+
+/// Volume enclosed by u, in voxels, cells in grid order: what the stopping rule and the report look at.
+///
+/// # Errors
+/// When a brick cannot be read.
+pub fn enclosed_voxels(u: &BrickArray<f32>) -> Result<u64> {
+    let grid = *u.set().grid();
+    let mut count = 0;
+    let mut values = vec![0.0; grid.brick_len()];
+    for id in 0..grid.len() {
+        let part = grid.brick_box(id);
+        match u.constant_in(&part) {
+            Some(value) => count += if value >= 0.5 { part.volume() } else { 0 },
+            None => {
+                u.read_box(&part, &mut values[..part.len()])?;
+                count += values[..part.len()].iter().filter(|v| **v >= 0.5).count() as u64;
+            }
+        }
+    }
+    Ok(count)
+}
