@@ -32,4 +32,5 @@ macro_rules! vectorised {
 }
 
 pub mod distance;
+pub mod image;
 pub mod level_set;

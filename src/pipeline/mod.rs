@@ -3,4 +3,7 @@
 pub mod band;
 pub mod distance;
 pub mod evolve;
+pub mod image_terms;
+pub mod intensity;
+pub mod marks;
 pub mod tagging;

@@ -1,0 +1,160 @@
+//! The image's part in the velocity: presmoothing and edge detector on the cells around the band.
+
+use std::sync::Arc;
+
+use super::band::read_mask;
+use crate::error::Result;
+use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
+use crate::grid::{BrickSet, Slot};
+use crate::kernel::image::{edge_detector::edge_detector, heat};
+use crate::kernel::level_set::covolume::{CellMask, Coefficients, Planes};
+use crate::kernel::level_set::sor::relax;
+use crate::kernel::level_set::{CELL, CELL_LEN};
+use crate::store::{BoxSource, BrickArray};
+use crate::tile::HaloTile;
+
+/// How edges are found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeSettings {
+    /// Width of the presmoothing, a physical length; 0 for none.
+    pub sigma: f64,
+    /// Contrast parameter K for intensities in [0, 1] and gradients per smallest spacing.
+    pub k: f32,
+}
+
+/// Relaxations of a cell each time it is taken up, over-relaxed by [`HEAT_OMEGA`].
+const HEAT_ITERATIONS: usize = 4;
+const HEAT_OMEGA: f32 = 1.4;
+/// The smoothed image is done when the root mean square of the corrections is below this.
+const HEAT_TOLERANCE: f64 = 2e-5;
+const HEAT_ROUNDS: usize = 60;
+
+/// The edge detector g on the cells of `band`, from an image normalised to [0, 1] over the band's grid.
+///
+/// # Errors
+/// When the image cannot be read, scratch runs out or the run is interrupted.
+pub fn edges(
+    stages: [&Stage<'_>; 2],
+    engine: &Engine,
+    image: &dyn BoxSource<f32>,
+    band: &Arc<BrickSet>,
+    spacing: [f64; 3],
+    settings: &EdgeSettings,
+) -> Result<BrickArray<f32>> {
+    let smoothed = presmooth(stages[0], engine, image, band, spacing, settings.sigma)?;
+    let stage = stages[1];
+    let edges = BrickArray::with_faces(engine.scratch(), band)?;
+    let plan = HaloPlan::new(*band.grid(), Reach::All);
+    let workers = Workers::new(|| (HaloTile::new(CELL), Planes::new()));
+    let length = spacing.iter().copied().fold(f64::INFINITY, f64::min);
+    stage.voxels((band.len() * CELL_LEN) as u64);
+    stage.run(&one_wave(band), &workers, |(tile, planes), &slot| {
+        let wide = smoothed.set().slot(band.id(slot)).expect("smoothed cells cover the band");
+        plan.gather(&smoothed, wide, Boundary::Mirror, tile);
+        edges.write(slot, |g| edge_detector(tile.data(), spacing, length, settings.k, planes, g));
+        edges.refresh_faces(slot);
+        Ok(())
+    })?;
+    Ok(edges)
+}
+
+/// One implicit step of the heat equation on the cells within five sigma of the band.
+fn presmooth(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    image: &dyn BoxSource<f32>,
+    band: &BrickSet,
+    spacing: [f64; 3],
+    sigma: f64,
+) -> Result<BrickArray<f32>> {
+    let set = Arc::new(widened(band, spacing, 5.0 * sigma));
+    let smoothed = BrickArray::with_faces(engine.scratch(), &set)?;
+    let initial = BrickArray::new(engine.scratch(), &set)?;
+    let solved = BrickArray::new(engine.scratch(), &set)?;
+    let grid = *set.grid();
+    stage.voxels((set.len() * CELL_LEN) as u64);
+    stage.run(&one_wave(&set), &Workers::new(|| vec![0.0; CELL_LEN]), |values, &slot| {
+        let part = grid.brick_box(set.id(slot));
+        let values = &mut values[..part.len()];
+        image.read_box(&part, values)?;
+        let copy = |brick: &mut [f32]| spread(values, &part.shape(), brick);
+        initial.write(slot, copy);
+        smoothed.write(slot, copy);
+        solved.write(slot, |flags: &mut [u8]| spread(&vec![1; values.len()], &part.shape(), flags));
+        smoothed.refresh_faces(slot);
+        Ok(())
+    })?;
+    if sigma > 0.0 {
+        relax_heat(stage, &set, [&smoothed, &initial], &solved, spacing, sigma)?;
+    }
+    Ok(smoothed)
+}
+
+/// Copies a dense box, shorter than a cell where the domain ends, into a cell's storage.
+fn spread<T: Copy>(values: &[T], shape: &[i64; 3], brick: &mut [T]) {
+    for (row, values) in values.chunks_exact(shape[0] as usize).enumerate() {
+        let (y, z) = (row % shape[1] as usize, row / shape[1] as usize);
+        brick[(z * CELL + y) * CELL..][..values.len()].copy_from_slice(values);
+    }
+}
+
+fn relax_heat(
+    stage: &Stage<'_>,
+    set: &Arc<BrickSet>,
+    [smoothed, initial]: [&BrickArray<f32>; 2],
+    solved: &BrickArray<u8>,
+    spacing: [f64; 3],
+    sigma: f64,
+) -> Result<()> {
+    let plan = HaloPlan::new(*set.grid(), Reach::Faces);
+    let workers = Workers::new(|| (HaloTile::new(CELL), CellMask::new(), Coefficients::new()));
+    let waves = checkerboard(set, |_| true);
+    let voxels = (set.len() * CELL_LEN) as f64;
+    for round in 1..=HEAT_ROUNDS {
+        let mut squares = vec![0.0; set.len()];
+        for wave in &waves {
+            let corrections = stage.run(wave, &workers, |(tile, mask, scheme), &slot| {
+                read_mask(solved, slot, mask);
+                close_to_absent(set, slot, mask);
+                initial.read(slot, |values| heat::scheme(values, mask, spacing, sigma, scheme));
+                plan.gather(smoothed, slot, Boundary::Mirror, tile);
+                let correction = relax(tile.data_mut(), scheme, mask, HEAT_OMEGA, HEAT_ITERATIONS);
+                plan.scatter(tile, smoothed, slot);
+                Ok(correction)
+            })?;
+            wave.iter().zip(corrections).for_each(|(&slot, c)| squares[slot as usize] = c);
+        }
+        let residual = (squares.iter().sum::<f64>() / voxels).sqrt();
+        stage.iterated((HEAT_ITERATIONS * usize::from(round > 0)) as u64, residual);
+        if residual < HEAT_TOLERANCE {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// No flux into cells that are not stored.
+fn close_to_absent(set: &BrickSet, slot: Slot, mask: &mut CellMask) {
+    for face in crate::grid::FACES {
+        if set.neighbour(slot, face.offset()).is_none() {
+            let last = if face.upper { CELL - 1 } else { 0 };
+            mask.open[face.axis][usize::from(face.upper)][last] = 0.0;
+        }
+    }
+}
+
+/// The set with all cells that lie within `length` of it.
+fn widened(set: &BrickSet, spacing: [f64; 3], length: f64) -> BrickSet {
+    let grid = *set.grid();
+    let reach: [i64; 3] = std::array::from_fn(|a| (length / (spacing[a] * CELL as f64)).ceil().max(1.0) as i64);
+    let mut keep = vec![false; grid.len() as usize];
+    for &id in set.ids() {
+        let at = grid.coords(id);
+        let around = crate::grid::Box3::new(
+            std::array::from_fn(|a| (at[a] - reach[a]) * CELL as i64),
+            std::array::from_fn(|a| (at[a] + reach[a] + 1) * CELL as i64),
+        );
+        grid.bricks_in(&around).for_each(|id| keep[id as usize] = true);
+    }
+    BrickSet::from_fn(grid, |id| keep[id as usize])
+}
