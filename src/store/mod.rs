@@ -4,4 +4,4 @@ mod element;
 mod stream;
 
 pub use element::{Element, ElementType, SamplesMut};
-pub use stream::{BoxSink, BoxSource, PlaneSource};
+pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, PlaneSource};
