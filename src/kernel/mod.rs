@@ -1,1 +1,3 @@
-//! kernel
+//! How one tile is computed: pure functions of their input. No threads, no files, no printing.
+
+pub mod surface;
