@@ -1,1 +1,4 @@
-//! io
+//! Which bytes mean what: one file format a file.
+
+pub mod mesh_ply;
+pub mod points;

@@ -34,3 +34,4 @@ macro_rules! vectorised {
 pub mod distance;
 pub mod image;
 pub mod level_set;
+pub mod surface;

@@ -8,5 +8,5 @@ mod window;
 
 pub use brick_array::{BrickArray, Scratch};
 pub use element::{Element, ElementType, SamplesMut};
-pub use stream::{BoxSink, BoxSource, PlaneSource};
+pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, PlaneSource};
 pub use window::{Traffic, Window};

@@ -1,4 +1,4 @@
-//! The traits that join files, bricks and pipelines: read or write any box of voxels, or one plane of a stack.
+//! The traits that join files, bricks and pipelines: read or write any box of voxels, one plane of a stack, or a mesh.
 
 use super::{Element, ElementType, SamplesMut};
 use crate::error::Result;
@@ -46,4 +46,40 @@ pub trait PlaneSource: Sync {
     /// # Errors
     /// When the plane cannot be read or decoded: names file, page and reason.
     fn read_plane(&self, z: i64, out: SamplesMut<'_>) -> Result<()>;
+}
+
+/// Something that takes a triangle mesh as it is found: a file, a buffer in memory.
+pub trait MeshSink {
+    /// Takes the next vertex, a world position `[x, y, z]`; vertices are numbered from 0 in the order they come.
+    ///
+    /// # Errors
+    /// When the vertex cannot be written.
+    fn vertex(&mut self, position: [f32; 3]) -> Result<()>;
+
+    /// Takes a triangle of vertices that came before it, counter-clockwise as seen from outside.
+    ///
+    /// # Errors
+    /// When the triangle cannot be written.
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()>;
+}
+
+/// A triangle mesh in memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshBuffer {
+    /// World positions, `[x, y, z]`.
+    pub vertices: Vec<[f32; 3]>,
+    /// Places in `vertices`, counter-clockwise as seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl MeshSink for MeshBuffer {
+    fn vertex(&mut self, position: [f32; 3]) -> Result<()> {
+        self.vertices.push(position);
+        Ok(())
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
+        self.triangles.push(corners);
+        Ok(())
+    }
 }

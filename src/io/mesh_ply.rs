@@ -1,0 +1,140 @@
+//! Writes a triangle mesh as binary little-endian PLY (Turk 1994) while it is found, whatever its size.
+//!
+//! How many vertices and triangles there are is known only at the end. The file therefore starts with a header of
+//! fixed length, filled up by a comment; vertices follow it as they come, triangles gather in a second scratch
+//! file that is appended at the end. Nothing stands under the final name before the file is whole.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use crate::error::{Error, Result};
+use crate::store::MeshSink;
+
+const BUFFER: usize = 1 << 18;
+
+/// A PLY file in the making: a [`MeshSink`] that [`PlyWriter::finish`] completes.
+#[derive(Debug)]
+pub struct PlyWriter {
+    path: PathBuf,
+    unit: Option<String>,
+    /// The header, or at first the room for it, and the vertices.
+    file: BufWriter<NamedTempFile>,
+    triangles: BufWriter<File>,
+    vertex_count: u64,
+    triangle_count: u64,
+}
+
+impl PlyWriter {
+    /// Starts the file that will stand at `path`; `unit` names the length unit, where it is known.
+    ///
+    /// Scratch files lie in the folder of `path` and go when the writer is dropped unfinished.
+    ///
+    /// # Errors
+    /// When no file can be made in that folder.
+    pub fn create(path: &Path, unit: Option<&str>) -> Result<Self> {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+        let start = || -> io::Result<_> {
+            let mut file = BufWriter::with_capacity(BUFFER, scratch_file(folder)?);
+            file.write_all(&header(unit, u64::MAX, u64::MAX))?;
+            Ok((file, BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?)))
+        };
+        let (file, triangles) = start().map_err(|e| unwritable(&e, path))?;
+        let unit = unit.map(ToOwned::to_owned);
+        Ok(Self { path: path.to_path_buf(), unit, file, triangles, vertex_count: 0, triangle_count: 0 })
+    }
+
+    /// Completes the file and puts it under its name, in place of any file that was there.
+    ///
+    /// # Errors
+    /// When the file cannot be written or renamed.
+    pub fn finish(self) -> Result<()> {
+        let path = self.path.clone();
+        self.complete().map_err(|e| unwritable(&e, &path))
+    }
+
+    fn complete(self) -> io::Result<()> {
+        let mut triangles = self.triangles.into_inner().map_err(io::IntoInnerError::into_error)?;
+        let mut file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
+        triangles.seek(SeekFrom::Start(0))?;
+        io::copy(&mut triangles, file.as_file_mut())?;
+        file.seek(SeekFrom::Start(0))?;
+        file.write_all(&header(self.unit.as_deref(), self.vertex_count, self.triangle_count))?;
+        file.as_file().sync_all()?;
+        file.persist(&self.path).map_err(|e| e.error)?;
+        Ok(())
+    }
+}
+
+impl MeshSink for PlyWriter {
+    fn vertex(&mut self, position: [f32; 3]) -> Result<()> {
+        let mut bytes = [0; 12];
+        for (place, value) in bytes.chunks_exact_mut(4).zip(position) {
+            place.copy_from_slice(&value.to_le_bytes());
+        }
+        self.vertex_count += 1;
+        self.file.write_all(&bytes).map_err(|e| unwritable(&e, &self.path))
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
+        let mut bytes = [3; 13];
+        for (place, value) in bytes[1..].chunks_exact_mut(4).zip(corners) {
+            place.copy_from_slice(&value.to_le_bytes());
+        }
+        self.triangle_count += 1;
+        self.triangles.write_all(&bytes).map_err(|e| unwritable(&e, &self.path))
+    }
+}
+
+/// The header, of one length for all counts.
+fn header(unit: Option<&str>, vertices: u64, triangles: u64) -> Vec<u8> {
+    let longest = header_text(unit, u64::MAX, u64::MAX, 0).len();
+    let padding = longest - header_text(unit, vertices, triangles, 0).len();
+    header_text(unit, vertices, triangles, padding).into_bytes()
+}
+
+fn header_text(unit: Option<&str>, vertices: u64, triangles: u64, padding: usize) -> String {
+    // A line end in the unit would end the comment. Signed indices are what most readers expect.
+    let unit = unit.map_or(String::new(), |u| format!("comment unit {}\n", u.replace(char::is_control, " ")));
+    let index = if vertices <= 1 << 31 { "int" } else { "uint" };
+    format!(
+        "ply\nformat binary_little_endian 1.0\ncomment made by strandline\n{unit}comment {:padding$}\n\
+         element vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {triangles}\nproperty list uchar {index} vertex_indices\nend_header\n",
+        ""
+    )
+}
+
+/// A hidden file that gets the permissions of any new file when it is renamed, not those of a private scratch file.
+fn scratch_file(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".strandline-").suffix(".ply.part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+fn unwritable(error: &io::Error, path: &Path) -> Error {
+    Error::failed(format!("the mesh cannot be written: {error}; check the folder and its free space")).at(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers_have_one_length() {
+        for unit in [None, Some("micrometer"), Some("two\nlines")] {
+            let sizes = [(0, 0), (7, 12), (1 << 31, 9), (u64::MAX, u64::MAX)].map(|(v, t)| header(unit, v, t).len());
+            assert!(sizes.iter().all(|&size| size == sizes[0]), "{sizes:?}");
+        }
+        let text = String::from_utf8(header(Some("a\nb"), 1 << 31, 1)).unwrap();
+        assert!(text.contains("comment unit a b\n") && text.contains("uchar int "));
+        assert!(String::from_utf8(header(None, (1 << 31) + 1, 1)).unwrap().contains("uchar uint "));
+    }
+}

@@ -1,0 +1,79 @@
+//! `EdgeTally`: whether a mesh is closed, told exactly while its triangles pass.
+
+use std::collections::HashMap;
+
+/// The directed edges whose opposite has not come yet.
+///
+/// In a closed, consistently oriented mesh each edge is walked once in either direction for every pair of triangles
+/// that meet there. An edge leaves the tally as its opposite comes; what stays at the end is the border. With
+/// triangles in the order of bricks the tally holds no more than the edges of the current layer.
+#[derive(Clone, Debug, Default)]
+pub struct EdgeTally {
+    waiting: HashMap<(u32, u32), u32>,
+    open: u64,
+}
+
+impl EdgeTally {
+    /// Counts the three edges of a triangle; an edge from a vertex to itself is none.
+    pub fn add(&mut self, [a, b, c]: [u32; 3]) {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            if from != to {
+                self.walk(from, to);
+            }
+        }
+    }
+
+    /// Number of edges that still lack their opposite: 0 for a closed mesh.
+    #[must_use]
+    pub fn open(&self) -> u64 {
+        self.open
+    }
+
+    fn walk(&mut self, from: u32, to: u32) {
+        if let Some(count) = self.waiting.get_mut(&(to, from)) {
+            self.open -= 1;
+            *count -= 1;
+            if *count == 0 {
+                self.waiting.remove(&(to, from));
+            }
+        } else {
+            self.open += 1;
+            *self.waiting.entry((from, to)).or_insert(0) += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+
+    fn open_edges(triangles: &[[u32; 3]]) -> u64 {
+        let mut tally = EdgeTally::default();
+        for &triangle in triangles {
+            tally.add(triangle);
+        }
+        tally.open()
+    }
+
+    #[test]
+    fn a_tetrahedron_is_closed_and_without_a_side_it_is_not() {
+        assert_eq!(open_edges(&TETRAHEDRON), 0);
+        assert_eq!(open_edges(&TETRAHEDRON[..3]), 3);
+    }
+
+    #[test]
+    fn a_flipped_triangle_shows() {
+        let mut flipped = TETRAHEDRON;
+        flipped[1].swap(0, 1);
+        assert_eq!(open_edges(&flipped), 6);
+    }
+
+    #[test]
+    fn closed_meshes_that_share_an_edge_are_closed() {
+        let second = TETRAHEDRON.map(|t| t.map(|v| if v < 2 { v } else { v + 2 }));
+        assert_eq!(open_edges(&[TETRAHEDRON, second].concat()), 0);
+        assert_eq!(open_edges(&[[5, 5, 5]]), 0);
+    }
+}
