@@ -1,1 +1,3 @@
-//! io
+//! Files in and out: one format a file.
+
+pub mod tiff_stack;
