@@ -5,3 +5,5 @@
 mod common;
 
 mod tiff_derived;
+mod tiff_handmade;
+mod tiff_hostile;

@@ -1,4 +1,5 @@
 //! A reader for small `.npy` files of 16-bit unsigned numbers in C order (NumPy format 1.0).
+#![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 

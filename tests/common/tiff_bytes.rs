@@ -65,11 +65,15 @@ impl Out {
         let mut part = Out { bytes: Vec::new(), big_endian: self.big_endian };
         let (kind, count) = match value {
             Value::Short(v) => {
-                v.iter().for_each(|&n| part.short(n));
+                for &n in v {
+                    part.short(n);
+                }
                 (3, v.len())
             }
             Value::Long(v) => {
-                v.iter().for_each(|&n| part.long(n));
+                for &n in v {
+                    part.long(n);
+                }
                 (4, v.len())
             }
             Value::Text(text) => {

@@ -46,7 +46,6 @@ fn write_head(page: &Page, typed: bool, rows: u32, packed: u32, head: &mut [u8])
     } else {
         (page.row_bytes() as u32, 8, 1, 1)
     };
-    let predictor = if page.compression == Compression::Fax4 { 1 } else { page.predictor };
     let entries: [(u16, u16, u32); ENTRIES] = [
         (256, 4, width),
         (257, 4, rows),
@@ -57,7 +56,7 @@ fn write_head(page: &Page, typed: bool, rows: u32, packed: u32, head: &mut [u8])
         (277, 3, samples.into()),
         (278, 4, rows),
         (279, 4, packed),
-        (317, 3, predictor.into()),
+        (317, 3, page.predictor.into()),
         (339, 3, format.into()),
     ];
     let mut bytes = Vec::with_capacity(HEAD);

@@ -173,16 +173,22 @@ impl Page {
         if self.compression == Compression::Fax4 && (self.kind.samples > 1 || self.kind.sample.bits() != 1) {
             return Err(tags.error("CCITT fax compression is for one bit per pixel only"));
         }
-        let predicts = self.compression != Compression::None && self.compression != Compression::Fax4;
+        if self.compression == Compression::Fax4 && self.chunk.iter().any(|&n| n > u32::from(u16::MAX)) {
+            return Err(tags.error("CCITT fax strips of over 65535 rows or columns are not supported"));
+        }
         let fits = match self.predictor {
             1 => true,
+            // Readers do not agree whether the values of uncompressed pages are differences (TIFF 6.0 knows it for LZW).
+            _ if matches!(self.compression, Compression::None | Compression::Fax4) => false,
             2 => matches!(self.kind.sample.bits(), 8 | 16 | 32 | 64),
             3 => self.kind.sample.is_float(),
             _ => false,
         };
-        if predicts && !fits {
-            let (p, name) = (self.predictor, self.kind.sample.name());
-            return Err(tags.error(format!("predictor {p} is not supported for {name} samples")));
+        if !fits {
+            let (p, name, method) = (self.predictor, self.kind.sample.name(), self.compression.name());
+            return Err(tags.error(format!(
+                "predictor {p} is not supported for {name} samples with compression {method}; save it without predictor"
+            )));
         }
         if tags.number(32997)?.unwrap_or(1) > 1 || tags.number(32998)?.unwrap_or(1) > 1 {
             return Err(tags.error("tiles with a depth of their own are not supported; save one page per plane"));

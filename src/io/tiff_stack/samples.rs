@@ -10,7 +10,6 @@ use crate::store::{ElementType, SamplesMut};
 pub(super) enum SampleKind {
     U8,
     U16,
-    U24,
     U32,
     I8,
     I16,
@@ -18,7 +17,8 @@ pub(super) enum SampleKind {
     F16,
     F32,
     F64,
-    /// Unsigned with this many bits, packed from the highest bit of a byte on, rows padded to whole bytes.
+    /// Unsigned with this many bits, packed from the highest bit of a byte on in either byte order, rows padded to
+    /// whole bytes.
     Packed(u8),
 }
 
@@ -29,7 +29,6 @@ impl SampleKind {
             // Format 4 is "undefined", which readers take for unsigned.
             (1 | 4, 8) => Ok(Self::U8),
             (1 | 4, 16) => Ok(Self::U16),
-            (1 | 4, 24) => Ok(Self::U24),
             (1 | 4, 32) => Ok(Self::U32),
             (1 | 4, 1..=31) => Ok(Self::Packed(bits as u8)),
             (2, 8) => Ok(Self::I8),
@@ -57,7 +56,6 @@ impl SampleKind {
         match self {
             Self::U8 | Self::I8 => 8,
             Self::U16 | Self::I16 | Self::F16 => 16,
-            Self::U24 => 24,
             Self::U32 | Self::I32 | Self::F32 => 32,
             Self::F64 => 64,
             Self::Packed(bits) => u16::from(bits),
@@ -72,7 +70,7 @@ impl SampleKind {
     /// The value of the `SampleFormat` tag.
     pub(super) fn format(self) -> u16 {
         match self {
-            Self::U8 | Self::U16 | Self::U24 | Self::U32 | Self::Packed(_) => 1,
+            Self::U8 | Self::U16 | Self::U32 | Self::Packed(_) => 1,
             Self::I8 | Self::I16 | Self::I32 => 2,
             Self::F16 | Self::F32 | Self::F64 => 3,
         }
@@ -89,7 +87,7 @@ impl SampleKind {
         match self {
             Self::U8 | Self::Packed(..=8) => ElementType::U8,
             Self::U16 | Self::Packed(..=16) => ElementType::U16,
-            Self::U24 | Self::U32 | Self::Packed(_) => ElementType::U32,
+            Self::U32 | Self::Packed(_) => ElementType::U32,
             Self::I8 | Self::I16 | Self::F16 | Self::F32 => ElementType::F32,
             Self::I32 | Self::F64 => ElementType::F64,
         }
@@ -150,10 +148,6 @@ impl Row<'_> {
             (SampleKind::U8, SamplesMut::U8(o)) => fill(self, &mut o[part], |[b]| b),
             (SampleKind::U16, SamplesMut::U16(o)) => numbers!(self, &mut o[part], u16, |v| v),
             (SampleKind::U32, SamplesMut::U32(o)) => numbers!(self, &mut o[part], u32, |v| v),
-            (SampleKind::U24, SamplesMut::U32(o)) => {
-                let order = self.order;
-                fill(self, &mut o[part], |b: [u8; 3]| order.number(&b) as u32);
-            }
             (SampleKind::F32, SamplesMut::F32(o)) => numbers!(self, &mut o[part], f32, |v| v),
             (SampleKind::F64, SamplesMut::F64(o)) => numbers!(self, &mut o[part], f64, |v| v),
             (SampleKind::F16, SamplesMut::F32(o)) => numbers!(self, &mut o[part], f16, f32::from),
