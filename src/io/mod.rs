@@ -2,3 +2,4 @@
 
 pub mod mesh_ply;
 pub mod points;
+pub mod tiff_stack;

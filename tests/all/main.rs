@@ -6,3 +6,7 @@ mod common;
 mod mesh_ply;
 mod points;
 mod surfaces;
+
+mod tiff_derived;
+mod tiff_handmade;
+mod tiff_hostile;

@@ -1,1 +1,18 @@
 //! Shapes, files and slow plain references that several tests share.
+
+pub(crate) mod npy;
+pub(crate) mod random;
+pub(crate) mod tiff_bytes;
+pub(crate) mod tiff_planes;
+
+use std::path::PathBuf;
+
+/// The folder of shared test data, or `None` after saying that the test is skipped.
+pub(crate) fn shared_data(part: &str) -> Option<PathBuf> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(part);
+    if folder.exists() {
+        return Some(folder);
+    }
+    println!("skipped: {} is absent", folder.display());
+    None
+}

@@ -1,0 +1,97 @@
+//! The `ImageDescription` that ImageJ writes: lines of `key=value` after `ImageJ=version`.
+//!
+//! Keys as in ImageJ's `TiffDecoder`/`FileOpener`: `images, channels, slices, frames, spacing, unit`. Planes run
+//! channel first, then slice, then frame. The xy spacing lies in the resolution tags, in pixels per unit.
+
+use super::layout::{Axis, Description, Dimensions};
+use super::units::{self, Unit};
+
+/// True when ImageJ wrote the description.
+pub(super) fn is_imagej(text: &str) -> bool {
+    text.starts_with("ImageJ=")
+}
+
+/// Reads the description; `pages` is the number of pages in the file, `xy` the pixel size from the resolution tags.
+pub(super) fn parse(text: &str, pages: u64, xy: [Option<f64>; 2]) -> Description {
+    let value =
+        |key: &str| text.lines().find_map(|line| line.strip_prefix(key)?.trim_start().strip_prefix('=')).map(str::trim);
+    let number = |key: &str| value(key).and_then(|v| v.parse::<u64>().ok()).filter(|&n| n > 0);
+    let mut notes = Vec::new();
+    let unit = units::parse(value("unit").unwrap_or_default());
+    // Without a unit the tags hold 1 pixel per pixel, or a print resolution: nothing that was measured.
+    let physical = |size: f64| unit != Unit::Pixel || size != 1.0;
+    let xy = xy.map(|size| size.filter(|&s| physical(s)));
+    // ImageJ writes negative spacings for stacks that were acquired downwards.
+    let z = value("spacing").and_then(|v| v.parse::<f64>().ok()).map(f64::abs);
+    let z = z.filter(|&s| s.is_finite() && s > 0.0 && physical(s));
+    let name = match unit {
+        Unit::Length(name, _) => Some(name.to_string()),
+        Unit::Pixel => None,
+        Unit::Unknown => {
+            notes.push(format!(
+                "the unit \"{}\" is not known; lengths keep their numbers",
+                value("unit").unwrap_or_default()
+            ));
+            None
+        }
+    };
+    let images = number("images").unwrap_or(pages);
+    let dimensions = dimensions(images, [number("channels"), number("slices"), number("frames")]);
+    let apart = number("channels").is_some_and(|c| c > 1) || number("frames").is_some_and(|t| t > 1);
+    if apart && dimensions == Dimensions::only_z(images) {
+        notes
+            .push(format!("channels, slices and frames do not multiply to {images} images: all were taken for slices"));
+    }
+    Description {
+        dimensions: Some(dimensions),
+        runs: None,
+        spacing: [xy[0], xy[1], z],
+        unit: name,
+        single_page: true,
+        notes,
+    }
+}
+
+/// Channels, slices and frames; as in ImageJ a stack whose numbers do not multiply to `images` is one of slices alone.
+fn dimensions(images: u64, [channels, slices, frames]: [Option<u64>; 3]) -> Dimensions {
+    let (c, t) = (channels.unwrap_or(1), frames.unwrap_or(1));
+    let rest = c.checked_mul(t).filter(|ct| images.is_multiple_of(*ct)).map(|ct| images / ct);
+    let z = slices.or(rest).unwrap_or(1);
+    let stated = Dimensions([(Axis::Channel, c), (Axis::Z, z), (Axis::Time, t)]);
+    if stated.count() == Some(images) { stated } else { Dimensions::only_z(images) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hyperstack_with_escaped_unit() {
+        let text = "ImageJ=1.53f\nimages=84\nchannels=2\nslices=14\nframes=3\nunit=\\u00B5m\nspacing=-0.4\nmin=2.0\n";
+        let d = parse(text, 84, [Some(0.1), Some(0.2)]);
+        assert_eq!(d.dimensions, Some(Dimensions([(Axis::Channel, 2), (Axis::Z, 14), (Axis::Time, 3)])));
+        assert_eq!(d.spacing, [Some(0.1), Some(0.2), Some(0.4)]);
+        assert_eq!(d.unit.as_deref(), Some("micrometer"));
+    }
+
+    #[test]
+    fn missing_and_contradictory_numbers() {
+        let dims = |text: &str, pages| parse(text, pages, [None; 2]).dimensions;
+        assert_eq!(dims("ImageJ=1\n", 7), Some(Dimensions::only_z(7)));
+        assert_eq!(dims("ImageJ=1\nimages=7\nchannels=2\n", 7), Some(Dimensions::only_z(7)));
+        let two = Dimensions([(Axis::Channel, 2), (Axis::Z, 3), (Axis::Time, 1)]);
+        assert_eq!(dims("ImageJ=1\nimages=6\nchannels=2\n", 6), Some(two));
+        assert_eq!(
+            dims("ImageJ=1\nimages=6\nchannels=0\nslices=99999999999999999999\n", 6),
+            Some(Dimensions::only_z(6))
+        );
+    }
+
+    #[test]
+    fn pixels_are_no_spacing() {
+        let d = parse("ImageJ=1\nimages=3\nspacing=1.0\n", 3, [Some(1.0), Some(1.0)]);
+        assert_eq!((d.spacing, d.unit), ([None; 3], None));
+        let d = parse("ImageJ=1\nimages=3\nunit=um\nspacing=1.0\n", 3, [Some(1.0), None]);
+        assert_eq!(d.spacing, [Some(1.0), None, Some(1.0)]);
+    }
+}

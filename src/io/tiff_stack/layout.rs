@@ -1,0 +1,143 @@
+//! The order of planes in a file: from (channel, time, z) to the number of a plane.
+
+use crate::error::Result;
+
+use super::ifd::TiffFile;
+use super::page::Page;
+
+/// An axis along which planes follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axis {
+    Channel,
+    Z,
+    Time,
+}
+
+impl Axis {
+    /// The axis of an OME or ImageJ letter.
+    pub(super) fn from_letter(letter: char) -> Option<Self> {
+        match letter {
+            'C' => Some(Self::Channel),
+            'Z' => Some(Self::Z),
+            'T' => Some(Self::Time),
+            _ => None,
+        }
+    }
+
+    fn letter(self) -> char {
+        match self {
+            Self::Channel => 'C',
+            Self::Z => 'Z',
+            Self::Time => 'T',
+        }
+    }
+}
+
+/// The number of planes along each axis, fastest axis first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Dimensions(pub(super) [(Axis, u64); 3]);
+
+impl Dimensions {
+    /// A stack with nothing but z.
+    pub(super) fn only_z(planes: u64) -> Self {
+        Self([(Axis::Channel, 1), (Axis::Z, planes), (Axis::Time, 1)])
+    }
+
+    /// Planes along one axis.
+    pub(super) fn size(&self, axis: Axis) -> u64 {
+        self.0.iter().find(|(a, _)| *a == axis).map_or(1, |&(_, n)| n)
+    }
+
+    /// Planes in all; `None` past 64 bits.
+    pub(super) fn count(&self) -> Option<u64> {
+        self.0.iter().try_fold(1_u64, |product, &(_, n)| product.checked_mul(n))
+    }
+
+    /// The number of the plane, counted from 0, in the order of the file.
+    pub(super) fn plane(&self, channel: u64, time: u64, z: u64) -> u64 {
+        self.0.iter().rev().fold(0_u64, |number, &(axis, n)| {
+            let index = match axis {
+                Axis::Channel => channel,
+                Axis::Z => z,
+                Axis::Time => time,
+            };
+            number.saturating_mul(n).saturating_add(index)
+        })
+    }
+
+    /// The axes as letters, slowest first: `TZCYX`, with `S` for samples inside a pixel.
+    pub(super) fn letters(&self, page: &Page) -> String {
+        let mut letters: String =
+            self.0.iter().rev().filter(|&&(a, n)| n > 1 || a == Axis::Z).map(|(a, _)| a.letter()).collect();
+        letters.push_str(match (page.kind.samples > 1, page.planar) {
+            (true, true) => "SYX",
+            (true, false) => "YXS",
+            (false, _) => "YX",
+        });
+        letters
+    }
+}
+
+/// A run of planes that lie in consecutive pages (a `TiffData` element).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    pub(super) plane: u64,
+    pub(super) page: u64,
+    pub(super) count: u64,
+}
+
+/// What the description of a file says about its planes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Description {
+    /// Absent where the file says nothing: then every page is a plane along z.
+    pub(super) dimensions: Option<Dimensions>,
+    /// The pages of the planes, where they do not simply follow each other.
+    pub(super) runs: Option<Vec<Run>>,
+    /// Distance between voxel centres along x, y, z, where it is known.
+    pub(super) spacing: [Option<f64>; 3],
+    /// The unit of `spacing` as OME-Zarr spells it.
+    pub(super) unit: Option<String>,
+    /// True when the planes may follow the first one without pages of their own.
+    pub(super) single_page: bool,
+    /// What the user should know about the choice that was made.
+    pub(super) notes: Vec<String>,
+}
+
+impl Description {
+    /// A file that says nothing about its planes.
+    pub(super) fn none() -> Self {
+        Self { dimensions: None, runs: None, spacing: [None; 3], unit: None, single_page: false, notes: Vec::new() }
+    }
+
+    /// The page of every wanted plane, counted from 0.
+    pub(super) fn pages(&self, file: &TiffFile, planes: &[u64], available: u64) -> Result<Vec<u64>> {
+        let pages = match &self.runs {
+            None => planes.to_vec(),
+            Some(runs) => pages_of_runs(file, runs, planes)?,
+        };
+        if let Some(beyond) = pages.iter().find(|&&page| page >= available) {
+            return Err(file.error(format!(
+                "the description places a plane on page {} but the file holds {available} pages: it is truncated or was edited",
+                beyond.saturating_add(1)
+            )));
+        }
+        Ok(pages)
+    }
+}
+
+/// The pages that hold `planes`; where runs overlap the later one counts.
+fn pages_of_runs(file: &TiffFile, runs: &[Run], planes: &[u64]) -> Result<Vec<u64>> {
+    let mut sorted: Vec<(usize, Run)> = runs.iter().copied().enumerate().collect();
+    sorted.sort_by_key(|(place, run)| (run.plane, *place));
+    let mut pages = Vec::with_capacity(planes.len());
+    for &plane in planes {
+        // The last run that begins at or before the plane; runs that overlap otherwise are no valid OME-TIFF.
+        let after = sorted.partition_point(|(_, run)| run.plane <= plane);
+        let holder = sorted[..after].last().filter(|(_, run)| plane - run.plane < run.count);
+        let Some((_, run)) = holder else {
+            return Err(file.error(format!("the OME-XML names no page for plane {}", plane + 1)));
+        };
+        pages.push(run.page.saturating_add(plane - run.plane));
+    }
+    Ok(pages)
+}

@@ -1,0 +1,130 @@
+//! TIFF stacks as input: ImageJ hyperstacks, OME-TIFF, BigTIFF, plain pages, folders of slices; read plane by plane.
+//!
+//! Only offsets are kept in memory. Rests on TIFF 6.0, the BigTIFF design, the OME-TIFF specification and the files that
+//! ImageJ and `tifffile` write. Values are handed out as stored: min-is-white and palettes are not applied.
+
+mod codec;
+mod decode;
+mod ifd;
+mod imagej;
+mod layout;
+mod ome_xml;
+mod page;
+mod raw;
+mod samples;
+mod shaped;
+mod slices;
+mod source;
+mod units;
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use crate::error::{Error, Result};
+use crate::store::{ElementType, PlaneSource, SamplesMut};
+use decode::Scratch;
+use source::{Opened, Source};
+
+/// What a stack is, told without decoding a plane of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StackInfo {
+    /// Voxels along x, y, z of the chosen channel and time.
+    pub shape: [i64; 3],
+    /// Number of channels, those inside a pixel (RGB) included.
+    pub channels: u32,
+    /// Number of time points.
+    pub times: u32,
+    /// The sample type in the file: `uint8`, `uint16`, `int16`, `float32`, `uint12`, ...
+    pub file_type: String,
+    /// The type that planes are handed out in.
+    pub element: ElementType,
+    /// Distance between voxel centres along x, y, z, each where the file tells it.
+    pub spacing: [Option<f64>; 3],
+    /// The unit of `spacing` as OME-Zarr spells it, where the file tells it.
+    pub unit: Option<String>,
+    /// The axes as stored, slowest first, `S` for samples inside a pixel: `TZCYX`.
+    pub axes: String,
+    /// How strips and tiles are compressed.
+    pub compression: String,
+    /// What the user should know about how the file was understood.
+    pub notes: Vec<String>,
+}
+
+/// Which part of a file with several channels or time points to read, counted from 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Select {
+    /// The channel.
+    pub channel: u32,
+    /// The time point.
+    pub time: u32,
+}
+
+/// One channel at one time of a TIFF file or of a folder of slices.
+#[derive(Debug)]
+pub struct TiffStack {
+    path: PathBuf,
+    info: StackInfo,
+    source: Source,
+    /// Buffers that wait for the next plane: as many as planes were ever decoded at once.
+    pool: Mutex<Vec<Scratch>>,
+}
+
+impl TiffStack {
+    /// Opens a file, or a folder of slices, and reads what it says of itself; no plane is decoded.
+    ///
+    /// # Errors
+    /// When the file is unreadable, damaged, of a kind that is not supported, or has no such channel or time.
+    pub fn open(path: &Path, select: Select) -> Result<Self> {
+        let opened = if path.is_dir() { source::open_folder(path, select)? } else { source::open_file(path, select)? };
+        let Opened { info, source } = opened;
+        Ok(Self { path: path.to_path_buf(), info, source, pool: Mutex::new(Vec::new()) })
+    }
+
+    /// What the stack is.
+    #[must_use]
+    pub fn info(&self) -> &StackInfo {
+        &self.info
+    }
+
+    fn check_request(&self, z: i64, out: &SamplesMut<'_>) -> Result<()> {
+        let [width, height, depth] = self.info.shape;
+        let (element, len) = match out {
+            SamplesMut::U8(o) => (ElementType::U8, o.len()),
+            SamplesMut::U16(o) => (ElementType::U16, o.len()),
+            SamplesMut::U32(o) => (ElementType::U32, o.len()),
+            SamplesMut::F32(o) => (ElementType::F32, o.len()),
+            SamplesMut::F64(o) => (ElementType::F64, o.len()),
+        };
+        if element != self.info.element || len as u64 != width.unsigned_abs() * height.unsigned_abs() {
+            let due = self.info.element.name();
+            return Err(Error::failed(format!(
+                "a plane of {width} x {height} {due} was asked for as {len} {}",
+                element.name()
+            ))
+            .at(&self.path));
+        }
+        if !(0..depth).contains(&z) {
+            return Err(Error::failed(format!("plane {z} was asked for, of {depth}")).at(&self.path));
+        }
+        Ok(())
+    }
+}
+
+impl PlaneSource for TiffStack {
+    fn shape(&self) -> [i64; 3] {
+        self.info.shape
+    }
+
+    fn element(&self) -> ElementType {
+        self.info.element
+    }
+
+    fn read_plane(&self, z: i64, mut out: SamplesMut<'_>) -> Result<()> {
+        self.check_request(z, &out)?;
+        let free = |pool: &Mutex<Vec<Scratch>>| pool.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut scratch = free(&self.pool).unwrap_or_default();
+        let outcome = self.source.read_plane(z as u64, &mut scratch, &mut out);
+        self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+        outcome
+    }
+}
