@@ -1,1 +1,3 @@
-//! kernel
+//! How one tile is computed: pure functions without threads, files or printing.
+
+pub mod image;
