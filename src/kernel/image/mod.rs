@@ -1,4 +1,7 @@
-//! Image terms and pictures: presmoothing, edge detector, pyramid, demo picture.
+//! Image terms and pictures: presmoothing, edge detector, pyramid, slices with contours.
 
+pub mod downsample;
 pub mod edge_detector;
 pub mod heat;
+pub mod palette;
+pub mod panel;

@@ -1,0 +1,19 @@
+//! Writes OME-Zarr 0.5 (Zarr version 3) stores: sharded multiscale images and labels.
+//!
+//! Rests on the OME-Zarr 0.5 specification (`multiscales`, `omero`, `labels`, `image-label`) and the Zarr v3 core,
+//! `sharding_indexed` and `blosc` specifications. Arrays are `z, y, x`; lengths are physical.
+//!
+//! A [`StoreWriter`] builds the store under a hidden name beside its final one and moves it into place when all is
+//! written. Shards are the unit of writing: each is encoded whole, by one caller, and appears under its name complete.
+
+mod files;
+mod level;
+mod metadata;
+mod pyramid;
+mod shard;
+mod store;
+
+pub use level::LevelWriter;
+pub use metadata::{ImageSpec, LabelColor, LabelSpec};
+pub use pyramid::{LevelPlan, plan_levels};
+pub use store::{ImageWriter, StoreWriter};

@@ -1,0 +1,60 @@
+//! Writes pictures as PNG: 8 bits of red, green and blue.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+
+/// Writes a picture of `width` by `height` pixels; `pixels` are rows from the top, red, green and blue of each pixel.
+///
+/// # Errors
+/// When the file cannot be written; what was written of it is removed then.
+///
+/// # Panics
+/// When `pixels` does not fit the size.
+pub fn write_rgb(path: &Path, width: u32, height: u32, pixels: &[u8]) -> Result<()> {
+    assert_eq!(pixels.len() as u64, 3 * u64::from(width) * u64::from(height), "the pixels do not fit the size");
+    let fault = |error: png::EncodingError| Error::failed(format!("the picture cannot be written: {error}")).at(path);
+    let file = File::create(path).map_err(|error| fault(error.into()))?;
+    encode(file, width, height, pixels).map_err(|error| {
+        // The first error is the one to report.
+        let _ = std::fs::remove_file(path);
+        fault(error)
+    })
+}
+
+fn encode(file: File, width: u32, height: u32, pixels: &[u8]) -> std::result::Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(BufWriter::new(file), width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels)?;
+    writer.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.png");
+        let pixels: Vec<u8> = (0..5 * 3 * 3).map(|v| (v * 37 % 251) as u8).collect();
+        write_rgb(&path, 5, 3, &pixels).unwrap();
+        let mut reader = png::Decoder::new(std::io::BufReader::new(File::open(&path).unwrap())).read_info().unwrap();
+        let mut read = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut read).unwrap();
+        assert_eq!((info.width, info.height, info.color_type), (5, 3, png::ColorType::Rgb));
+        assert_eq!(read, pixels);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let error = write_rgb(Path::new("/nowhere/at/all.png"), 1, 1, &[0; 3]).unwrap_err();
+        assert_eq!(error.exit_code(), 1);
+        assert!(error.to_string().starts_with("/nowhere/at/all.png: "), "{error}");
+    }
+}
