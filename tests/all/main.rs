@@ -7,6 +7,7 @@ mod mesh_ply;
 mod points;
 mod surfaces;
 
+mod layering;
 mod tiff_derived;
 mod tiff_handmade;
 mod tiff_hostile;
