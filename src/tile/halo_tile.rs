@@ -3,7 +3,6 @@
 //! The buffer is dense `[z][y][x]` over (edge + 2)^3 voxels whatever the brick's valid extents, so strides are the
 //! same for every brick of a grid; local indices run from -1 (lower ghost) to `edge` (upper ghost).
 
-use crate::store::Element;
 
 /// A brick's voxels and one ghost layer around them.
 #[derive(Clone, Debug)]
@@ -13,7 +12,7 @@ pub struct HaloTile<T> {
     data: Vec<T>,
 }
 
-impl<T: Element> HaloTile<T> {
+impl<T: Copy + Default> HaloTile<T> {
     /// A tile of zeros for bricks of `edge`^3 voxels.
     #[must_use]
     pub fn new(edge: usize) -> Self {
