@@ -1,9 +1,9 @@
 //! Point clouds from files: CSV with a header, plain XYZ, PLY vertices. Told apart by content, never by the name.
 //!
-//! - [`csv`]: a header names the columns: `x`, `y`, `z`, or `axis-0`, `axis-1`, `axis-2` (z, y, x) as napari writes
+//! - `csv`: a header names the columns: `x`, `y`, `z`, or `axis-0`, `axis-1`, `axis-2` (z, y, x) as napari writes
 //!   them; `object` and `contour` where there are any. Other columns are left aside.
-//! - [`xyz`]: three numbers a line and perhaps more, separated by blanks, tabs, commas or semicolons.
-//! - [`ply`]: the vertices of a PLY file, text or binary.
+//! - `xyz`: three numbers a line and perhaps more, separated by blanks, tabs, commas or semicolons.
+//! - `ply`: the vertices of a PLY file, text or binary.
 
 mod columns;
 mod csv;
@@ -64,8 +64,10 @@ fn read_after_head(mut head: Vec<u8>, rest: impl Read, length: Option<u64>) -> R
     }
     refuse_binary(&head)?;
     let layout = Layout::of(&head)?;
+    let has_more = head.len() as u64 >= HEAD - 3;
     let mut text = BufReader::with_capacity(1 << 18, Cursor::new(head).chain(rest));
     match layout {
+        None if has_more => Err(Error::input("starts with more than 64 kB of comments; delete some of them")),
         None => Ok(PointCloud::default()),
         Some(Layout::Xyz { separator, columns, first_line }) => xyz::read(&mut text, separator, columns, first_line),
         Some(Layout::Csv { separator, columns, header_line }) => csv::read(&mut text, separator, columns, header_line),

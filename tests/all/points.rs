@@ -122,6 +122,7 @@ fn what_is_no_table_is_refused() {
     assert!(refusal(b"\xff\xfex\0,\0y\0").contains("UTF-16"));
     assert!(refusal(&vec![0xe9; 100_000]).contains("line 1"));
     assert!(refusal(&[&b"1 2 3\n"[..], &vec![b'7'; 2_000_000]].concat()).contains("line 2 is longer"));
+    assert!(refusal(&[b"# comment\n".repeat(9000), b"1 2 3\n".to_vec()].concat()).contains("64 kB of comments"));
     let folder = tempfile::tempdir().unwrap();
     let error = read_cloud(folder.path()).unwrap_err();
     assert!(error.to_string().contains("is a folder") && error.exit_code() == 2, "{error}");
