@@ -9,8 +9,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use tiff::decoder::{Decoder, Limits};
 
+use super::compression::Compression;
 use super::ifd::ByteOrder;
-use super::page::{Compression, Page};
+use super::page::Page;
 
 const ENTRIES: usize = 11;
 /// Bytes of header and directory in front of the packed bytes.

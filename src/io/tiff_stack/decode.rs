@@ -1,8 +1,9 @@
 //! Reads one plane, strip by strip or tile by tile: at most one of them is in memory beside the plane itself.
 
 use super::codec;
+use super::compression::Compression;
 use super::ifd::{ByteOrder, TiffFile};
-use super::page::{Chunk, Compression, MAX_CHUNK, Page};
+use super::page::{Chunk, MAX_CHUNK, Page};
 use super::samples::Row;
 use crate::error::{Error, Result};
 use crate::store::SamplesMut;

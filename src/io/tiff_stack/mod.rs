@@ -1,9 +1,10 @@
 //! TIFF stacks as input: ImageJ hyperstacks, OME-TIFF, BigTIFF, plain pages, folders of slices; read plane by plane.
 //!
-//! Only offsets are kept in memory. Rests on TIFF 6.0, the BigTIFF design, the OME-TIFF specification and the files that
-//! ImageJ and `tifffile` write. Values are handed out as stored: min-is-white and palettes are not applied.
+//! Only offsets are kept in memory. Rests on TIFF 6.0, the BigTIFF design, the OME-TIFF specification and the files
+//! that ImageJ and `tifffile` write. Values are handed out as stored: min-is-white and palettes are not applied.
 
 mod codec;
+mod compression;
 mod decode;
 mod ifd;
 mod imagej;
@@ -75,7 +76,7 @@ impl TiffStack {
     /// # Errors
     /// When the file is unreadable, damaged, of a kind that is not supported, or has no such channel or time.
     pub fn open(path: &Path, select: Select) -> Result<Self> {
-        let opened = if path.is_dir() { source::open_folder(path, select)? } else { source::open_file(path, select)? };
+        let opened = if path.is_dir() { slices::open_folder(path, select)? } else { source::open_file(path, select)? };
         let Opened { info, source } = opened;
         Ok(Self { path: path.to_path_buf(), info, source, pool: Mutex::new(Vec::new()) })
     }

@@ -1,4 +1,4 @@
-//! OME-XML in the `ImageDescription` of the first page (OME model 2016-06 and its forerunners; elements `Pixels`, `TiffData`).
+//! OME-XML in the `ImageDescription` of the first page (OME model 2016-06 and before; elements `Pixels`, `TiffData`).
 
 use roxmltree::{Document, Node, ParsingOptions};
 
@@ -184,10 +184,11 @@ fn add_spacing(pixels: Node, description: &mut Description) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ifd::ByteOrder;
-    use super::super::page::{Compression, Kind};
-    use super::super::samples::SampleKind;
     use super::*;
+    use crate::io::tiff_stack::compression::Compression;
+    use crate::io::tiff_stack::ifd::ByteOrder;
+    use crate::io::tiff_stack::page::Kind;
+    use crate::io::tiff_stack::samples::SampleKind;
 
     fn page(samples: u16) -> Page {
         Page {

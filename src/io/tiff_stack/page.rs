@@ -2,6 +2,7 @@
 //!
 //! Declared sizes are compared with the length of the file before anything is allocated.
 
+use super::compression::Compression;
 use super::ifd::{ByteOrder, Tags};
 use super::samples::SampleKind;
 use crate::error::Result;
@@ -10,80 +11,6 @@ use crate::error::Result;
 pub(super) const MAX_CHUNK: u64 = 256 << 20;
 /// The most strips or tiles of a page; a page of 100 000 x 100 000 in tiles of 64 x 64 has 2.4 million.
 const MAX_CHUNKS: u64 = 4 << 20;
-
-/// How strips and tiles are packed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Compression {
-    None,
-    Fax4,
-    Lzw,
-    /// The tag's value: 8 or, in old files, 32946.
-    Deflate(u16),
-    PackBits,
-    Zstd,
-    /// Any other, refused when the page is read.
-    Other(u16),
-}
-
-impl Compression {
-    fn from_tag(value: u64) -> Self {
-        match value {
-            1 => Self::None,
-            4 => Self::Fax4,
-            5 => Self::Lzw,
-            8 | 32946 => Self::Deflate(value as u16),
-            32773 => Self::PackBits,
-            50000 => Self::Zstd,
-            other => Self::Other(other as u16),
-        }
-    }
-
-    /// The value of the Compression tag.
-    pub(super) fn tag(self) -> u16 {
-        match self {
-            Self::None => 1,
-            Self::Fax4 => 4,
-            Self::Lzw => 5,
-            Self::Deflate(tag) | Self::Other(tag) => tag,
-            Self::PackBits => 32773,
-            Self::Zstd => 50000,
-        }
-    }
-
-    /// Its usual name.
-    pub(super) fn name(self) -> String {
-        let name = match self.tag() {
-            1 => "none",
-            2 => "CCITT modified Huffman",
-            3 => "CCITT fax group 3",
-            4 => "CCITT fax group 4",
-            5 => "LZW",
-            6 | 7 => "JPEG",
-            8 | 32946 => "deflate",
-            32773 => "PackBits",
-            33003 | 33005 | 33007 | 34712 => "JPEG 2000",
-            34676 | 34677 => "SGI LogLuv",
-            34887 => "LERC",
-            34925 => "LZMA",
-            50000 => "zstd",
-            50001 => "WebP",
-            50002 | 52546 => "JPEG XL",
-            other => return format!("method {other}"),
-        };
-        name.to_string()
-    }
-
-    /// The largest ratio of unpacked to packed bytes the method can reach, rounded up: a page that claims more is a lie.
-    fn max_expansion(self) -> u64 {
-        match self {
-            Self::None => 1,
-            Self::PackBits => 64,
-            Self::Deflate(_) => 1100,
-            Self::Lzw => 4096,
-            Self::Zstd | Self::Fax4 | Self::Other(_) => 1 << 16,
-        }
-    }
-}
 
 /// What all pages of a stack must have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -178,7 +105,7 @@ impl Page {
         }
         let fits = match self.predictor {
             1 => true,
-            // Readers do not agree whether the values of uncompressed pages are differences (TIFF 6.0 knows it for LZW).
+            // Readers do not agree whether uncompressed values are differences (TIFF 6.0 speaks of LZW alone).
             _ if matches!(self.compression, Compression::None | Compression::Fax4) => false,
             2 => matches!(self.kind.sample.bits(), 8 | 16 | 32 | 64),
             3 => self.kind.sample.is_float(),

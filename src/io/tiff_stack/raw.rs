@@ -2,8 +2,9 @@
 //!
 //! ImageJ writes stacks over 4 GB this way, since classic TIFF cannot point past 4 GB; so does `tifffile` on request.
 
+use super::compression::Compression;
 use super::ifd::Tags;
-use super::page::{Chunk, Compression, Page};
+use super::page::{Chunk, Page};
 use crate::error::Result;
 
 /// The one page, and where the planes begin that follow each other.

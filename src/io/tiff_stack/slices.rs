@@ -3,10 +3,66 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
+use super::ifd::{Tags, TiffFile};
+use super::layout::{Description, Dimensions};
+use super::page::Page;
+use super::source::{self, Opened, Source};
+use super::{Select, ome_xml};
 use crate::error::{Error, Result};
 
+/// Opens a folder of slices.
+pub(super) fn open_folder(folder: &Path, select: Select) -> Result<Opened> {
+    let files = list(folder)?;
+    let (file, offset) = open_slice(&files[0])?;
+    let tags = Tags::read(&file, offset, 1)?;
+    let first = Page::parse(&tags)?;
+    let description = describe_slice(&tags)?;
+    for path in &files[1..] {
+        let (file, offset) = open_slice(path)?;
+        let page = Page::parse(&Tags::read(&file, offset, 1)?)?;
+        if page.kind != first.kind {
+            return Err(file.error(format!(
+                "this slice is {} but the first of its folder ({}) is {}; all slices must be alike",
+                page.kind,
+                files[0].file_name().unwrap_or_default().to_string_lossy(),
+                first.kind
+            )));
+        }
+    }
+    let dimensions = Dimensions::only_z(files.len() as u64);
+    let (_, sample) = source::choose(&file, &dimensions, first.kind.samples, select)?;
+    let info = source::info(&first, &dimensions, description);
+    Ok(Opened { info, source: Source::Slices { files, kind: first.kind, sample } })
+}
+
+/// What the first slice says of its spacing.
+fn describe_slice(tags: &Tags) -> Result<Description> {
+    let text = tags.text(270, ome_xml::MAX_TEXT)?.unwrap_or_default();
+    if ome_xml::is_ome(&text) {
+        return ome_xml::spacing_of_slice(&text).map_err(|reason| tags.file.error(reason));
+    }
+    let (_, description) = source::describe(tags.file, &[tags.offset])?;
+    if description.dimensions.and_then(|d| d.count()).is_some_and(|planes| planes > 1) {
+        return Err(tags.file.error("it is a stack itself, but in a folder of slices every file is one plane"));
+    }
+    Ok(description)
+}
+
+/// Opens a file that must hold one page.
+pub(super) fn open_slice(path: &Path) -> Result<(TiffFile, u64)> {
+    let file = TiffFile::open(path)?;
+    let offsets = file.pages()?;
+    match offsets[..] {
+        [only] => Ok((file, only)),
+        _ => Err(file.error(format!(
+            "it has {} pages, but in a folder of slices every file is one plane; name the file itself to read it",
+            offsets.len()
+        ))),
+    }
+}
+
 /// The slices in a folder, in order.
-pub(super) fn list(folder: &Path) -> Result<Vec<PathBuf>> {
+fn list(folder: &Path) -> Result<Vec<PathBuf>> {
     let unreadable = |e: std::io::Error| Error::input(format!("the folder cannot be read: {e}")).at(folder);
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
@@ -55,11 +111,13 @@ fn natural(a: &str, b: &str) -> Ordering {
     }
 }
 
-/// The leading run of digits or of other characters, and the rest.
+/// The leading run of digits, or else one character, and the rest.
 fn split_token(text: &str) -> (&str, &str) {
     let Some(first) = text.chars().next() else { return ("", "") };
-    let digit = first.is_ascii_digit();
-    text.split_at(text.find(|c: char| c.is_ascii_digit() != digit).unwrap_or(text.len()))
+    if !first.is_ascii_digit() {
+        return text.split_at(first.len_utf8());
+    }
+    text.split_at(text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len()))
 }
 
 #[cfg(test)]

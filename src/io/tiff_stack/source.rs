@@ -60,7 +60,7 @@ impl Source {
                 Plane { file, page: stack.page, sample: *sample, chunks }.read(scratch, out)
             }
             Self::Slices { files, kind, sample } => {
-                let (file, offset) = open_slice(&files[z])?;
+                let (file, offset) = slices::open_slice(&files[z])?;
                 read_page(&file, *kind, *sample, 1, offset, scratch, out)
             }
         }
@@ -124,7 +124,7 @@ pub(super) fn open_file(path: &Path, select: Select) -> Result<Opened> {
 }
 
 /// Reads the first full page and what the file says about its planes.
-fn describe(file: &TiffFile, offsets: &[u64]) -> Result<(Page, Description)> {
+pub(super) fn describe(file: &TiffFile, offsets: &[u64]) -> Result<(Page, Description)> {
     let tags = Tags::read(file, offsets[0], 1)?;
     let text = tags.text(270, ome_xml::MAX_TEXT)?.unwrap_or_default();
     let pages = offsets.len() as u64;
@@ -204,7 +204,7 @@ fn refuse_odd_pages(file: &TiffFile, kind: Kind, places: &[(usize, u64)]) -> Res
 }
 
 /// The channel among the planes, and the sample in the pixel, that hold the wanted channel.
-fn choose(file: &TiffFile, dimensions: &Dimensions, samples: u16, select: Select) -> Result<(u64, u16)> {
+pub(super) fn choose(file: &TiffFile, dimensions: &Dimensions, samples: u16, select: Select) -> Result<(u64, u16)> {
     let channels = dimensions.size(Axis::Channel).saturating_mul(u64::from(samples));
     let times = dimensions.size(Axis::Time);
     let refuse = |what: &str, wanted: u32, held: u64| {
@@ -219,7 +219,15 @@ fn choose(file: &TiffFile, dimensions: &Dimensions, samples: u16, select: Select
     Ok((u64::from(select.channel) / u64::from(samples), (select.channel % u32::from(samples)) as u16))
 }
 
-fn info(page: &Page, dimensions: &Dimensions, description: Description) -> StackInfo {
+pub(super) fn info(page: &Page, dimensions: &Dimensions, description: Description) -> StackInfo {
+    let mut notes = description.notes;
+    let (depth, planes) = (dimensions.size(Axis::Z), dimensions.count().unwrap_or(u64::MAX));
+    if depth == 1 && planes > 1 {
+        // Many writers put the slices of a stack down as channels or frames when they are not told the axes.
+        notes.push(format!(
+            "there is 1 plane along z but {planes} planes of other channels or times; is one of them z?"
+        ));
+    }
     let sample = page.kind.sample;
     let channels = dimensions.size(Axis::Channel).saturating_mul(u64::from(page.kind.samples));
     StackInfo {
@@ -232,57 +240,6 @@ fn info(page: &Page, dimensions: &Dimensions, description: Description) -> Stack
         unit: description.unit,
         axes: dimensions.letters(page),
         compression: page.compression.name(),
-        notes: description.notes,
-    }
-}
-
-/// Opens a folder of slices.
-pub(super) fn open_folder(folder: &Path, select: Select) -> Result<Opened> {
-    let files = slices::list(folder)?;
-    let (file, offset) = open_slice(&files[0])?;
-    let tags = Tags::read(&file, offset, 1)?;
-    let first = Page::parse(&tags)?;
-    let description = describe_slice(&tags)?;
-    for path in &files[1..] {
-        let (file, offset) = open_slice(path)?;
-        let page = Page::parse(&Tags::read(&file, offset, 1)?)?;
-        if page.kind != first.kind {
-            return Err(file.error(format!(
-                "this slice is {} but the first of its folder ({}) is {}; all slices must be alike",
-                page.kind,
-                files[0].file_name().unwrap_or_default().to_string_lossy(),
-                first.kind
-            )));
-        }
-    }
-    let dimensions = Dimensions::only_z(files.len() as u64);
-    let (_, sample) = choose(&file, &dimensions, first.kind.samples, select)?;
-    let info = info(&first, &dimensions, description);
-    Ok(Opened { info, source: Source::Slices { files, kind: first.kind, sample } })
-}
-
-/// What the first slice says of its spacing.
-fn describe_slice(tags: &Tags) -> Result<Description> {
-    let text = tags.text(270, ome_xml::MAX_TEXT)?.unwrap_or_default();
-    if ome_xml::is_ome(&text) {
-        return ome_xml::spacing_of_slice(&text).map_err(|reason| tags.file.error(reason));
-    }
-    let (_, description) = describe(tags.file, &[tags.offset])?;
-    if description.dimensions.and_then(|d| d.count()).is_some_and(|planes| planes > 1) {
-        return Err(tags.file.error("it is a stack itself, but in a folder of slices every file is one plane"));
-    }
-    Ok(description)
-}
-
-/// Opens a file that must hold one page.
-fn open_slice(path: &Path) -> Result<(TiffFile, u64)> {
-    let file = TiffFile::open(path)?;
-    let offsets = file.pages()?;
-    match offsets[..] {
-        [only] => Ok((file, only)),
-        _ => Err(file.error(format!(
-            "it has {} pages, but in a folder of slices every file is one plane; name the file itself to read it",
-            offsets.len()
-        ))),
+        notes,
     }
 }
