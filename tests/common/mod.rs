@@ -1,1 +1,3 @@
 //! Shapes, files and slow plain references that several tests share.
+
+pub(crate) mod python;
