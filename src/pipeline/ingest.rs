@@ -64,7 +64,9 @@ pub fn ingest<T: Sample>(
         let cropped = crop_plane(plane, &whole, &part);
         bricks.write_box(&part.translate(crop.lo.map(|v| -v)), &cropped)?;
         Histogram::of(&cropped).ok_or_else(|| {
-            Error::input(format!("plane {z} holds a value that is no number (NaN or infinite); crop it away or repair the image"))
+            Error::input(format!(
+                "plane {z} holds a value that is no number (NaN or infinite); crop it away or repair the image"
+            ))
         })
     })?;
     let histogram = counts.into_iter().reduce(Histogram::merge).unwrap_or_default();

@@ -1,9 +1,11 @@
 //! The surface u = 1/2 of a solved band as a mesh, with its measures: brick by brick, welded in grid order.
 
+use std::collections::BTreeMap;
+
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickId, Geometry};
-use crate::kernel::surface::{MarchingCubes, Measures, Patch, SurfaceMeasure, Welder, cells_of_brick};
+use crate::kernel::surface::{MarchingCubes, Measures, Patch, SurfaceMeasure, Triangle, Welder, cells_of_brick};
 use crate::store::{BoxSource, BrickArray, MeshSink};
 
 /// Bricks whose patches are made in parallel before they are welded in order.
@@ -13,7 +15,12 @@ const BATCH: usize = 256;
 ///
 /// # Errors
 /// When the sink fails or the run is interrupted.
-pub fn extract(stage: &Stage<'_>, u: &BrickArray<f32>, geometry: &Geometry, sink: &mut dyn MeshSink) -> Result<Measures> {
+pub fn extract(
+    stage: &Stage<'_>,
+    u: &BrickArray<f32>,
+    geometry: &Geometry,
+    sink: &mut dyn MeshSink,
+) -> Result<Measures> {
     let grid = *u.set().grid();
     let (lo, hi) = (geometry.origin, geometry.position(geometry.shape));
     let centre = std::array::from_fn(|a| 0.5 * (lo[a] + hi[a]));
@@ -25,11 +32,8 @@ pub fn extract(stage: &Stage<'_>, u: &BrickArray<f32>, geometry: &Geometry, sink
     let bricks: Vec<BrickId> = (0..grid.len()).filter(|&id| holds_surface(u, id)).collect();
     for batch in bricks.chunks(BATCH) {
         let patches = stage.run(batch, &workers, |(cubes, values), &id| {
-            let cells = cells_of_brick(&grid.brick_box(id), shape, true);
-            let part = Box3::new(cells.lo, cells.hi.map(|v| v + 1));
-            read_padded(u, &part, values)?;
             let mut patch = Patch::default();
-            cubes.extract(values, &part, &cells, &mut patch);
+            patch_of(u, id, cubes, values, &mut patch)?;
             Ok(patch)
         })?;
         for patch in &patches {
@@ -63,5 +67,113 @@ fn read_padded(u: &BrickArray<f32>, part: &Box3, values: &mut Vec<f32>) -> Resul
     for (row, (y, z)) in stored.chunks_exact(width).zip(inside.rows()) {
         values[part.offset_of([inside.lo[0], y, z])..][..width].copy_from_slice(row);
     }
+    Ok(())
+}
+
+/// Distances from points to the surface of `u`, each exact to the triangles; none when there is no surface.
+///
+/// Around the brick of a point, patches are made again in growing shells of bricks until no nearer triangle can come:
+/// nothing of the mesh is kept in memory, and most points end in the first shell.
+///
+/// # Errors
+/// When the run is interrupted.
+pub fn distances_to(
+    stage: &Stage<'_>,
+    u: &BrickArray<f32>,
+    geometry: &Geometry,
+    points: &[[f64; 3]],
+) -> Result<Vec<Option<f64>>> {
+    let grid = *u.set().grid();
+    let shape = geometry.shape;
+    let mut by_brick: BTreeMap<BrickId, Vec<usize>> = BTreeMap::new();
+    for (n, &point) in points.iter().enumerate() {
+        let voxel = geometry.to_voxels(point);
+        let inside = std::array::from_fn(|a| (voxel[a].round() as i64).clamp(0, shape[a] - 1));
+        by_brick.entry(grid.brick_of(inside).unwrap_or(0)).or_default().push(n);
+    }
+    let groups: Vec<(BrickId, Vec<usize>)> = by_brick.into_iter().collect();
+    let workers = Workers::new(move || Shells::new(shape));
+    let found = stage.run(&groups, &workers, |shells, (brick, members)| {
+        let targets: Vec<[f64; 3]> = members.iter().map(|&n| points[n]).collect();
+        shells.nearest(u, geometry, *brick, &targets)
+    })?;
+    let mut distances = vec![None; points.len()];
+    for ((_, members), group) in groups.iter().zip(found) {
+        members.iter().zip(group).for_each(|(&n, distance)| distances[n] = distance);
+    }
+    Ok(distances)
+}
+
+/// Work buffers of the search for the nearest triangle.
+struct Shells {
+    cubes: MarchingCubes,
+    values: Vec<f32>,
+    patch: Patch,
+}
+
+impl Shells {
+    fn new(shape: [i64; 3]) -> Self {
+        Self { cubes: MarchingCubes::new(shape, 0.5), values: Vec::new(), patch: Patch::default() }
+    }
+
+    fn nearest(
+        &mut self,
+        u: &BrickArray<f32>,
+        geometry: &Geometry,
+        brick: BrickId,
+        targets: &[[f64; 3]],
+    ) -> Result<Vec<Option<f64>>> {
+        let grid = *u.set().grid();
+        let centre = grid.coords(brick);
+        let mut squared = vec![f64::INFINITY; targets.len()];
+        for radius in 0..=grid.counts().into_iter().max().unwrap_or(1) {
+            let around = Box3::new(centre, centre.map(|c| c + 1)).grow(radius);
+            let shell = around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
+            let on_shell = shell.filter(|at| (0..3).any(|a| (at[a] - centre[a]).abs() == radius));
+            for id in on_shell.filter_map(|at| grid.id_at(at)).filter(|&id| holds_surface(u, id)) {
+                self.measure(u, geometry, id, targets, &mut squared)?;
+            }
+            // A triangle of a farther shell is at least this far from any point of the brick in the middle.
+            let certain = radius as f64 * grid.edge() as f64 * geometry.min_spacing() - 2.0 * geometry.max_spacing();
+            if certain > 0.0 && squared.iter().all(|&d| d <= certain * certain) {
+                break;
+            }
+        }
+        Ok(squared.into_iter().map(|d| d.is_finite().then(|| d.sqrt())).collect())
+    }
+
+    fn measure(
+        &mut self,
+        u: &BrickArray<f32>,
+        geometry: &Geometry,
+        id: BrickId,
+        targets: &[[f64; 3]],
+        squared: &mut [f64],
+    ) -> Result<()> {
+        patch_of(u, id, &mut self.cubes, &mut self.values, &mut self.patch)?;
+        let world = |p: [f64; 3]| std::array::from_fn(|a| geometry.origin[a] + p[a] * geometry.spacing[a]);
+        for corners in &self.patch.triangles {
+            let triangle = Triangle::new(corners.map(|v| world(self.patch.positions[v as usize])));
+            for (target, nearest) in targets.iter().zip(squared.iter_mut()) {
+                *nearest = nearest.min(triangle.distance_squared(*target));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The surface in the cells of one brick.
+fn patch_of(
+    u: &BrickArray<f32>,
+    id: BrickId,
+    cubes: &mut MarchingCubes,
+    values: &mut Vec<f32>,
+    patch: &mut Patch,
+) -> Result<()> {
+    let grid = *u.set().grid();
+    let cells = cells_of_brick(&grid.brick_box(id), grid.shape(), true);
+    let part = Box3::new(cells.lo, cells.hi.map(|v| v + 1));
+    read_padded(u, &part, values)?;
+    cubes.extract(values, &part, &cells, patch);
     Ok(())
 }

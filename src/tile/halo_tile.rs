@@ -3,7 +3,6 @@
 //! The buffer is dense `[z][y][x]` over (edge + 2)^3 voxels whatever the brick's valid extents, so strides are the
 //! same for every brick of a grid; local indices run from -1 (lower ghost) to `edge` (upper ghost).
 
-
 /// A brick's voxels and one ghost layer around them.
 #[derive(Clone, Debug)]
 pub struct HaloTile<T> {

@@ -11,3 +11,4 @@ mod layering;
 mod tiff_derived;
 mod tiff_handmade;
 mod tiff_hostile;
+mod zarr_readers;

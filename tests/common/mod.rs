@@ -16,3 +16,4 @@ pub(crate) fn shared_data(part: &str) -> Option<PathBuf> {
     println!("skipped: {} is absent", folder.display());
     None
 }
+pub(crate) mod python;

@@ -14,6 +14,7 @@ use crate::store::{Element, ElementType};
 #[derive(Debug)]
 pub struct LevelWriter {
     folder: PathBuf,
+    store: PathBuf,
     plan: LevelPlan,
     element: ElementType,
     layout: ShardLayout,
@@ -21,11 +22,12 @@ pub struct LevelWriter {
 }
 
 impl LevelWriter {
-    pub(super) fn create(folder: &Path, plan: LevelPlan, element: ElementType) -> Result<Self> {
+    /// Begins the level in `folder`; errors name `store`, what the whole will be called.
+    pub(super) fn create(folder: &Path, store: &Path, plan: LevelPlan, element: ElementType) -> Result<Self> {
         let layout = ShardLayout::new(plan.geometry.shape, element);
         let codec = ChunkCodec::new(element)?;
         write_json(&folder.join("zarr.json"), &metadata::array(plan.geometry.shape, element, layout, &codec))?;
-        Ok(Self { folder: folder.to_path_buf(), plan, element, layout, codec })
+        Ok(Self { folder: folder.to_path_buf(), store: store.to_path_buf(), plan, element, layout, codec })
     }
 
     /// The level's grid.
@@ -107,6 +109,7 @@ impl LevelWriter {
         assert_eq!(T::TYPE, self.element, "the level holds voxels of another type");
         let path = self.shard_path(shard);
         write_whole(&path, |sink| write_shard(sink, &self.codec, self.layout, shard, &mut fill))
+            .map_err(|error| error.at(&self.store))
     }
 
     fn shard_path(&self, shard: &Box3) -> PathBuf {
@@ -131,7 +134,7 @@ mod tests {
 
     fn level(folder: &Path, shape: [i64; 3], element: ElementType) -> LevelWriter {
         let geometry = Geometry { shape, spacing: [1.0; 3], origin: [0.0; 3], unit: None };
-        LevelWriter::create(&folder.join("0"), LevelPlan { geometry, factors: [1; 3] }, element).unwrap()
+        LevelWriter::create(&folder.join("0"), folder, LevelPlan { geometry, factors: [1; 3] }, element).unwrap()
     }
 
     /// The array as the `zarrs` crate reads it, which takes no part in laying out or writing shards.
@@ -201,7 +204,9 @@ mod tests {
             calls += 1;
             if calls == 2 { Err(Error::input("page 3 is broken")) } else { Ok(()) }
         });
-        assert!(error.unwrap_err().to_string().ends_with("page 3 is broken"));
+        let error = error.unwrap_err();
+        assert!(error.to_string().ends_with("page 3 is broken"));
+        assert_eq!(error.path(), Some(folder.path()));
         assert_eq!(std::fs::read_dir(folder.path().join("0/c/0/0")).unwrap().count(), 0);
     }
 }

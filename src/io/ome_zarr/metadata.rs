@@ -84,7 +84,8 @@ pub(super) fn array(shape: [i64; 3], element: ElementType, layout: ShardLayout, 
 pub(super) fn image(spec: &ImageSpec<'_>, levels: &[LevelPlan]) -> Map<String, Value> {
     let mut ome = Map::new();
     ome.insert("multiscales".into(), multiscales(spec.name, levels, "mean", "mean of each block of voxels"));
-    if let Some(window) = spec.window {
+    // JSON has no infinities; an image of nothing but one value needs no window.
+    if let Some(window) = spec.window.filter(|[low, high]| (high - low).is_finite() && low < high) {
         ome.insert("omero".into(), omero(spec, window));
     }
     ome
@@ -168,5 +169,19 @@ mod tests {
         assert_eq!(placed[1]["translation"], json!([0.0, -1e-9, 123_456_789.012_345]));
         assert_eq!(multiscale["axes"][0], json!({ "name": "z", "type": "space" }));
         assert!(!ome.contains_key("omero"));
+    }
+
+    #[test]
+    fn windows_are_numbers() {
+        let geometry = Geometry { shape: [3; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+        let omero = |window| {
+            let spec = ImageSpec { name: "d", geometry: &geometry, element: ElementType::F32, window: Some(window) };
+            image(&spec, &plan_levels(&geometry)).remove("omero")
+        };
+        let found = omero([-1.0, 2.5]).unwrap();
+        assert_eq!(found["channels"][0]["window"], json!({ "start": -1.0, "end": 2.5, "min": -1.0, "max": 2.5 }));
+        for window in [[0.0, f64::INFINITY], [f64::NAN, 1.0], [2.0, 2.0]] {
+            assert_eq!(omero(window), None);
+        }
     }
 }

@@ -54,7 +54,7 @@ impl StoreWriter {
             .tempdir_in(path.parent().unwrap_or(Path::new(".")))
             .map_err(|error| io_error("the output cannot be created in its folder", &error).at(&path))?;
         let store = Self { path, overwrite, partial, labels: Mutex::default() };
-        store.ensure_groups(Path::new(""))?;
+        store.ensure_groups(Path::new("")).map_err(|error| error.at(&store.path))?;
         Ok(store)
     }
 
@@ -73,7 +73,7 @@ impl StoreWriter {
     /// When `relative` leads out of the store.
     pub fn file(&self, relative: &str) -> Result<PathBuf> {
         let path = self.inside(relative);
-        create_parent(&path)?;
+        create_parent(&path).map_err(|error| error.at(&self.path))?;
         Ok(path)
     }
 
@@ -88,6 +88,7 @@ impl StoreWriter {
         let levels = plan_levels(spec.geometry);
         let attributes = metadata::image(spec, &levels);
         self.multiscale(group, &metadata::group(Some(attributes)), levels, spec.element)
+            .map_err(|error| error.at(&self.path))
     }
 
     /// Begins a label image of the root's image, in the group `labels`.
@@ -98,25 +99,7 @@ impl StoreWriter {
     /// # Panics
     /// When the name is taken or no plain folder name, or the type is no unsigned one.
     pub fn labels(&self, spec: &LabelSpec<'_>) -> Result<ImageWriter> {
-        assert!(
-            matches!(spec.element, ElementType::U8 | ElementType::U16 | ElementType::U32),
-            "labels are unsigned integers"
-        );
-        assert_eq!(Path::new(spec.name).components().count(), 1, "a label image lies directly in the group of labels");
-        let levels = plan_levels(spec.geometry);
-        let attributes = metadata::labels(spec, &levels);
-        let image = self.multiscale(
-            &format!("labels/{}", spec.name),
-            &metadata::group(Some(attributes)),
-            levels,
-            spec.element,
-        )?;
-        // Listed last, under the lock until it is on disk: the list names what is there, whichever thread comes first.
-        let mut names = self.lock();
-        names.push(spec.name.to_owned());
-        names.sort();
-        write_json(&self.inside("labels").join(METADATA), &metadata::group(Some(metadata::label_list(&names))))?;
-        Ok(image)
+        self.begin_labels(spec).map_err(|error| error.at(&self.path))
     }
 
     /// Moves the store into place, replacing the one that is there if `overwrite` said so.
@@ -147,6 +130,28 @@ impl StoreWriter {
         Ok(())
     }
 
+    fn begin_labels(&self, spec: &LabelSpec<'_>) -> Result<ImageWriter> {
+        assert!(
+            matches!(spec.element, ElementType::U8 | ElementType::U16 | ElementType::U32),
+            "labels are unsigned integers"
+        );
+        assert_eq!(Path::new(spec.name).components().count(), 1, "a label image lies directly in the group of labels");
+        let levels = plan_levels(spec.geometry);
+        let attributes = metadata::labels(spec, &levels);
+        let image = self.multiscale(
+            &format!("labels/{}", spec.name),
+            &metadata::group(Some(attributes)),
+            levels,
+            spec.element,
+        )?;
+        // Listed last, under the lock until it is on disk: the list names what is there, whichever thread comes first.
+        let mut names = self.lock();
+        names.push(spec.name.to_owned());
+        names.sort();
+        write_json(&self.inside("labels").join(METADATA), &metadata::group(Some(metadata::label_list(&names))))?;
+        Ok(image)
+    }
+
     fn multiscale(
         &self,
         group: &str,
@@ -158,7 +163,8 @@ impl StoreWriter {
         assert!(!folder.join("0").exists(), "the store holds an image at {group:?} already");
         self.ensure_groups(Path::new(group))?;
         let levels = levels.into_iter().enumerate();
-        let levels = levels.map(|(level, plan)| LevelWriter::create(&folder.join(level.to_string()), plan, element));
+        let levels =
+            levels.map(|(level, plan)| LevelWriter::create(&folder.join(level.to_string()), &self.path, plan, element));
         let levels = levels.collect::<Result<_>>()?;
         write_json(&folder.join(METADATA), document)?;
         Ok(ImageWriter { levels })

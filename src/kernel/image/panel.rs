@@ -1,7 +1,8 @@
 //! Pictures of slices: a grey image in a window of intensities, the outlines of labels drawn over it in colour.
 //!
-//! Between pixels grey values are interpolated linearly, and a point belongs to the label with the largest share of the
-//! four pixels around it by the same weights: so outlines are smooth curves within half a pixel of the labels' edges.
+//! Between pixels grey values are interpolated linearly. A point belongs to the label with the largest share of the
+//! pixels around it, weighted by a Gaussian: outlines are smooth curves close to the labels' edges. Objects too thin for
+//! that keep the edges of their pixels, so that nothing is smoothed away.
 
 use std::collections::BTreeMap;
 
@@ -126,18 +127,55 @@ impl Slice<'_> {
         self.neighbours(place).iter().map(|&(at, share)| f64::from(self.grey[at]) * share).sum::<f64>() as f32
     }
 
-    fn label_at(&self, place: [f64; 2]) -> u32 {
-        let around = self.neighbours(place).map(|(at, share)| (self.labels[at], share));
-        if around.iter().all(|(label, _)| *label == around[0].0) {
-            return around[0].0;
-        }
-        let mut shares = BTreeMap::new();
-        for (label, share) in around {
-            *shares.entry(label).or_insert(0.0) += share;
-        }
-        // Equal shares go to the larger label: the same whatever the order of the pixels.
-        shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(label, _)| label)
+    /// The labels of the 25 pixels around one; beyond the border the nearest pixel's.
+    fn labels_around(&self, pixel: [usize; 2]) -> [[u32; 5]; 5] {
+        let near = |a: usize, n: usize| AROUND.map(|step| (pixel[a] as i64 + step).clamp(0, n as i64 - 1) as usize);
+        let (columns, rows) = (near(0, self.width), near(1, self.height));
+        rows.map(|y| columns.map(|x| self.labels[y * self.width + x]))
     }
+
+    /// The labels at the samples of a drawing of `size` samples.
+    fn sampled_labels(&self, size: [usize; 2]) -> Vec<u32> {
+        let pixels = (0..self.height).flat_map(|y| (0..self.width).map(move |x| [x, y]));
+        let keeps: Vec<bool> = pixels.map(|pixel| keeps_its_label(&self.labels_around(pixel))).collect();
+        let samples = (0..size[1]).flat_map(|row| (0..size[0]).map(move |column| [column, row]));
+        let label_at = |sample| {
+            let place = self.place(sample, size);
+            // Half-way places lie in the first and last pixels' halves, which round inside.
+            let pixel = [place[0].round() as usize, place[1].round() as usize];
+            let at = pixel[1] * self.width + pixel[0];
+            if keeps[at] {
+                return self.labels[at];
+            }
+            largest_share(&self.labels_around(pixel), [0, 1].map(|a| place[a] - pixel[a] as f64))
+        };
+        samples.map(label_at).collect()
+    }
+}
+
+/// Pixels before and after the nearest one whose labels count.
+const AROUND: [i64; 5] = [-2, -1, 0, 1, 2];
+/// A label with fewer of the 25 pixels is a line or a dot.
+const THIN: usize = 6;
+
+/// True where all pixels around agree with the middle one, or hardly any.
+fn keeps_its_label(labels: &[[u32; 5]; 5]) -> bool {
+    let alike = labels.iter().flatten().filter(|&&label| label == labels[2][2]).count();
+    alike == 25 || alike < THIN
+}
+
+/// The label of the largest share at a point that lies `offset` from the middle pixel.
+fn largest_share(labels: &[[u32; 5]; 5], offset: [f64; 2]) -> u32 {
+    // Standard deviation 0.9 pixels: steps of one pixel become slopes, and nothing moves further than half a pixel.
+    let [across, down] = offset.map(|at| AROUND.map(|step| (-(step as f64 - at).powi(2) / (2.0 * 0.9 * 0.9)).exp()));
+    let mut shares = BTreeMap::new();
+    for (row, down) in labels.iter().zip(down) {
+        for (&label, across) in row.iter().zip(across) {
+            *shares.entry(label).or_insert(0.0) += across * down;
+        }
+    }
+    // Equal shares go to the larger label: the same whatever the order of the pixels.
+    shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(labels[2][2], |(label, _)| label)
 }
 
 /// The labels of a slice at the samples of its drawing, and which samples lie on an outline.
@@ -149,8 +187,7 @@ struct Outlines {
 
 fn outlines(slice: &Slice<'_>, size: [usize; 2]) -> Outlines {
     let [width, height] = size;
-    let places = (0..height).flat_map(|row| (0..width).map(move |column| [column, row]));
-    let labels: Vec<u32> = places.map(|at| slice.label_at(slice.place(at, size))).collect();
+    let labels = slice.sampled_labels(size);
     let mut outlined = Outlines { width, drawn: vec![false; labels.len()], labels };
     let reach = (LINE_WIDTH * OVERSAMPLING as f64) as i64;
     for row in 0..height {
@@ -195,12 +232,16 @@ impl Outlines {
     /// The colour of a drawn pixel: the mean over its samples of outline, tinted inside and plain grey.
     fn blend(&self, [column, row]: [usize; 2], grey: f64) -> [u8; 3] {
         let mut sum = [0.0; 3];
+        let mut known = (0, label_color(0));
         for y in row * OVERSAMPLING..(row + 1) * OVERSAMPLING {
             for x in column * OVERSAMPLING..(column + 1) * OVERSAMPLING {
                 let at = y * self.width + x;
                 let label = self.labels[at];
+                if label != known.0 {
+                    known = (label, label_color(label));
+                }
                 let opacity = if self.drawn[at] { 1.0 } else { TINT * f64::from(u8::from(label != 0)) };
-                for (sum, color) in sum.iter_mut().zip(label_color(label)) {
+                for (sum, color) in sum.iter_mut().zip(known.1) {
                     *sum += opacity * f64::from(color) + (1.0 - opacity) * grey;
                 }
             }
@@ -280,6 +321,16 @@ mod tests {
         assert_eq!(pixel(&row, 2 * MARGIN + 4, MARGIN + 3), BACKGROUND);
         let drawn = row.pixels.chunks(3).filter(|p| *p != BACKGROUND).count();
         assert_eq!(drawn, 40 + 6);
+    }
+
+    #[test]
+    fn single_pixels_still_show() {
+        let mut labels = vec![0; 25];
+        labels[12] = 3;
+        let slice = Slice { grey: &[0.0; 25], labels: &labels, width: 5, height: 5, pixel_aspect: 1.0 };
+        let picture = panel(&slice, [0.0, 1.0], 8.0);
+        let drawn = picture.pixels.chunks(3).filter(|p| *p != [0; 3]).count();
+        assert_eq!(drawn, 64, "the pixel is 8 by 8");
     }
 
     #[test]

@@ -1,0 +1,17 @@
+//! `segment`: objects in a 3-D image, guided by border points that were marked on it.
+//!
+//! ```text
+//! stack -> bricks -> root image        marks -> contours -> cloud, object by object, each in a box of its own
+//! cloud -> distance -> flood -> band   image -> presmoothing -> edge detector      band + edges -> time loop -> u
+//! u -> surface -> mesh, measures       u of all objects -> one label volume
+//! ```
+
+mod labels;
+mod object;
+mod output;
+mod settings;
+
+pub use labels::Overlap;
+pub use object::{Hole, ObjectReport};
+pub use output::{Outcome, segment};
+pub use settings::{Guides, SegmentSettings};

@@ -1,0 +1,209 @@
+//! The whole job: ingest, solve each object, write the store.
+
+use std::collections::BTreeMap;
+
+use super::labels::{LabelVolume, Placed};
+use super::object::{ObjectReport, Picture, Solution, solve};
+use super::settings::{Guides, SegmentSettings};
+use crate::error::{Error, Result};
+use crate::exec::{Engine, Stage, Workers};
+use crate::grid::{Box3, BrickGrid, Geometry};
+use crate::io::mesh_ply::PlyWriter;
+use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
+use crate::kernel::image::palette::label_color;
+use crate::kernel::surface::Hausdorff;
+use crate::pipeline::ingest::{Image, Sample, ingest};
+use crate::pipeline::marks::{ObjectMarks, split};
+use crate::pipeline::pyramid::{Reduce, write_levels};
+use crate::pipeline::surface;
+use crate::store::{BoxSource, Element, ElementType, MeshBuffer, PlaneSource};
+
+/// What a segmentation found.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The grid of the image.
+    pub geometry: Geometry,
+    /// Type of the image's voxels.
+    pub element: ElementType,
+    /// The objects in order of their labels.
+    pub objects: Vec<ObjectReport>,
+    /// Voxels of each label.
+    pub label_voxels: BTreeMap<u32, u64>,
+}
+
+/// Segments the part `crop` of a stack; `store` gets the results, none of them when it is absent.
+///
+/// # Errors
+/// When the stack or the marks cannot be used, the output cannot be written, scratch runs out, or the run is
+/// interrupted.
+pub fn segment(
+    engine: &Engine,
+    stack: &dyn PlaneSource,
+    crop: &Box3,
+    guides: &Guides<'_>,
+    settings: &SegmentSettings,
+    store: Option<&StoreWriter>,
+) -> Result<Outcome> {
+    match stack.element() {
+        ElementType::U8 => run::<u8>(engine, stack, crop, guides, settings, store),
+        ElementType::U16 => run::<u16>(engine, stack, crop, guides, settings, store),
+        ElementType::U32 => run::<u32>(engine, stack, crop, guides, settings, store),
+        ElementType::F64 => run::<f64>(engine, stack, crop, guides, settings, store),
+        ElementType::F32 | ElementType::F16 => run::<f32>(engine, stack, crop, guides, settings, store),
+    }
+}
+
+fn run<T: Sample>(
+    engine: &Engine,
+    stack: &dyn PlaneSource,
+    crop: &Box3,
+    guides: &Guides<'_>,
+    settings: &SegmentSettings,
+    store: Option<&StoreWriter>,
+) -> Result<Outcome> {
+    let objects = split(guides.cloud);
+    let stage = engine.stage("read stack", crop.shape()[2].unsigned_abs());
+    let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
+    stage.finish();
+    if settings.rho > 0.0 && image.extremes[0] == image.extremes[1] {
+        return Err(Error::input(format!(
+            "the image holds only the value {}; check --channel, --time and --crop, or give --rho 0 to use the marks alone",
+            image.extremes[0]
+        )));
+    }
+    let mut solved = Vec::new();
+    for marks in &objects {
+        let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry };
+        let solution = solve(engine, &picture, marks, settings)?;
+        let report = draw(engine, &solution, marks, store, objects.len() > 1)?;
+        solved.push((solution, report));
+    }
+    let label_voxels = write_labels(engine, guides.geometry, &solved, settings, store)?;
+    if let Some(store) = store {
+        write_image(engine, guides.geometry, &image, store)?;
+    }
+    let objects = solved.into_iter().map(|(_, report)| report).collect();
+    Ok(Outcome { geometry: guides.geometry.clone(), element: T::TYPE, objects, label_voxels })
+}
+
+/// Extracts, measures and writes an object's surface, and writes its segmentation function.
+fn draw(
+    engine: &Engine,
+    solution: &Solution,
+    marks: &ObjectMarks,
+    store: Option<&StoreWriter>,
+    several: bool,
+) -> Result<ObjectReport> {
+    let (u, geometry, label) = (&solution.u, &solution.geometry, marks.object);
+    let stage = engine.stage(&format!("surface {label}"), 0);
+    let measures = match store {
+        Some(store) => {
+            let file = if several { format!("meshes/object-{label}.ply") } else { "meshes/surface.ply".into() };
+            let mut mesh = PlyWriter::create(&store.file(&file)?, geometry.unit.as_deref())?;
+            let measures = surface::extract(&stage, u, geometry, &mut mesh)?;
+            mesh.finish()?;
+            measures
+        }
+        None => surface::extract(&stage, u, geometry, &mut MeshBuffer::default())?,
+    };
+    let points = marks.contours.concat();
+    let distances = surface::distances_to(&stage, u, geometry, &points)?;
+    let hausdorff = Hausdorff::of(distances.into_iter().flatten());
+    stage.voxels(measures.triangles);
+    stage.finish();
+    if let Some(store) = store {
+        let group = if several { format!("levelset/object-{label}") } else { "levelset".into() };
+        let spec = ImageSpec { name: "levelset", geometry, element: ElementType::F32, window: Some([0.0, 1.0]) };
+        let levels = store.image(&group, &spec)?;
+        let stage = engine.stage(&format!("write u {label}"), 0);
+        write_levels::<f32>(&stage, engine, levels.levels(), u, Reduce::Mean)?;
+        stage.finish();
+    }
+    Ok(ObjectReport {
+        label,
+        cloud_points: solution.cloud_points,
+        beta: solution.beta,
+        hole: solution.hole,
+        band_voxels: solution.band_voxels,
+        evolution: solution.evolution,
+        measures,
+        hausdorff,
+    })
+}
+
+fn write_labels(
+    engine: &Engine,
+    geometry: &Geometry,
+    solved: &[(Solution, ObjectReport)],
+    settings: &SegmentSettings,
+    store: Option<&StoreWriter>,
+) -> Result<BTreeMap<u32, u64>> {
+    let placed = solved
+        .iter()
+        .map(|(s, report)| Placed { label: report.label, window: s.window, u: &s.u, volume: report.measures.volume })
+        .collect();
+    let volume = LabelVolume::new(geometry.shape, placed, settings.overlap);
+    let stage = engine.stage("write labels", 0);
+    stage.voxels(geometry.domain().volume());
+    let highest = solved.iter().map(|(_, r)| r.label).max().unwrap_or(0);
+    let counts = match highest {
+        0..=0xff => write_labels_as::<u8>(&stage, engine, geometry, &volume, solved, store),
+        0x100..=0xffff => write_labels_as::<u16>(&stage, engine, geometry, &volume, solved, store),
+        _ => write_labels_as::<u32>(&stage, engine, geometry, &volume, solved, store),
+    }?;
+    stage.finish();
+    Ok(counts)
+}
+
+fn write_labels_as<T: Element>(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    geometry: &Geometry,
+    volume: &LabelVolume<'_>,
+    solved: &[(Solution, ObjectReport)],
+    store: Option<&StoreWriter>,
+) -> Result<BTreeMap<u32, u64>> {
+    if let Some(store) = store {
+        let colors: Vec<LabelColor> = solved
+            .iter()
+            .map(|(_, r)| {
+                let [red, green, blue] = label_color(r.label);
+                LabelColor { label: r.label, rgba: [red, green, blue, 255] }
+            })
+            .collect();
+        let spec = LabelSpec { name: "segmentation", geometry, element: T::TYPE, colors: &colors };
+        let image = store.labels(&spec)?;
+        write_levels::<T>(stage, engine, image.levels(), volume, Reduce::Mode)?;
+    }
+    count_labels(stage, geometry, volume)
+}
+
+/// Voxels of each label.
+fn count_labels(stage: &Stage<'_>, geometry: &Geometry, volume: &LabelVolume<'_>) -> Result<BTreeMap<u32, u64>> {
+    let grid = BrickGrid::new(geometry.shape, 64);
+    let parts: Vec<Box3> = (0..grid.len()).map(|id| grid.brick_box(id)).collect();
+    let counts = stage.run(&parts, &Workers::new(Vec::new), |labels, part| {
+        let mut counts = BTreeMap::<u32, u64>::new();
+        if BoxSource::<u32>::constant_in(volume, part) == Some(0) {
+            return Ok(counts);
+        }
+        labels.resize(part.len(), 0);
+        volume.read_box(part, labels)?;
+        labels.iter().filter(|&&l| l > 0).for_each(|&l| *counts.entry(l).or_default() += 1);
+        Ok(counts)
+    })?;
+    Ok(counts.into_iter().flatten().fold(BTreeMap::new(), |mut all, (label, n)| {
+        *all.entry(label).or_default() += n;
+        all
+    }))
+}
+
+fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>, store: &StoreWriter) -> Result<()> {
+    let stage = engine.stage("write image", 0);
+    stage.voxels(geometry.domain().volume());
+    let window = Some([image.range.low, image.range.high]);
+    let levels = store.image("", &ImageSpec { name: "image", geometry, element: T::TYPE, window })?;
+    write_levels::<T>(&stage, engine, levels.levels(), &image.bricks, Reduce::Mean)?;
+    stage.finish();
+    Ok(())
+}
