@@ -70,7 +70,7 @@ fn half_sweep(
             }
             let here: &mut [f32; CELL] = u[center..center + CELL].first_chunk_mut().expect("a row of the cell");
             for x in 0..CELL {
-                let correction = turn[x] * (sum[x] - here[x]);
+                let correction = turn[x] * mask.columns[x] * (sum[x] - here[x]);
                 squares[x] += correction * correction * inverse_square;
                 here[x] = (here[x] + correction).clamp(0.0, 1.0);
             }
@@ -100,7 +100,7 @@ fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask, correction_squared: f64)
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
             let (u, old) = (row(u, center), row(old, center));
             for x in 0..CELL {
-                let step = u[x] - old[x];
+                let step = mask.columns[x] * (u[x] - old[x]);
                 moved[x] += step.abs();
                 squared[x] += step * step;
                 grown[x] += step;
