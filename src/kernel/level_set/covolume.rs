@@ -111,30 +111,11 @@ impl Default for CellMask {
     }
 }
 
-/// The scheme of one cell, divided by its diagonal; arrays dense over the cell.
-#[derive(Clone, Debug)]
-pub struct Coefficients {
-    /// Weights of the neighbours across -x, +x, -y, +y, -z, +z.
-    pub weights: [Vec<f32>; 6],
-    /// The old value divided by the diagonal.
-    pub right: Vec<f32>,
-    /// Sum over the solved voxels of `M_p`, the norm of the gradient of u.
-    pub gradient_sum: f64,
-}
-
-impl Coefficients {
-    /// Room for one cell.
-    #[must_use]
-    pub fn new() -> Self {
-        Self { weights: std::array::from_fn(|_| vec![0.0; CELL_LEN]), right: vec![0.0; CELL_LEN], gradient_sum: 0.0 }
-    }
-}
-
-impl Default for Coefficients {
-    fn default() -> Self {
-        Self::new()
-    }
-}
+/// Layers of a scheme: the weights of the neighbours across -x, +x, -y, +y, -z, +z, then the old value divided by the
+/// diagonal; each dense over the cell.
+pub const SCHEME_LAYERS: usize = 7;
+/// Values of a scheme.
+pub const SCHEME_LEN: usize = SCHEME_LAYERS * CELL_LEN;
 
 /// Planes that the assembly rolls through.
 #[derive(Clone, Debug)]
@@ -163,7 +144,10 @@ impl Default for Planes {
     }
 }
 
-/// Assembles the scheme of one cell, on the widest vector unit the processor has (the bits are the same on any).
+/// Assembles the scheme of one cell (rows without solved voxels are left as they are) and returns the sum of `M_p`, the
+/// norm of the gradient of u, over the solved voxels.
+///
+/// Runs on the widest vector unit the processor has; the bits are the same on any.
 ///
 /// # Panics
 /// When a field is not a grown cell (g may be empty when `rho` is 0).
@@ -173,10 +157,10 @@ pub fn assemble(
     spacing: [f64; 3],
     velocity: &Velocity,
     work: &mut Planes,
-    out: &mut Coefficients,
-) {
+    scheme: &mut [f32],
+) -> f64 {
     vectorised!({ fields: Fields<'_>, mask: &CellMask, spacing: [f64; 3], velocity: &Velocity, work: &mut Planes,
-        out: &mut Coefficients } => assemble_cell);
+        scheme: &mut [f32] } => assemble_cell -> f64)
 }
 
 #[inline(always)]
@@ -186,8 +170,8 @@ fn assemble_cell(
     spacing: [f64; 3],
     velocity: &Velocity,
     work: &mut Planes,
-    out: &mut Coefficients,
-) {
+    scheme: &mut [f32],
+) -> f64 {
     let metric = Metric {
         inverse_spacing: spacing.map(|h| (1.0 / h) as f32),
         epsilon_squared: velocity.epsilon * velocity.epsilon,
@@ -207,15 +191,15 @@ fn assemble_cell(
         for y in mask.rows[0]..mask.rows[1] {
             let row = Row { y, z, work, mask, metric: &metric, step, velocity };
             if velocity.rho == 0.0 {
-                row.assemble::<false>(fields, out, &mut sums);
+                row.assemble::<false>(fields, scheme, &mut sums);
             } else {
-                row.assemble::<true>(fields, out, &mut sums);
+                row.assemble::<true>(fields, scheme, &mut sums);
             }
         }
         std::mem::swap(&mut work.low, &mut work.high);
         std::mem::swap(&mut work.z_low, &mut work.z_high);
     }
-    out.gradient_sum = sums.iter().map(|&s| f64::from(s)).sum();
+    sums.iter().map(|&s| f64::from(s)).sum()
 }
 
 /// One row of voxels of the cell being assembled.
@@ -237,7 +221,7 @@ fn window<const N: usize>(values: &[f32], start: usize) -> &[f32; N] {
 
 impl Row<'_> {
     #[inline(always)]
-    fn assemble<const EDGES: bool>(&self, fields: Fields<'_>, out: &mut Coefficients, sums: &mut [f32; CELL]) {
+    fn assemble<const EDGES: bool>(&self, fields: Fields<'_>, scheme: &mut [f32], sums: &mut [f32; CELL]) {
         let (y, z, mask, v) = (self.y, self.z, self.mask, self.velocity);
         let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
         let flat = y * GROWN;
@@ -269,13 +253,13 @@ impl Row<'_> {
             sums[x] += f32::from(solved[x]) * mean[x];
             diagonal[x] = 1.0 / diagonal[x];
         }
-        for (weights, c) in out.weights.iter_mut().zip(&c) {
-            let weights = &mut weights[at..at + CELL];
+        for (layer, c) in c.iter().enumerate() {
+            let weights = &mut scheme[layer * CELL_LEN + at..][..CELL];
             for x in 0..CELL {
                 weights[x] = c[x] * diagonal[x];
             }
         }
-        let right = &mut out.right[at..at + CELL];
+        let right = &mut scheme[6 * CELL_LEN + at..][..CELL];
         for x in 0..CELL {
             right[x] = u[x] * diagonal[x];
         }
