@@ -55,10 +55,10 @@ pub struct CellMask {
     pub open: [[[f32; CELL]; 2]; 3],
     /// 1 for columns (x) inside the domain, 0 for those beyond its end.
     pub columns: [f32; CELL],
-    /// Rows (y) and planes (z) that hold solved voxels, half open.
-    pub rows: [usize; 2],
-    /// See `rows`.
+    /// Planes (z) that hold solved voxels, half open.
     pub planes: [usize; 2],
+    /// Rows (y) of each plane that hold solved voxels, half open.
+    pub rows: [[usize; 2]; CELL],
     /// Number of solved voxels.
     pub count: u32,
 }
@@ -71,8 +71,8 @@ impl CellMask {
             solved: vec![0; CELL_LEN],
             open: [[[1.0; CELL]; 2]; 3],
             columns: [1.0; CELL],
-            rows: [0; 2],
             planes: [0; 2],
+            rows: [[0; 2]; CELL],
             count: 0,
         }
     }
@@ -82,12 +82,12 @@ impl CellMask {
     pub fn set(&mut self, solved: &[u8], valid: [usize; 3], border: [[bool; 2]; 3]) {
         self.solved.copy_from_slice(solved);
         self.count = 0;
-        (self.rows, self.planes) = ([CELL, 0], [CELL, 0]);
+        (self.rows, self.planes) = ([[CELL, 0]; CELL], [CELL, 0]);
         for (row, flags) in solved.chunks_exact(CELL).enumerate() {
             let count: u32 = flags.iter().map(|&f| u32::from(f)).sum();
             if count > 0 {
                 let (y, z) = (row % CELL, row / CELL);
-                self.rows = [self.rows[0].min(y), self.rows[1].max(y + 1)];
+                self.rows[z] = [self.rows[z][0].min(y), self.rows[z][1].max(y + 1)];
                 self.planes = [self.planes[0].min(z), self.planes[1].max(z + 1)];
                 self.count += count;
             }
@@ -102,6 +102,15 @@ impl CellMask {
                 self.open[axis][1][valid[axis] - 1] = 0.0;
             }
         }
+    }
+}
+
+impl CellMask {
+    /// The rows on which the vertices or z-faces below plane `z` are needed: those of the planes on both its sides.
+    fn rows_around(&self, z: usize) -> [usize; 2] {
+        let below = z.checked_sub(1).map_or([CELL, 0], |z| self.rows[z]);
+        let above = self.rows.get(z).copied().unwrap_or([CELL, 0]);
+        [below[0].min(above[0]), below[1].max(above[1])]
     }
 }
 
@@ -180,15 +189,17 @@ fn assemble_cell(
     let mut sums = [0.0f32; CELL];
     let [first, end] = mask.planes;
     if first < end {
-        vertex_plane(fields.u, first, &mut work.low);
-        z_faces(fields.u, first, &work.low, &metric, &mut work.z_low);
+        let rows = mask.rows_around(first);
+        vertex_plane(fields.u, first, rows, &mut work.low);
+        z_faces(fields.u, first, rows, &work.low, &metric, &mut work.z_low);
     }
     for z in first..end {
-        vertex_plane(fields.u, z + 1, &mut work.high);
-        x_faces(fields.u, z, &work.low, &work.high, &metric, &mut work.x);
-        y_faces(fields.u, z, &work.low, &work.high, &metric, &mut work.y);
-        z_faces(fields.u, z + 1, &work.high, &metric, &mut work.z_high);
-        for y in mask.rows[0]..mask.rows[1] {
+        let (rows, next) = (mask.rows[z], mask.rows_around(z + 1));
+        vertex_plane(fields.u, z + 1, next, &mut work.high);
+        x_faces(fields.u, z, rows, [&work.low, &work.high], &metric, &mut work.x);
+        y_faces(fields.u, z, rows, [&work.low, &work.high], &metric, &mut work.y);
+        z_faces(fields.u, z + 1, next, &work.high, &metric, &mut work.z_high);
+        for y in rows[0]..rows[1] {
             let row = Row { y, z, work, mask, metric: &metric, step, velocity };
             if velocity.rho == 0.0 {
                 row.assemble::<false>(fields, scheme, &mut sums);
@@ -340,13 +351,14 @@ fn mean_gradient_cell(u: &[f32], spacing: [f64; 3], work: &mut Planes, out: &mut
     let metric = Metric { inverse_spacing: spacing.map(|h| (1.0 / h) as f32), epsilon_squared: f32::MIN_POSITIVE };
     let mask = CellMask::new();
     let velocity = Velocity { theta: 0.0, rho: 0.0, delta: 0.0, epsilon: 0.0, tau: 0.0, normalised: false };
-    vertex_plane(u, 0, &mut work.low);
-    z_faces(u, 0, &work.low, &metric, &mut work.z_low);
+    let rows = [0, CELL];
+    vertex_plane(u, 0, rows, &mut work.low);
+    z_faces(u, 0, rows, &work.low, &metric, &mut work.z_low);
     for z in 0..CELL {
-        vertex_plane(u, z + 1, &mut work.high);
-        x_faces(u, z, &work.low, &work.high, &metric, &mut work.x);
-        y_faces(u, z, &work.low, &work.high, &metric, &mut work.y);
-        z_faces(u, z + 1, &work.high, &metric, &mut work.z_high);
+        vertex_plane(u, z + 1, rows, &mut work.high);
+        x_faces(u, z, rows, [&work.low, &work.high], &metric, &mut work.x);
+        y_faces(u, z, rows, [&work.low, &work.high], &metric, &mut work.y);
+        z_faces(u, z + 1, rows, &work.high, &metric, &mut work.z_high);
         for y in 0..CELL {
             let row = Row { y, z, work, mask: &mask, metric: &metric, step: [0.0; 3], velocity: &velocity };
             out[(z * CELL + y) * CELL..][..CELL].copy_from_slice(&row.mean_norms(y * GROWN));

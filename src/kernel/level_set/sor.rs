@@ -47,7 +47,7 @@ fn half_sweep(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, colour
     let turns: [f32; CELL + 1] = std::array::from_fn(|n| if n % 2 == 0 { omega } else { 0.0 });
     let inverse_square = 1.0 / (omega * omega);
     for z in mask.planes[0]..mask.planes[1] {
-        for y in mask.rows[0]..mask.rows[1] {
+        for y in mask.rows[z][0]..mask.rows[z][1] {
             let at = (z * CELL + y) * CELL;
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
             let turn: &[f32; CELL] = turns[(colour + y + z) % 2..].first_chunk().expect("one longer than a row");
@@ -87,7 +87,7 @@ fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
     let mut grown = [0.0f32; CELL];
     let mut largest = [0.0f32; CELL];
     for z in mask.planes[0]..mask.planes[1] {
-        for y in mask.rows[0]..mask.rows[1] {
+        for y in mask.rows[z][0]..mask.rows[z][1] {
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
             let (u, old) = (row(u, center), row(old, center));
             for x in 0..CELL {
