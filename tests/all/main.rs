@@ -3,6 +3,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod covolume;
 mod mesh_ply;
 mod points;
 mod surfaces;
