@@ -4,6 +4,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod covolume;
+mod distance;
+mod flood;
 mod mesh_ply;
 mod points;
 mod surfaces;
