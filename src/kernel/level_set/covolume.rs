@@ -53,6 +53,8 @@ pub struct CellMask {
     pub solved: Vec<u8>,
     /// Weights of the lower and upper neighbour along each axis: 0 at the domain's border, else 1.
     pub open: [[[f32; CELL]; 2]; 3],
+    /// 1 for places of a row (x) inside the domain; beyond, a cell cut short holds whatever was there before.
+    pub inside: [f32; CELL],
     /// Rows (y) and planes (z) that hold solved voxels, half open.
     pub rows: [usize; 2],
     /// See `rows`.
@@ -65,7 +67,14 @@ impl CellMask {
     /// A mask in which nothing is solved.
     #[must_use]
     pub fn new() -> Self {
-        Self { solved: vec![0; CELL_LEN], open: [[[1.0; CELL]; 2]; 3], rows: [0; 2], planes: [0; 2], count: 0 }
+        Self {
+            solved: vec![0; CELL_LEN],
+            open: [[[1.0; CELL]; 2]; 3],
+            inside: [1.0; CELL],
+            rows: [0; 2],
+            planes: [0; 2],
+            count: 0,
+        }
     }
 
     /// Takes over a cell's flags; `valid` voxels along each axis are inside the domain, and `border[axis]` says
@@ -83,6 +92,7 @@ impl CellMask {
                 self.count += count;
             }
         }
+        self.inside = std::array::from_fn(|x| if x < valid[0] { 1.0 } else { 0.0 });
         self.open = [[[1.0; CELL]; 2]; 3];
         for axis in 0..3 {
             if border[axis][0] {

@@ -52,14 +52,16 @@ fn half_sweep(
     colour: usize,
     squares: &mut [f32; CELL],
 ) {
-    // Omega on the voxels of the colour, 0 between: rows of either parity start one place apart.
-    let turns: [f32; CELL + 1] = std::array::from_fn(|n| if n % 2 == 0 { omega } else { 0.0 });
+    // Omega on the voxels of the colour, 0 between and beyond the domain, for rows that start with either colour.
+    let turns: [[f32; CELL]; 2] = std::array::from_fn(|start| {
+        std::array::from_fn(|x| if (x + start) % 2 == 0 { omega * mask.inside[x] } else { 0.0 })
+    });
     let inverse_square = 1.0 / (omega * omega);
     for z in mask.planes[0]..mask.planes[1] {
         for y in mask.rows[0]..mask.rows[1] {
             let at = (z * CELL + y) * CELL;
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
-            let turn: &[f32; CELL] = turns[(colour + y + z) % 2..].first_chunk().expect("one longer than a row");
+            let turn = &turns[(colour + y + z) % 2];
             let mut sum = *row(&scheme.right, at);
             let places = [center - 1, center + 1, center - GROWN, center + GROWN, center - PLANE, center + PLANE];
             for (weights, place) in scheme.weights.iter().zip(places) {
@@ -100,7 +102,7 @@ fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask, correction_squared: f64)
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
             let (u, old) = (row(u, center), row(old, center));
             for x in 0..CELL {
-                let step = u[x] - old[x];
+                let step = mask.inside[x] * (u[x] - old[x]);
                 moved[x] += step.abs();
                 squared[x] += step * step;
                 grown[x] += step;
