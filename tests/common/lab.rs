@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use strandline::exec::{Budget, Cancel, Engine, Silent};
 use strandline::grid::{Box3, BrickGrid, BrickSet, Slot};
+use strandline::kernel::level_set::CELL;
+use strandline::pipeline::band::Band;
 use strandline::store::{BoxSink, BoxSource, BrickArray, Element, Scratch};
 
 /// An engine, and the folder it works in for as long as it lives.
@@ -27,6 +29,19 @@ impl Lab {
         field.write_box(&Box3::from_shape(set.grid().shape()), values).expect("memory takes any box");
         (0..set.len() as Slot).for_each(|slot| field.refresh_faces(slot));
         field
+    }
+}
+
+impl Lab {
+    /// A band over all cells of a domain, made of plain fields.
+    pub(crate) fn band(&self, shape: [i64; 3], u: &[f32], d: &[f32], solved: &[u8]) -> Band {
+        let set = dense(shape, CELL as i64);
+        Band {
+            u: [self.field(&set, u), self.field(&set, u)],
+            distance: self.field(&set, d),
+            solved: self.field(&set, solved),
+            voxels: solved.iter().map(|s| u64::from(*s)).sum(),
+        }
     }
 }
 
