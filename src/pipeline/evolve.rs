@@ -219,13 +219,12 @@ impl Solver<'_> {
             }
             self.schemes.write(slot, |scheme| (self.assemble(w, slot, scheme), relax(w, scheme)))
         } else {
-            self.faces.gather(old, slot, Boundary::Mirror, &mut w.old);
             self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
             (last.gradient, self.schemes.read(slot, |scheme| relax(w, scheme)))
         };
         self.faces.scatter(&w.u, new, slot);
         Visit {
-            sums: motion(w.u.data(), w.old.data(), &w.mask),
+            sums: old.read(slot, |old| motion(w.u.data(), old, &w.mask)),
             gradient,
             correction: (squares / f64::from(w.mask.count)).sqrt(),
         }

@@ -59,7 +59,10 @@ pub fn edges(
 }
 
 /// One implicit step of the heat equation on the cells within five sigma of the band.
-fn presmooth(
+///
+/// # Errors
+/// When the image cannot be read, scratch runs out or the run is interrupted.
+pub fn presmooth(
     stage: &Stage<'_>,
     engine: &Engine,
     image: &dyn BoxSource<f32>,

@@ -43,14 +43,16 @@ fn relax_cell(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, iterat
 /// Corrects the voxels of one colour, those with `x + y + z` of parity `colour`.
 #[inline(always)]
 fn half_sweep(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, colour: usize, squares: &mut [f32; CELL]) {
-    // Omega on the voxels of the colour, 0 between: rows of either parity start one place apart.
-    let turns: [f32; CELL + 1] = std::array::from_fn(|n| if n % 2 == 0 { omega } else { 0.0 });
+    // Omega on the voxels of the colour, 0 between and beyond the domain, for rows that start with either colour.
+    let turns: [[f32; CELL]; 2] = std::array::from_fn(|start| {
+        std::array::from_fn(|x| if (x + start) % 2 == 0 { omega * mask.columns[x] } else { 0.0 })
+    });
     let inverse_square = 1.0 / (omega * omega);
     for z in mask.planes[0]..mask.planes[1] {
         for y in mask.rows[z][0]..mask.rows[z][1] {
             let at = (z * CELL + y) * CELL;
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
-            let turn: &[f32; CELL] = turns[(colour + y + z) % 2..].first_chunk().expect("one longer than a row");
+            let turn = &turns[(colour + y + z) % 2];
             let mut sum = *row(scheme, 6 * CELL_LEN + at);
             let places = [center - 1, center + 1, center - GROWN, center + GROWN, center - PLANE, center + PLANE];
             for (layer, place) in places.into_iter().enumerate() {
@@ -61,7 +63,7 @@ fn half_sweep(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, colour
             }
             let here: &mut [f32; CELL] = u[center..center + CELL].first_chunk_mut().expect("a row of the cell");
             for x in 0..CELL {
-                let correction = turn[x] * mask.columns[x] * (sum[x] - here[x]);
+                let correction = turn[x] * (sum[x] - here[x]);
                 squares[x] += correction * correction * inverse_square;
                 here[x] = (here[x] + correction).clamp(0.0, 1.0);
             }
@@ -74,7 +76,7 @@ fn row(values: &[f32], start: usize) -> &[f32; CELL] {
     values[start..start + CELL].first_chunk().expect("a row of the cell")
 }
 
-/// Compares a relaxed cell with the old one, both grown.
+/// Compares a relaxed cell, grown, with the old one, dense over the cell.
 #[must_use]
 pub fn motion(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
     vectorised!({ u: &[f32], old: &[f32], mask: &CellMask } => motion_cell -> CellSums)
@@ -89,7 +91,7 @@ fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
     for z in mask.planes[0]..mask.planes[1] {
         for y in mask.rows[z][0]..mask.rows[z][1] {
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
-            let (u, old) = (row(u, center), row(old, center));
+            let (u, old) = (row(u, center), row(old, (z * CELL + y) * CELL));
             for x in 0..CELL {
                 let step = mask.columns[x] * (u[x] - old[x]);
                 moved[x] += step.abs();
