@@ -1,1 +1,73 @@
-//! cli
+//! The command line: what was typed (`args`), what it means (`config`), doing it (`segment`, `demo`, `info`).
+//!
+//! Results go to stdout, everything else to stderr. Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable
+//! input, 130 interrupted, 143 terminated.
+
+mod args;
+mod config;
+mod console;
+mod demo;
+mod files;
+mod info;
+mod input;
+mod picture;
+mod report;
+mod segment;
+mod signals;
+mod table;
+mod text;
+mod values;
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::error::Result;
+use args::{Cli, Command};
+
+/// Runs the program with its arguments, the first of which is its own name.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version go to stdout with code 0, complaints to stderr with code 2.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let typed: Vec<String> = arguments.iter().map(|a| a.to_string_lossy().into_owned()).collect();
+    match catch_unwind(AssertUnwindSafe(|| execute(cli, &typed))) {
+        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Err(error)) => {
+            complain(&error.to_string());
+            ExitCode::from(error.exit_code())
+        }
+        Err(_) => {
+            complain("this is a fault of strandline; please report it with the lines above and the command");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn execute(cli: Cli, typed: &[String]) -> Result<()> {
+    match cli.command {
+        Command::Segment(args) => segment::run(&args, typed),
+        Command::Demo(args) => demo::run(&args, typed),
+        Command::Info(args) => info::run(&args),
+    }
+}
+
+fn complain(message: &str) {
+    // Nobody is left to tell when stderr is closed.
+    let _ = writeln!(std::io::stderr(), "strandline: {message}");
+}
+
+/// Prints a result; a reader that went away is no failure of the run.
+fn print(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}

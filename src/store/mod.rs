@@ -2,11 +2,13 @@
 
 mod brick_array;
 mod element;
+mod free_space;
 mod slot_file;
 mod stream;
 mod window;
 
 pub use brick_array::{BrickArray, Scratch};
 pub use element::{Element, ElementType, SamplesMut};
+pub use free_space::free_space;
 pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, PlaneSource};
 pub use window::{Traffic, Window};

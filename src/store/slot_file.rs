@@ -1,4 +1,4 @@
-//! `SlotFile`: equal slots of plain numbers in a memory-mapped scratch file. The only `unsafe` of the crate.
+//! `SlotFile`: equal slots of plain numbers in a memory-mapped scratch file. Where the crate maps files.
 //!
 //! ```text
 //! file   | slot 0 | slot 1 | slot 2 | ...      slot = slot_len elements, native byte order, no padding

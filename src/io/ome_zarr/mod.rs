@@ -10,10 +10,12 @@ mod files;
 mod level;
 mod metadata;
 mod pyramid;
+mod read;
 mod shard;
 mod store;
 
 pub use level::LevelWriter;
 pub use metadata::{ImageSpec, LabelColor, LabelSpec};
 pub use pyramid::{LevelPlan, plan_levels};
+pub use read::{ImageReader, StoredLevel};
 pub use store::{ImageWriter, StoreWriter};

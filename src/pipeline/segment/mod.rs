@@ -6,11 +6,15 @@
 //! u -> surface -> mesh, measures       u of all objects -> one label volume
 //! ```
 
+mod check;
+mod estimate;
 mod labels;
 mod object;
 mod output;
 mod settings;
 
+pub use check::check_marks;
+pub use estimate::{Estimate, estimate};
 pub use labels::Overlap;
 pub use object::{Hole, ObjectReport};
 pub use output::{Outcome, segment};

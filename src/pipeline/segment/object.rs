@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::settings::SegmentSettings;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
-use crate::grid::{Box3, BrickGrid, Geometry, PointBins};
+use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, PointBins};
 use crate::kernel::level_set::CELL;
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::{Band, Reaches, make_band};
@@ -173,10 +173,7 @@ fn enclose(
     let bounds = voxel_bounds(cloud, image);
     let extent = (0..3).map(|a| bounds.shape()[a] as f64 * image.spacing[a]).fold(0.0, f64::max);
     let mean = image.voxel_volume().cbrt();
-    let wanted = settings.beta.map_or(0.0, |beta| 2.0 * beta);
-    let mut farthest = (FIRST_REACH_VOXELS * image.max_spacing())
-        .max(FIRST_REACH_GAPS * contour_gap(marks, image))
-        .max(wanted + 2.0 * image.max_spacing());
+    let mut farthest = first_reach(marks, image, settings);
     loop {
         let (geometry, window) = grid_around(image, &bounds, farthest);
         let (distance, tagging) = flood_within(engine, marks, cloud, &geometry, settings, farthest)?;
@@ -197,6 +194,24 @@ fn enclose(
         let reaches = Reaches { beta: beta as f32, inner: half_width as f32, outer: outer as f32 };
         return Ok(Enclosure { geometry, window, distance, tagging, reaches });
     }
+}
+
+/// The distance from the cloud within which the search begins.
+fn first_reach(marks: &ObjectMarks, image: &Geometry, settings: &SegmentSettings) -> f64 {
+    let wanted = settings.beta.map_or(0.0, |beta| 2.0 * beta);
+    (FIRST_REACH_VOXELS * image.max_spacing())
+        .max(FIRST_REACH_GAPS * contour_gap(marks, image))
+        .max(wanted + 2.0 * image.max_spacing())
+}
+
+/// What the search begins with, for an estimate: the cloud's points and the cells within its first reach.
+pub(super) fn first_cells(marks: &ObjectMarks, image: &Geometry, settings: &SegmentSettings) -> (u64, BrickSet) {
+    let cloud = cloud_of(marks, image, settings.caps);
+    let farthest = first_reach(marks, image, settings);
+    let (geometry, _) = grid_around(image, &voxel_bounds(&cloud, image), farthest);
+    let bins = PointBins::new(BrickGrid::new(geometry.shape, CELL as i64), &geometry, &cloud);
+    let reach = geometry.spacing.map(|h| (farthest / h).ceil() as i64 + 1);
+    (cloud.len() as u64, bins.bricks_within(&geometry, &cloud, reach))
 }
 
 fn flood_within(

@@ -109,7 +109,7 @@ fn draw(
     let points = marks.contours.concat();
     let distances = surface::distances_to(&stage, u, geometry, &points)?;
     let hausdorff = Hausdorff::of(distances.into_iter().flatten());
-    stage.voxels(measures.triangles);
+    stage.voxels(solution.band_voxels);
     stage.finish();
     if let Some(store) = store {
         let group = if several { format!("levelset/object-{label}") } else { "levelset".into() };

@@ -78,17 +78,40 @@ const TAU_VOXELS: f64 = 0.5;
 const EPSILON_PER_VOXEL: f64 = 1e-2;
 
 impl SegmentSettings {
+    /// The curvature's weight on a grid.
+    #[must_use]
+    pub fn delta_on(&self, geometry: &Geometry) -> f64 {
+        self.delta.unwrap_or(DELTA_VOXELS * geometry.min_spacing())
+    }
+
+    /// The width of the presmoothing on a grid.
+    #[must_use]
+    pub fn sigma_on(&self, geometry: &Geometry) -> f64 {
+        self.sigma.unwrap_or(SIGMA_VOXELS * geometry.min_spacing())
+    }
+
+    /// The time step on a grid.
+    #[must_use]
+    pub fn tau_on(&self, geometry: &Geometry) -> f64 {
+        self.tau.unwrap_or(TAU_VOXELS * geometry.min_spacing())
+    }
+
+    /// The regularisation of gradient norms on a grid.
+    #[must_use]
+    pub fn epsilon_on(&self, geometry: &Geometry) -> f64 {
+        self.epsilon.unwrap_or(EPSILON_PER_VOXEL / geometry.min_spacing())
+    }
+
     /// The time loop for a grid.
     #[must_use]
     pub fn time_loop(&self, geometry: &Geometry) -> TimeLoop {
-        let h = geometry.min_spacing();
         TimeLoop {
             velocity: Velocity {
                 theta: self.theta as f32,
                 rho: self.rho as f32,
-                delta: self.delta.unwrap_or(DELTA_VOXELS * h) as f32,
-                epsilon: self.epsilon.unwrap_or(EPSILON_PER_VOXEL / h) as f32,
-                tau: self.tau.unwrap_or(TAU_VOXELS * h) as f32,
+                delta: self.delta_on(geometry) as f32,
+                epsilon: self.epsilon_on(geometry) as f32,
+                tau: self.tau_on(geometry) as f32,
                 normalised: self.normalised,
             },
             stop: self.stop,
@@ -101,7 +124,7 @@ impl SegmentSettings {
     /// The edge detector for a grid.
     #[must_use]
     pub fn edges(&self, geometry: &Geometry) -> EdgeSettings {
-        EdgeSettings { sigma: self.sigma.unwrap_or(SIGMA_VOXELS * geometry.min_spacing()), k: self.k as f32 }
+        EdgeSettings { sigma: self.sigma_on(geometry), k: self.k as f32 }
     }
 }
 

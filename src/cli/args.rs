@@ -1,0 +1,233 @@
+//! What was typed: the flags, in groups that commands share. What they mean together is decided in `config`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use super::values::{Crop, Output, parse_crop, parse_method, parse_pair, parse_size, parse_triple, solvers_help};
+use crate::pipeline::distance::Method;
+
+/// Finds surfaces in 3-D volumes larger than memory.
+#[derive(Debug, Parser)]
+#[command(name = "strandline", version, max_term_width = 100, arg_required_else_help = true)]
+pub(super) struct Cli {
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Find objects in a 3-D image, guided by border points
+    Segment(Box<SegmentArgs>),
+    /// Segment the built-in stack of a plant embryo
+    Demo(DemoArgs),
+    /// Tell what an input or output is: shape, axes, spacing, unit, type
+    Info(InfoArgs),
+}
+
+/// Find objects in a 3-D image, guided by border points that were marked on it.
+///
+/// Lengths are physical, triples are x,y,z. Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input,
+/// 130 interrupted, 143 terminated.
+#[derive(Clone, Debug, Args)]
+pub(super) struct SegmentArgs {
+    /// TIFF stack, or a folder with one TIFF file for each slice
+    pub(super) image: PathBuf,
+    /// Border points: CSV (x,y,z and optionally object,contour), XYZ or PLY; given several times, the n-th file is
+    /// object n, and objects named in later files are numbered on from those of the earlier ones
+    #[arg(long, required = true, value_name = "CLOUD")]
+    pub(super) points: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) picture: ImageArgs,
+    #[command(flatten)]
+    pub(super) level_set: LevelSetArgs,
+    #[command(flatten)]
+    pub(super) distance: DistanceArgs,
+    #[command(flatten)]
+    pub(super) resources: ResourceArgs,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+}
+
+/// Where the image lies and which part of it counts.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Image")]
+pub(super) struct ImageArgs {
+    /// Channel of the file, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) channel: u32,
+    /// Time point of the file, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) time: u32,
+    /// Part of the image in voxels, ends excluded; an end left out is the image's [default: all of it]
+    #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = parse_crop, allow_hyphen_values = true)]
+    pub(super) crop: Option<Crop>,
+    /// Distance between voxel centres, physical [default: the file's]
+    #[arg(long, value_name = "HX,HY,HZ", value_parser = parse_triple, allow_hyphen_values = true)]
+    pub(super) image_spacing: Option<[f64; 3]>,
+    /// Pull of the image's edges: the same at strong and weak ones, or as strong as they are
+    #[arg(long, value_enum, default_value_t = Edge::Normalised)]
+    pub(super) edge: Edge,
+    /// Percentages of the image's values that count as black and white
+    #[arg(long, value_name = "LO,HI", value_parser = parse_pair, allow_hyphen_values = true, default_value = "0.1,99.9")]
+    pub(super) percentiles: [f64; 2],
+    /// Leave the ends of stacked contours open: close nothing above the last and below the first
+    #[arg(long)]
+    pub(super) no_caps: bool,
+    /// Which object gets the voxels where several overlap
+    #[arg(long, value_enum, default_value_t = OverlapArg::Smaller)]
+    pub(super) overlap: OverlapArg,
+}
+
+/// How the surface moves.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Level set")]
+pub(super) struct LevelSetArgs {
+    /// Weight of curvature, a length; smooths the surface [default: 0.1 of the smallest spacing]
+    #[arg(long, value_name = "D", allow_hyphen_values = true)]
+    pub(super) delta: Option<f64>,
+    /// Weight of the pull towards the points [default: 1]
+    #[arg(long, value_name = "W", allow_hyphen_values = true)]
+    pub(super) theta: Option<f64>,
+    /// Weight of the pull towards the image's edges; 0 leaves the image out [default: 0.3]
+    #[arg(long, value_name = "W", allow_hyphen_values = true)]
+    pub(super) rho: Option<f64>,
+    /// Contrast of the edge detector, for intensities from 0 to 1 [default: 650]
+    #[arg(long, value_name = "K", allow_hyphen_values = true)]
+    pub(super) k: Option<f64>,
+    /// Width of the smoothing before edges are looked for, a length [default: 2 of the smallest spacing]
+    #[arg(long, value_name = "D", allow_hyphen_values = true)]
+    pub(super) sigma: Option<f64>,
+    /// Distance of the start surface from the points, a length [default: just beyond their largest hole]
+    #[arg(long, value_name = "D", allow_hyphen_values = true)]
+    pub(super) beta: Option<f64>,
+    /// Time step [default: 0.5 of the smallest spacing]
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    pub(super) tau: Option<f64>,
+    /// Regularisation of gradients, one over a length [default: 0.01 over the smallest spacing]
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    pub(super) epsilon: Option<f64>,
+    /// Relaxation factor of the linear solver, between 0 and 2 [default: 1.2]
+    #[arg(long, value_name = "W", allow_hyphen_values = true)]
+    pub(super) omega: Option<f64>,
+    /// What counts as rest: the surface's mean speed, or the L2 norm of a step's change
+    #[arg(long, value_enum, default_value_t = StopArg::Surface)]
+    pub(super) stop: StopArg,
+    /// Limit under which the surface rests [default: 0.02 for surface, 0.001 for l2]
+    #[arg(long, value_name = "X", allow_hyphen_values = true)]
+    pub(super) tol: Option<f64>,
+    /// Time steps at most [default: 60]
+    #[arg(long, value_name = "N")]
+    pub(super) max_steps: Option<u32>,
+}
+
+/// How distance is computed.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Distance")]
+pub(super) struct DistanceArgs {
+    #[arg(long, value_name = "NAME", value_parser = parse_method, default_value = "vdt", help = solvers_help())]
+    pub(super) method: Method,
+}
+
+/// What the run may use.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Resources")]
+pub(super) struct ResourceArgs {
+    /// Memory limit: bytes, or with KiB, MiB, GiB, TiB (K, M, G, T mean the same) or kB, MB, GB, TB
+    /// [default: half of what the machine or the control group has]
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub(super) memory: Option<u64>,
+    /// Threads [default: one for each core]
+    #[arg(long, value_name = "N")]
+    pub(super) threads: Option<usize>,
+    /// Edge of the bricks that hold the image, voxels, a multiple of 16; no result depends on it [default: 64]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(super) brick: Option<i64>,
+    /// Folder for temporary fields, removed at the end [default: $TMPDIR, else the folder of the output]
+    #[arg(long, value_name = "DIR")]
+    pub(super) scratch: Option<PathBuf>,
+}
+
+/// Where results go.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(super) struct OutputArgs {
+    /// OME-Zarr store to write; none computes and reports, and writes no field
+    #[arg(short, long = "output", value_name = "OUT.zarr|none", required = true)]
+    pub(super) output: Output,
+    /// Replace outputs that are there already
+    #[arg(long)]
+    pub(super) overwrite: bool,
+    /// Write the report once more, as a file of its own
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) report: Option<PathBuf>,
+    /// Write the surface once more, as a file of its own; with several objects FILE-1.ply, FILE-2.ply, ...
+    #[arg(long, value_name = "FILE.ply")]
+    pub(super) mesh: Option<PathBuf>,
+    /// Draw three slices through the objects with their outlines
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) picture: Option<PathBuf>,
+    /// Read the inputs, print what a run would take, and stop
+    #[arg(long)]
+    pub(super) dry_run: bool,
+    /// Print nothing but errors
+    #[arg(short, long, conflicts_with = "verbose")]
+    pub(super) quiet: bool,
+    /// Print settings and each stage as it ends
+    #[arg(short, long)]
+    pub(super) verbose: bool,
+}
+
+/// Segment the built-in stack of an early Arabidopsis embryo with default settings.
+#[derive(Debug, Args)]
+pub(super) struct DemoArgs {
+    /// OME-Zarr store to write; one that the demo made before is replaced
+    #[arg(short, long = "output", value_name = "OUT.zarr", default_value = "strandline-demo.zarr")]
+    pub(super) output: PathBuf,
+    #[command(flatten)]
+    pub(super) resources: ResourceArgs,
+    /// Print nothing but errors
+    #[arg(short, long)]
+    pub(super) quiet: bool,
+}
+
+/// Tell what an input or output is.
+#[derive(Debug, Args)]
+pub(super) struct InfoArgs {
+    /// TIFF stack, folder of slices, border points (CSV, XYZ, PLY) or OUT.zarr
+    pub(super) file: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// How the image's edges pull.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Edge {
+    /// By the direction of the edge alone
+    Normalised,
+    /// By the gradient of the edge detector
+    Plain,
+}
+
+/// Which object gets the voxels where several overlap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum OverlapArg {
+    /// The one with the smaller volume: nested tissues
+    Smaller,
+    /// The one with the larger volume
+    Larger,
+    /// The one with the lower number
+    First,
+    /// The one with the higher number
+    Last,
+}
+
+/// When the time loop ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum StopArg {
+    /// The surface's mean speed falls under the limit
+    Surface,
+    /// The L2 norm of a step's change falls under the limit
+    L2,
+}

@@ -1,0 +1,271 @@
+//! What was typed becomes what is meant: settings checked one by one and together, budgets resolved.
+
+use std::path::{Path, PathBuf};
+use std::thread::available_parallelism;
+
+use super::args::{DistanceArgs, Edge, ImageArgs, LevelSetArgs, OutputArgs, OverlapArg, ResourceArgs, StopArg};
+use super::values::Output;
+use crate::error::{Error, Result};
+use crate::exec::machine_memory;
+use crate::pipeline::evolve::Stop;
+use crate::pipeline::segment::{Overlap, SegmentSettings};
+
+/// What a run may use.
+#[derive(Clone, Debug)]
+pub(super) struct Resources {
+    pub(super) memory: u64,
+    pub(super) threads: usize,
+    pub(super) scratch: PathBuf,
+}
+
+const L2_TOLERANCE: f64 = 1e-3;
+const BRICKS: std::ops::RangeInclusive<i64> = 16..=512;
+const MOST_THREADS: usize = 1024;
+
+/// The settings of a segmentation.
+pub(super) fn settings(
+    image: &ImageArgs,
+    level_set: &LevelSetArgs,
+    distance: &DistanceArgs,
+    resources: &ResourceArgs,
+) -> Result<SegmentSettings> {
+    let defaults = SegmentSettings::default();
+    let l = level_set;
+    Ok(SegmentSettings {
+        method: distance.method,
+        theta: checked("--theta", l.theta.unwrap_or(defaults.theta), AT_LEAST_ZERO)?,
+        rho: checked("--rho", l.rho.unwrap_or(defaults.rho), AT_LEAST_ZERO)?,
+        delta: optional("--delta", l.delta, AT_LEAST_ZERO)?,
+        k: checked("--k", l.k.unwrap_or(defaults.k), AT_LEAST_ZERO)?,
+        sigma: optional("--sigma", l.sigma, AT_LEAST_ZERO)?,
+        beta: optional("--beta", l.beta, ABOVE_ZERO)?,
+        tau: optional("--tau", l.tau, ABOVE_ZERO)?,
+        epsilon: optional("--epsilon", l.epsilon, ABOVE_ZERO)?,
+        omega: checked("--omega", l.omega.unwrap_or(defaults.omega), BETWEEN_ZERO_AND_TWO)?,
+        stop: stop(l, defaults.stop)?,
+        max_steps: l.max_steps.unwrap_or(defaults.max_steps),
+        normalised: image.edge == Edge::Normalised,
+        caps: !image.no_caps,
+        percentiles: percentiles(image.percentiles)?,
+        overlap: match image.overlap {
+            OverlapArg::Smaller => Overlap::Smaller,
+            OverlapArg::Larger => Overlap::Larger,
+            OverlapArg::First => Overlap::First,
+            OverlapArg::Last => Overlap::Last,
+        },
+        brick: brick(resources.brick.unwrap_or(defaults.brick))?,
+    })
+}
+
+/// A range of numbers and how to say it.
+type Range = (fn(f64) -> bool, &'static str);
+const AT_LEAST_ZERO: Range = (|v| v >= 0.0, "0 or more");
+const ABOVE_ZERO: Range = (|v| v > 0.0, "more than 0");
+const BETWEEN_ZERO_AND_TWO: Range = (|v| 0.0 < v && v < 2.0, "between 0 and 2");
+
+fn checked(flag: &str, value: f64, (holds, range): Range) -> Result<f64> {
+    // Lengths and weights are computed with in single precision.
+    if value.is_finite() && (value as f32).is_finite() && holds(value) {
+        return Ok(value);
+    }
+    Err(Error::usage(format!("{flag} is {value}; it must be a number, {range}")))
+}
+
+fn optional(flag: &str, value: Option<f64>, range: Range) -> Result<Option<f64>> {
+    value.map(|value| checked(flag, value, range)).transpose()
+}
+
+fn stop(level_set: &LevelSetArgs, default: Stop) -> Result<Stop> {
+    let tolerance = optional("--tol", level_set.tol, ABOVE_ZERO)?;
+    Ok(match (level_set.stop, default) {
+        (StopArg::Surface, Stop::Surface(limit)) => Stop::Surface(tolerance.unwrap_or(limit)),
+        (StopArg::Surface, Stop::L2(_)) => Stop::Surface(tolerance.unwrap_or(0.02)),
+        (StopArg::L2, _) => Stop::L2(tolerance.unwrap_or(L2_TOLERANCE)),
+    })
+}
+
+fn percentiles([low, high]: [f64; 2]) -> Result<[f64; 2]> {
+    if 0.0 <= low && low < high && high <= 100.0 {
+        return Ok([low, high]);
+    }
+    Err(Error::usage(format!(
+        "--percentiles is {low},{high}; give two percentages, the lower one first, such as 0.1,99.9"
+    )))
+}
+
+fn brick(edge: i64) -> Result<i64> {
+    if BRICKS.contains(&edge) && edge % 16 == 0 {
+        return Ok(edge);
+    }
+    Err(Error::usage(format!("--brick is {edge}; give a multiple of 16 from {} to {}", BRICKS.start(), BRICKS.end())))
+}
+
+/// A spacing from the command line.
+pub(super) fn spacing(given: Option<[f64; 3]>) -> Result<Option<[f64; 3]>> {
+    if let Some([x, y, z]) = given.filter(|h| h.iter().any(|&v| checked("", v, ABOVE_ZERO).is_err())) {
+        return Err(Error::usage(format!("--image-spacing is {x},{y},{z}; give three lengths, each more than 0")));
+    }
+    Ok(given)
+}
+
+/// Memory, threads and scratch; `output` is what lies nearest to large free disks when nothing else is said.
+pub(super) fn resources(args: &ResourceArgs, output: Option<&Path>) -> Result<Resources> {
+    let threads = args.threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
+    if !(1..=MOST_THREADS).contains(&threads) {
+        return Err(Error::usage(format!("--threads is {threads}; give 1 to {MOST_THREADS}")));
+    }
+    let memory = args.memory.unwrap_or_else(|| machine_memory() / 2);
+    let from_environment = || std::env::var_os("TMPDIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
+    let beside_output = || output.map(|path| folder_of(path).to_path_buf());
+    let scratch = args.scratch.clone().or_else(from_environment).or_else(beside_output);
+    let scratch = scratch.unwrap_or_else(std::env::temp_dir);
+    if !scratch.is_dir() {
+        let what = "the folder for temporary fields does not exist; create it, or name another with --scratch";
+        return Err(Error::usage(what).at(&scratch));
+    }
+    Ok(Resources { memory, threads, scratch })
+}
+
+/// The folder that a path lies in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Refuses what would be found out only when the work is done: outputs that are there, folders that are not.
+pub(super) fn check_outputs(output: &OutputArgs) -> Result<()> {
+    let store = match &output.output {
+        Output::Store(path) => Some(path),
+        Output::None => None,
+    };
+    let extras = [&output.report, &output.mesh, &output.picture].into_iter().flatten();
+    let mut seen: Vec<&Path> = store.iter().map(|path| path.as_path()).collect();
+    for path in extras {
+        if seen.contains(&path.as_path()) {
+            return Err(Error::usage("is named for two outputs; give each a name of its own").at(path));
+        }
+        seen.push(path);
+        if path.is_dir() {
+            return Err(Error::usage("is a folder; give the name of a file").at(path));
+        }
+        if path.exists() && !output.overwrite {
+            let what = "exists already; choose another name, or give --overwrite to replace it";
+            return Err(Error::usage(what).at(path));
+        }
+    }
+    for path in seen {
+        let folder = folder_of(path);
+        if !folder.is_dir() {
+            return Err(Error::usage("the folder for the output does not exist; create it first").at(folder));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::super::args::{Cli, Command, SegmentArgs};
+    use super::*;
+
+    fn typed(flags: &str) -> Box<SegmentArgs> {
+        let words = "strandline segment image.tif --points marks.csv -o none".split(' ');
+        let cli = Cli::try_parse_from(words.chain(flags.split_whitespace())).unwrap();
+        let Command::Segment(args) = cli.command else { panic!("another command") };
+        args
+    }
+
+    fn meant(flags: &str) -> Result<SegmentSettings> {
+        let args = typed(flags);
+        settings(&args.picture, &args.level_set, &args.distance, &args.resources)
+    }
+
+    #[test]
+    fn nothing_typed_means_the_defaults() {
+        assert_eq!(meant("").unwrap(), SegmentSettings::default());
+    }
+
+    #[test]
+    fn the_help_states_the_true_defaults() {
+        use clap::CommandFactory;
+        let help = Cli::command().find_subcommand_mut("segment").unwrap().render_long_help().to_string();
+        let defaults = SegmentSettings::default();
+        for (value, what) in [
+            (defaults.theta, "towards the points"),
+            (defaults.rho, "leaves the image out"),
+            (defaults.k, "intensities from 0 to 1"),
+            (defaults.omega, "between 0 and 2"),
+            (f64::from(defaults.max_steps), "Time steps at most"),
+        ] {
+            let line = help.lines().find(|line| line.contains(what)).unwrap_or_else(|| panic!("{what}: {help}"));
+            assert!(line.contains(&format!("[default: {value}]")), "{line}");
+        }
+        assert!(help.contains("[default: 64]") && defaults.brick == 64);
+        assert!(help.contains("[default: 0.1,99.9]") && defaults.percentiles == [0.1, 99.9]);
+        assert!(help.contains("0.02 for surface") && defaults.stop == Stop::Surface(0.02));
+    }
+
+    #[test]
+    fn every_flag_arrives() {
+        let settings = meant(
+            "--delta 1 --theta 2 --rho 3 --k 4 --sigma 5 --beta 6 --tau 7 --epsilon 8 --omega 1.5 --stop l2 --tol 9 \
+             --max-steps 10 --method fsm --edge plain --percentiles 1,99 --no-caps --overlap last --brick 32",
+        );
+        let expected = SegmentSettings {
+            method: crate::pipeline::distance::Method::Fsm,
+            theta: 2.0,
+            rho: 3.0,
+            delta: Some(1.0),
+            k: 4.0,
+            sigma: Some(5.0),
+            beta: Some(6.0),
+            tau: Some(7.0),
+            epsilon: Some(8.0),
+            omega: 1.5,
+            stop: Stop::L2(9.0),
+            max_steps: 10,
+            normalised: false,
+            caps: false,
+            percentiles: [1.0, 99.0],
+            overlap: Overlap::Last,
+            brick: 32,
+        };
+        assert_eq!(settings.unwrap(), expected);
+        assert_eq!(meant("--stop l2").unwrap().stop, Stop::L2(L2_TOLERANCE));
+    }
+
+    #[test]
+    fn senseless_settings_are_refused_by_name() {
+        for flags in [
+            "--theta -1",
+            "--theta nan",
+            "--rho inf",
+            "--delta -0.1",
+            "--k -3",
+            "--sigma -1",
+            "--beta 0",
+            "--tau 0",
+            "--tau 1e300",
+            "--epsilon 0",
+            "--omega 2",
+            "--omega 0",
+            "--tol 0",
+            "--percentiles 99,1",
+            "--percentiles -1,50",
+            "--percentiles nan,50",
+            "--percentiles 0,101",
+            "--brick 8",
+            "--brick 24",
+            "--brick 0",
+            "--brick -16",
+            "--brick 528",
+        ] {
+            let error = meant(flags).unwrap_err();
+            let flag = flags.split(' ').next().unwrap();
+            assert!(error.exit_code() == 2 && error.to_string().starts_with(flag), "{flags}: {error}");
+        }
+        for given in [[0.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, f64::NAN], [f64::INFINITY, 1.0, 1.0]] {
+            assert!(spacing(Some(given)).unwrap_err().to_string().contains("--image-spacing"));
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! `strandline info`: what a stack, a cloud of points or a store is, as lines or as JSON.
+
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
+
+use super::args::InfoArgs;
+use super::print;
+use super::text::{grouped, number, triple};
+use crate::error::{Error, Result};
+use crate::io::ome_zarr::ImageReader;
+use crate::io::points::read_cloud;
+use crate::io::tiff_stack::{Select, TiffStack};
+use crate::pipeline::marks::split;
+
+/// Runs the command.
+pub(super) fn run(args: &InfoArgs) -> Result<()> {
+    let path = &args.file;
+    if !path.exists() {
+        return Err(Error::input("there is no such file or folder").at(path));
+    }
+    let (document, lines) = if path.join("zarr.json").is_file() {
+        store(path)?
+    } else if path.is_dir() || is_tiff(path) {
+        stack(path)?
+    } else {
+        points(path)?
+    };
+    let text = if args.json { format!("{document:#}\n") } else { table(&lines) };
+    print(&text);
+    Ok(())
+}
+
+type Lines = Vec<(String, String)>;
+
+fn table(lines: &Lines) -> String {
+    let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    lines.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
+}
+
+fn line(name: &str, value: impl Into<String>) -> (String, String) {
+    (name.into(), value.into())
+}
+
+/// The first bytes of classic and big TIFF in both byte orders.
+fn is_tiff(path: &Path) -> bool {
+    let mut head = [0; 4];
+    let read = std::fs::File::open(path).and_then(|mut file| std::io::Read::read_exact(&mut file, &mut head));
+    let name = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    (read.is_ok() && [*b"II*\0", *b"MM\0*", *b"II+\0", *b"MM\0+"].contains(&head))
+        || matches!(name.as_deref(), Some("tif" | "tiff"))
+}
+
+fn stack(path: &Path) -> Result<(Value, Lines)> {
+    let stack = TiffStack::open(path, Select::default())?;
+    let info = stack.info();
+    let [x, y, z] = info.shape;
+    let unit = info.unit.clone().unwrap_or_default();
+    let spacing = info.spacing.map(|h| h.map_or("?".into(), number)).join(", ");
+    let mut lines = vec![
+        line("kind", if path.is_dir() { "folder of TIFF slices" } else { "TIFF stack" }),
+        line("size x, y, z", format!("{x}, {y}, {z}")),
+        line("spacing x, y, z", format!("{spacing} {unit}").trim_end()),
+        line("channels", info.channels.to_string()),
+        line("times", info.times.to_string()),
+        line("axes as stored", &*info.axes),
+        line("type", &*info.file_type),
+        line("compression", &*info.compression),
+    ];
+    lines.extend(info.notes.iter().map(|note| line("note", &**note)));
+    let document = json!({
+        "kind": "stack", "shape_xyz": info.shape, "spacing_xyz": info.spacing, "unit": info.unit,
+        "channels": info.channels, "times": info.times, "axes": info.axes, "type": info.file_type,
+        "compression": info.compression, "notes": info.notes,
+    });
+    Ok((document, lines))
+}
+
+fn points(path: &Path) -> Result<(Value, Lines)> {
+    let cloud = read_cloud(path)?;
+    let (low, high) = cloud.bounds().unwrap_or_default();
+    let mut lines = vec![
+        line("kind", "points"),
+        line("points", grouped(cloud.len() as u64)),
+        line("lowest x, y, z", triple(low)),
+        line("highest x, y, z", triple(high)),
+    ];
+    let mut objects = Vec::new();
+    for marks in split(&cloud) {
+        let points: usize = marks.contours.iter().map(Vec::len).sum();
+        let contours = if marks.drawn { marks.contours.len() } else { 0 };
+        let on = if marks.drawn { format!(" on {contours} contours") } else { ", no contours".into() };
+        lines.push(line(&format!("object {}", marks.object), format!("{} points{on}", grouped(points as u64))));
+        objects.push(json!({ "object": marks.object, "points": points, "contours": contours }));
+    }
+    let document = json!({
+        "kind": "points", "points": cloud.len(), "lowest_xyz": low, "highest_xyz": high, "objects": objects,
+    });
+    Ok((document, lines))
+}
+
+fn store(path: &Path) -> Result<(Value, Lines)> {
+    let mut lines = vec![line("kind", "OME-Zarr store")];
+    let mut images = Map::new();
+    for group in groups(path) {
+        // The root of a store may hold no image of its own.
+        let Ok(image) = ImageReader::open(&path.join(&group)) else { continue };
+        let name = if group.is_empty() { "image" } else { &group };
+        let mut levels = Vec::new();
+        for level in image.levels() {
+            let g = &level.geometry;
+            let [x, y, z] = g.shape;
+            let unit = g.unit.as_deref().unwrap_or("");
+            let text = format!("{x} x {y} x {z} {}, spacing {} {unit}", level.element, triple(g.spacing));
+            lines.push(line(&format!("{name}, level {}", level.path), text.trim_end()));
+            levels.push(json!({
+                "path": level.path, "shape_xyz": g.shape, "spacing_xyz": g.spacing, "origin_xyz": g.origin,
+                "unit": g.unit, "type": level.element,
+            }));
+        }
+        images.insert(name.into(), levels.into());
+    }
+    if images.is_empty() {
+        return Err(Error::input("holds no OME-Zarr 0.5 image with the axes z, y, x").at(path));
+    }
+    let report = std::fs::read(path.join("report.json")).ok().and_then(|text| serde_json::from_slice(&text).ok());
+    if let Some(report) = &report {
+        lines.extend(summary(report));
+    }
+    let result = report.as_ref().map_or(Value::Null, |report| report["result"].clone());
+    Ok((json!({ "kind": "store", "images": images, "result": result }), lines))
+}
+
+/// The groups in which our stores keep images, the root first.
+fn groups(store: &Path) -> Vec<String> {
+    let below = |folder: &str| {
+        let entries = std::fs::read_dir(store.join(folder)).into_iter().flatten().flatten();
+        let mut names: Vec<String> = entries
+            .filter(|entry| entry.path().join("zarr.json").is_file())
+            .map(|entry| format!("{folder}/{}", entry.file_name().to_string_lossy()))
+            .collect();
+        names.sort();
+        names
+    };
+    let mut groups = vec![String::new(), "levelset".into()];
+    groups.extend(below("levelset"));
+    groups.extend(below("labels"));
+    groups
+}
+
+/// A few lines out of a report.
+fn summary(report: &Value) -> Lines {
+    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned);
+    let unit = report["grid"]["unit"].as_str().unwrap_or("").to_owned();
+    let mut lines = vec![
+        line("made by", format!("strandline {} {}", text(&report["version"]), text(&report["command"]))),
+        line("from", text(&report["settings"]["image"])),
+        line("seconds", report["seconds"].as_f64().map_or("?".into(), number)),
+    ];
+    for object in report["result"]["objects"].as_array().into_iter().flatten() {
+        let value = |name: &str| object[name].as_f64().map_or("?".into(), number);
+        lines.push(line(
+            &format!("object {}", object["label"]),
+            format!(
+                "volume {}, area {} ({unit} cubed, squared), closed: {}",
+                value("volume"),
+                value("area"),
+                object["closed"]
+            ),
+        ));
+    }
+    lines
+}

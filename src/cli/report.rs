@@ -1,0 +1,254 @@
+//! `report.json`: what was done, with which settings, at what cost, and what was found; all that repeating it needs.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::exec::StageReport;
+use crate::grid::Geometry;
+use crate::pipeline::distance::{Method, SOLVERS};
+use crate::pipeline::evolve::Stop;
+use crate::pipeline::segment::{ObjectReport, Outcome, Overlap, SegmentSettings};
+
+/// The whole report.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) version: &'static str,
+    pub(super) command: &'static str,
+    /// The command line as typed.
+    pub(super) arguments: Vec<String>,
+    pub(super) settings: Settings,
+    pub(super) grid: Grid,
+    pub(super) threads: usize,
+    pub(super) ranks: usize,
+    pub(super) memory_budget_bytes: u64,
+    pub(super) peak_rss_bytes: u64,
+    pub(super) seconds: f64,
+    pub(super) notes: Vec<String>,
+    pub(super) stages: Vec<Stage>,
+    pub(super) result: Found,
+}
+
+/// Every setting, also those that nobody gave; lengths physical.
+#[derive(Debug, Serialize)]
+pub(super) struct Settings {
+    pub(super) image: String,
+    pub(super) points: Vec<String>,
+    pub(super) output: Option<String>,
+    pub(super) channel: u32,
+    pub(super) time: u32,
+    /// First voxel and one past the last, x, y, z.
+    pub(super) crop_xyz: [[i64; 2]; 3],
+    pub(super) image_type: &'static str,
+    #[serde(flatten)]
+    pub(super) solver: Solver,
+    pub(super) scratch: String,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Solver {
+    method: &'static str,
+    theta: f64,
+    rho: f64,
+    delta: f64,
+    k: f64,
+    sigma: f64,
+    /// Null when it was found for each object; it is then in the results.
+    beta: Option<f64>,
+    tau: f64,
+    epsilon: f64,
+    omega: f64,
+    stop: &'static str,
+    tol: f64,
+    max_steps: u32,
+    edge: &'static str,
+    caps: bool,
+    percentiles: [f64; 2],
+    overlap: &'static str,
+    brick: i64,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Grid {
+    shape_zyx: [i64; 3],
+    spacing_zyx: [f64; 3],
+    origin_zyx: [f64; 3],
+    unit: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Stage {
+    name: String,
+    seconds: f64,
+    voxels: u64,
+    brick_loads: u64,
+    bricks: u64,
+    bytes_read: u64,
+    bytes_written: u64,
+    iterations: u64,
+    residual: f64,
+    peak_rss_bytes: u64,
+}
+
+/// What was found; of one object everything directly, of all objects in the list.
+#[derive(Debug, Serialize)]
+pub(super) struct Found {
+    #[serde(flatten)]
+    single: Option<Object>,
+    label_voxels: BTreeMap<String, u64>,
+    objects: Vec<Object>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct Object {
+    label: u32,
+    voxels: u64,
+    volume: f64,
+    area: f64,
+    closed: bool,
+    components: u64,
+    triangles: u64,
+    hausdorff: Option<Hausdorff>,
+    cloud_points: u64,
+    beta: f64,
+    hole: Option<Hole>,
+    band_voxels: u64,
+    time_steps: u32,
+    sor_iterations: u64,
+    stopped_by: &'static str,
+    residual: f64,
+}
+
+/// Distances of the marks from the surface.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Hausdorff {
+    mean: f64,
+    max: f64,
+}
+
+/// The cloud's largest hole.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Hole {
+    width: f64,
+    place_xyz: [f64; 3],
+}
+
+fn zyx<T: Copy>([x, y, z]: [T; 3]) -> [T; 3] {
+    [z, y, x]
+}
+
+impl Grid {
+    pub(super) fn new(geometry: &Geometry) -> Self {
+        Self {
+            shape_zyx: zyx(geometry.shape),
+            spacing_zyx: zyx(geometry.spacing),
+            origin_zyx: zyx(geometry.origin),
+            unit: geometry.unit.clone(),
+        }
+    }
+}
+
+impl Solver {
+    pub(super) fn new(settings: &SegmentSettings, geometry: &Geometry) -> Self {
+        let (stop, tol) = match settings.stop {
+            Stop::Surface(tol) => ("surface", tol),
+            Stop::L2(tol) => ("l2", tol),
+        };
+        Self {
+            method: method_name(settings.method),
+            theta: settings.theta,
+            rho: settings.rho,
+            delta: settings.delta_on(geometry),
+            k: settings.k,
+            sigma: settings.sigma_on(geometry),
+            beta: settings.beta,
+            tau: settings.tau_on(geometry),
+            epsilon: settings.epsilon_on(geometry),
+            omega: settings.omega,
+            stop,
+            tol,
+            max_steps: settings.max_steps,
+            edge: if settings.normalised { "normalised" } else { "plain" },
+            caps: settings.caps,
+            percentiles: settings.percentiles,
+            overlap: match settings.overlap {
+                Overlap::Smaller => "smaller",
+                Overlap::Larger => "larger",
+                Overlap::First => "first",
+                Overlap::Last => "last",
+            },
+            brick: settings.brick,
+        }
+    }
+}
+
+fn method_name(method: Method) -> &'static str {
+    SOLVERS.iter().find(|solver| solver.method == method).map_or("", |solver| solver.name)
+}
+
+impl From<StageReport> for Stage {
+    fn from(stage: StageReport) -> Self {
+        Self {
+            name: stage.name,
+            seconds: stage.seconds,
+            voxels: stage.voxels,
+            brick_loads: stage.brick_loads,
+            bricks: stage.bricks,
+            bytes_read: stage.bytes_read,
+            bytes_written: stage.bytes_written,
+            iterations: stage.iterations,
+            residual: stage.residual,
+            peak_rss_bytes: stage.peak_rss_bytes,
+        }
+    }
+}
+
+impl Object {
+    fn new(object: &ObjectReport, voxels: u64) -> Self {
+        Self {
+            label: object.label,
+            voxels,
+            volume: object.measures.volume,
+            area: object.measures.area,
+            closed: object.measures.is_closed(),
+            components: object.measures.components,
+            triangles: object.measures.triangles,
+            hausdorff: object.hausdorff.map(|h| Hausdorff { mean: h.mean, max: h.max }),
+            cloud_points: object.cloud_points,
+            beta: object.beta,
+            hole: object.hole.map(|hole| Hole { width: hole.width, place_xyz: hole.place }),
+            band_voxels: object.band_voxels,
+            time_steps: object.evolution.steps,
+            sor_iterations: object.evolution.sor_iterations,
+            stopped_by: object.evolution.stopped_by,
+            residual: object.evolution.residual,
+        }
+    }
+}
+
+impl Found {
+    pub(super) fn new(outcome: &Outcome) -> Self {
+        let voxels = |label| outcome.label_voxels.get(&label).copied().unwrap_or(0);
+        let objects: Vec<Object> = outcome.objects.iter().map(|o| Object::new(o, voxels(o.label))).collect();
+        let single = if let [only] = objects.as_slice() { Some(only.clone()) } else { None };
+        let label_voxels = outcome.objects.iter().map(|o| (o.label.to_string(), voxels(o.label))).collect();
+        Self { single, label_voxels, objects }
+    }
+}
+
+/// The crop as the report states it.
+pub(super) fn crop_xyz(part: &crate::grid::Box3) -> [[i64; 2]; 3] {
+    std::array::from_fn(|a| [part.lo[a], part.hi[a]])
+}
+
+impl Report {
+    /// Writes the report; nothing stands under the name before it is whole.
+    pub(super) fn write(&self, path: &Path) -> Result<()> {
+        let fault = |error: std::io::Error| Error::from_io("the report cannot be written", &error).at(path);
+        let mut text = serde_json::to_string_pretty(self).map_err(|error| fault(error.into()))?;
+        text.push('\n');
+        super::files::write_whole(path, |file| std::io::Write::write_all(file, text.as_bytes())).map_err(fault)
+    }
+}

@@ -1,0 +1,317 @@
+//! `strandline segment`: opens the inputs, says what it will take, runs, writes, tells what was found.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::args::SegmentArgs;
+use super::config::{self, Resources};
+use super::console::{Console, Voice};
+use super::files::copy_whole;
+use super::input::{Marks, crop_box, open_stack, read_marks};
+use super::report::{Found, Grid, Report, Settings, Solver, crop_xyz};
+use super::text::{bytes, duration, grouped, number, triple};
+use super::values::Output;
+use super::{picture, print, signals, table};
+use crate::error::{Error, Result};
+use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
+use crate::grid::{Box3, Geometry};
+use crate::io::ome_zarr::StoreWriter;
+use crate::io::tiff_stack::{Select, TiffStack};
+use crate::pipeline::marks::split;
+use crate::pipeline::segment::{Estimate, Guides, Outcome, SegmentSettings, check_marks, estimate, segment};
+use crate::store::{PlaneSource, Scratch, free_space};
+
+/// A segmentation that is ready to start: all inputs are open and checked.
+pub(super) struct Job {
+    pub(super) command: &'static str,
+    typed: Vec<String>,
+    args: SegmentArgs,
+    settings: SegmentSettings,
+    resources: Resources,
+    stack: TiffStack,
+    /// The grid of the part that is segmented.
+    geometry: Geometry,
+    crop: Box3,
+    marks: Marks,
+    console: Arc<Console>,
+    cancel: Cancel,
+    started: Instant,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
+    let job = Job::new("segment", args.clone(), typed)?;
+    let estimate = job.estimate();
+    if args.output.dry_run {
+        job.print_plan(&estimate);
+        return job.fits(&estimate).map(|_| ());
+    }
+    job.run(&estimate).map(|_| ())
+}
+
+impl Job {
+    /// Understands what was typed and opens the inputs.
+    pub(super) fn new(command: &'static str, args: SegmentArgs, typed: &[String]) -> Result<Self> {
+        let started = Instant::now();
+        let cancel = signals::cancel_on_signals()?;
+        let settings = config::settings(&args.picture, &args.level_set, &args.distance, &args.resources)?;
+        let spacing = config::spacing(args.picture.image_spacing)?;
+        config::check_outputs(&args.output)?;
+        let resources = config::resources(&args.resources, args.output.store())?;
+        let voice = match (args.output.quiet, args.output.verbose) {
+            (true, _) => Voice::Quiet,
+            (_, true) => Voice::Verbose,
+            _ => Voice::Normal,
+        };
+        let console = Arc::new(Console::new(voice));
+        let select = Select { channel: args.picture.channel, time: args.picture.time };
+        let opened = open_stack(&args.image, select, spacing)?;
+        opened.notes.iter().for_each(|note| console.note(note));
+        let crop = crop_box(args.picture.crop, opened.geometry.shape)?;
+        let marks = read_marks(&args.points)?;
+        let geometry = opened.geometry.crop(&crop);
+        for object in split(&marks.cloud) {
+            let checked = check_marks(&object, &geometry);
+            let file = &marks.files[&object.object];
+            checked.map_err(|error| error.at(file))?.iter().for_each(|note| console.note(note));
+        }
+        let typed = typed.to_vec();
+        let stack = opened.stack;
+        Ok(Self { command, typed, args, settings, resources, stack, geometry, crop, marks, console, cancel, started })
+    }
+
+    /// What the run will take.
+    pub(super) fn estimate(&self) -> Estimate {
+        let guides = Guides { geometry: &self.geometry, cloud: &self.marks.cloud };
+        let threads = self.resources.threads as u64;
+        estimate(&self.stack, &self.crop, &guides, &self.settings, threads, self.needs_store())
+    }
+
+    /// Fields are written out, or needed for what is drawn from them.
+    fn needs_store(&self) -> bool {
+        let output = &self.args.output;
+        output.store().is_some() || output.mesh.is_some() || output.picture.is_some()
+    }
+
+    /// Refuses a run that cannot fit memory or disk.
+    pub(super) fn fits(&self, estimate: &Estimate) -> Result<u64> {
+        let window = Budget { total: self.resources.memory }.window(estimate.held)?;
+        if let Some(free) = free_space(&self.resources.scratch) {
+            if free < estimate.least_scratch {
+                return Err(Error::failed(format!(
+                    "needs at least {} for temporary fields but only {} are free; free some space or name another \
+                     folder with --scratch",
+                    bytes(estimate.least_scratch),
+                    bytes(free)
+                ))
+                .at(&self.resources.scratch));
+            }
+            if free < estimate.scratch {
+                self.console.note(&format!(
+                    "temporary fields may need {} but only {} are free in {}",
+                    bytes(estimate.scratch),
+                    bytes(free),
+                    self.resources.scratch.display()
+                ));
+            }
+        }
+        Ok(window)
+    }
+
+    /// Runs the segmentation and writes all that was asked for; returns what was found.
+    pub(super) fn run(&self, estimate: &Estimate) -> Result<Outcome> {
+        let window = self.fits(estimate)?;
+        self.console.say(&format!(
+            "{}: {} object(s), about {}; memory up to {}, {} of temporary fields in {}",
+            self.args.image.display(),
+            self.marks.files.len(),
+            duration(estimate.seconds),
+            bytes(self.resources.memory),
+            bytes(estimate.scratch),
+            self.resources.scratch.display()
+        ));
+        if self.console.is_verbose() {
+            self.console.say(&self.describe());
+        }
+        let scratch = Scratch::new(&self.resources.scratch, window);
+        let budget = Budget { total: self.resources.memory };
+        let progress: Arc<dyn Progress> = self.console.clone();
+        let engine = Engine::new(self.resources.threads, scratch, budget, self.cancel.clone(), progress)?;
+        engine.reserve(estimate.held)?;
+        let result = self.solve_and_write(&engine);
+        self.console.clear();
+        let outcome = result?;
+        if !self.args.output.quiet {
+            print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome)));
+        }
+        Ok(outcome)
+    }
+
+    fn solve_and_write(&self, engine: &Engine) -> Result<Outcome> {
+        let output = &self.args.output;
+        // What is drawn from fields that nobody wants to keep needs them for a while all the same.
+        let passing = tempfile::tempdir_in(&self.resources.scratch)
+            .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let store = match output.store() {
+            Some(path) => Some(StoreWriter::create(path, output.overwrite)?),
+            None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
+            None => None,
+        };
+        let guides = Guides { geometry: &self.geometry, cloud: &self.marks.cloud };
+        let outcome = segment(engine, &self.stack, &self.crop, &guides, &self.settings, store.as_ref())?;
+        if let Some(store) = &store {
+            if self.command == "demo" {
+                picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;
+            }
+            self.report(engine, &outcome).write(&store.file("report.json")?)?;
+        }
+        engine.check()?;
+        // A failure from here on costs a copy, not the result.
+        let folder = match (store, output.store()) {
+            (Some(store), Some(path)) => {
+                store.finish()?;
+                path.to_path_buf()
+            }
+            (Some(store), None) => {
+                store.finish()?;
+                passing.path().join("passing.zarr")
+            }
+            (None, _) => PathBuf::new(),
+        };
+        self.write_copies(engine, &outcome, &folder)?;
+        Ok(outcome)
+    }
+
+    /// The files beside the store.
+    fn write_copies(&self, engine: &Engine, outcome: &Outcome, folder: &Path) -> Result<()> {
+        let output = &self.args.output;
+        if let Some(path) = &output.mesh {
+            for object in &outcome.objects {
+                let several = outcome.objects.len() > 1;
+                let name = if several { format!("object-{}.ply", object.label) } else { "surface.ply".into() };
+                let target = if several { numbered(path, object.label) } else { path.clone() };
+                copy_whole(&folder.join("meshes").join(name), &target)
+                    .map_err(|error| Error::from_io("the mesh cannot be written", &error).at(&target))?;
+            }
+        }
+        if let Some(path) = &output.picture {
+            picture::draw(folder, self.centre(), path)?;
+        }
+        match &output.report {
+            Some(path) => self.report(engine, outcome).write(path),
+            None => Ok(()),
+        }
+    }
+
+    /// The middle of all marks, kept inside the image.
+    fn centre(&self) -> [f64; 3] {
+        let (low, high) = self.marks.cloud.bounds().unwrap_or_default();
+        std::array::from_fn(|a| 0.5 * (low[a] + high[a]))
+    }
+
+    fn report(&self, engine: &Engine, outcome: &Outcome) -> Report {
+        let (picture, output) = (&self.args.picture, &self.args.output);
+        let settings = Settings {
+            image: self.args.image.display().to_string(),
+            points: self.args.points.iter().map(|path| path.display().to_string()).collect(),
+            output: output.store().map(|path| path.display().to_string()),
+            channel: picture.channel,
+            time: picture.time,
+            crop_xyz: crop_xyz(&self.crop),
+            image_type: outcome.element.name(),
+            solver: Solver::new(&self.settings, &self.geometry),
+            scratch: self.resources.scratch.display().to_string(),
+        };
+        Report {
+            version: env!("CARGO_PKG_VERSION"),
+            command: self.command,
+            arguments: self.typed.clone(),
+            settings,
+            grid: Grid::new(&outcome.geometry),
+            threads: engine.threads(),
+            ranks: engine.comm().ranks(),
+            memory_budget_bytes: self.resources.memory,
+            peak_rss_bytes: peak_resident(),
+            seconds: self.started.elapsed().as_secs_f64(),
+            notes: self.console.notes(),
+            stages: engine.reports().into_iter().map(Into::into).collect(),
+            result: Found::new(outcome),
+        }
+    }
+
+    /// The image and its settings in a few lines.
+    fn describe(&self) -> String {
+        let (g, s) = (&self.geometry, &self.settings);
+        let unit = g.unit.as_deref().map_or(String::new(), |unit| format!(" {unit}"));
+        let [x, y, z] = g.shape;
+        format!(
+            "image {x} x {y} x {z} (x, y, z) {}, spacing {}{unit}, origin {}\n\
+             theta {} rho {} delta {} k {} sigma {} beta {} tau {} epsilon {} omega {} brick {} threads {}",
+            self.stack.element().name(),
+            triple(g.spacing),
+            triple(g.origin),
+            number(s.theta),
+            number(s.rho),
+            number(s.delta_on(g)),
+            number(s.k),
+            number(s.sigma_on(g)),
+            s.beta.map_or("automatic".into(), number),
+            number(s.tau_on(g)),
+            number(s.epsilon_on(g)),
+            number(s.omega),
+            s.brick,
+            self.resources.threads
+        )
+    }
+
+    fn print_plan(&self, estimate: &Estimate) {
+        let mut text = format!("{}\n", self.describe());
+        for object in split(&self.marks.cloud) {
+            let points: usize = object.contours.iter().map(Vec::len).sum();
+            let file = self.marks.files[&object.object].display();
+            let contours = if object.drawn { format!(" on {} contours", object.contours.len()) } else { String::new() };
+            text.push_str(&format!("object {}: {points} marks{contours}, {file}\n", object.object));
+        }
+        text.push_str(&format!(
+            "{} voxels near the marks\nmemory: {} held, {} allowed\ntemporary fields: about {} in {}\n\
+             output: up to {} before compression\ntime: very roughly {}\n",
+            grouped(estimate.near_voxels),
+            bytes(estimate.held),
+            bytes(self.resources.memory),
+            bytes(estimate.scratch),
+            self.resources.scratch.display(),
+            bytes(estimate.output),
+            duration(estimate.seconds)
+        ));
+        print(&text);
+    }
+}
+
+/// `FILE.ply` as `FILE-3.ply`.
+fn numbered(path: &Path, label: u32) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
+    path.with_file_name(format!("{stem}-{label}{extension}"))
+}
+
+impl super::args::OutputArgs {
+    /// The store's path, where there is to be one.
+    pub(super) fn store(&self) -> Option<&Path> {
+        match &self.output {
+            Output::Store(path) => Some(path),
+            Output::None => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn several_meshes_are_numbered() {
+        assert_eq!(numbered(Path::new("a/b.ply"), 3), Path::new("a/b-3.ply"));
+        assert_eq!(numbered(Path::new("b"), 12), Path::new("b-12"));
+    }
+}

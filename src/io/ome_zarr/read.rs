@@ -1,0 +1,156 @@
+//! Reads boxes of voxels back from a store that this crate wrote, for pictures and for telling what a store holds.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde_json::Value;
+use zarrs::array::{Array, ArraySubset, ElementOwned};
+use zarrs::filesystem::FilesystemStore;
+
+use crate::error::{Error, Result};
+use crate::grid::{Box3, Geometry};
+
+/// A multiscale image of a store.
+#[derive(Clone, Debug)]
+pub struct ImageReader {
+    folder: PathBuf,
+    levels: Vec<StoredLevel>,
+}
+
+/// One resolution level as its metadata tells it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredLevel {
+    /// Its folder's name.
+    pub path: String,
+    /// Where its voxels lie.
+    pub geometry: Geometry,
+    /// The type of a voxel as Zarr names it.
+    pub element: String,
+}
+
+impl ImageReader {
+    /// Opens the multiscale in a group: the store's folder itself, or one below it such as `labels/segmentation`.
+    ///
+    /// # Errors
+    /// When there is none, or not with the axes z, y, x.
+    pub fn open(group: &Path) -> Result<Self> {
+        let document = read_json(&group.join("zarr.json"))?;
+        let multiscale = &document["attributes"]["ome"]["multiscales"][0];
+        let read = |multiscale: &Value| {
+            let unit = axes(multiscale)?;
+            let datasets = multiscale["datasets"].as_array()?;
+            datasets.iter().map(|dataset| level(group, dataset, unit.clone())).collect::<Option<Vec<_>>>()
+        };
+        let levels = read(multiscale).filter(|levels| !levels.is_empty()).ok_or_else(|| {
+            Error::input("holds no OME-Zarr 0.5 image with the axes z, y, x that can be read").at(group)
+        })?;
+        Ok(Self { folder: group.to_path_buf(), levels })
+    }
+
+    /// The levels, finest first.
+    #[must_use]
+    pub fn levels(&self) -> &[StoredLevel] {
+        &self.levels
+    }
+
+    /// The voxels of a part of a level, dense `[z][y][x]`; exact for every type.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    ///
+    /// # Panics
+    /// When the level does not exist or `part` is not inside it.
+    pub fn read_box(&self, level: usize, part: &Box3) -> Result<Vec<f64>> {
+        let level = &self.levels[level];
+        assert_eq!(part.intersect(&level.geometry.domain()), *part, "a box inside the level");
+        match level.element.as_str() {
+            "uint8" => self.read::<u8>(level, part),
+            "uint16" => self.read::<u16>(level, part),
+            "uint32" => self.read::<u32>(level, part),
+            "float32" => self.read::<f32>(level, part),
+            "float64" => self.read::<f64>(level, part),
+            other => Err(Error::input(format!("holds voxels of type {other}, which are not read")).at(&self.folder)),
+        }
+    }
+
+    fn read<T: ElementOwned + Into<f64>>(&self, level: &StoredLevel, part: &Box3) -> Result<Vec<f64>> {
+        let fault = |error: &dyn std::fmt::Display| Error::failed(format!("cannot be read: {error}")).at(&self.folder);
+        let store = FilesystemStore::new(&self.folder).map_err(|e| fault(&e))?;
+        let array = Array::open(Arc::new(store), &format!("/{}", level.path)).map_err(|e| fault(&e))?;
+        let ranges = [2, 1, 0].map(|a| part.lo[a] as u64..part.hi[a] as u64);
+        let subset = ArraySubset::new_with_ranges(&ranges);
+        let values = array.retrieve_array_subset::<Vec<T>>(&subset).map_err(|e| fault(&e))?;
+        Ok(values.into_iter().map(Into::into).collect())
+    }
+}
+
+fn read_json(path: &Path) -> Result<Value> {
+    let text = std::fs::read(path).map_err(|e| Error::input(format!("cannot be read: {e}")).at(path))?;
+    serde_json::from_slice(&text).map_err(|e| Error::input(format!("is no JSON: {e}")).at(path))
+}
+
+/// The unit of the axes, where they have one; none when the axes are not z, y, x.
+#[allow(clippy::option_option)]
+fn axes(multiscale: &Value) -> Option<Option<String>> {
+    let axes = multiscale["axes"].as_array()?;
+    let names: Vec<&str> = axes.iter().filter_map(|axis| axis["name"].as_str()).collect();
+    (names == ["z", "y", "x"]).then(|| axes[0]["unit"].as_str().map(ToOwned::to_owned))
+}
+
+fn level(group: &Path, dataset: &Value, unit: Option<String>) -> Option<StoredLevel> {
+    let path = dataset["path"].as_str()?.to_owned();
+    let array = read_json(&group.join(&path).join("zarr.json")).ok()?;
+    let transformations = dataset["coordinateTransformations"].as_array()?;
+    let vector = |kind: &str| transformations.iter().find_map(|t| xyz(&t[kind], Value::as_f64));
+    let geometry = Geometry {
+        shape: xyz(&array["shape"], Value::as_i64)?,
+        spacing: vector("scale")?,
+        origin: vector("translation").unwrap_or([0.0; 3]),
+        unit,
+    };
+    Some(StoredLevel { path, geometry, element: array["data_type"].as_str()?.to_owned() })
+}
+
+/// A list of z, y, x as a triple.
+fn xyz<T: Copy>(list: &Value, number: impl Fn(&Value) -> Option<T>) -> Option<[T; 3]> {
+    let values: Vec<T> = list.as_array()?.iter().filter_map(number).collect();
+    let [z, y, x] = values.try_into().ok()?;
+    Some([x, y, z])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::ome_zarr::{ImageSpec, StoreWriter};
+    use crate::store::ElementType;
+
+    #[test]
+    fn what_was_written_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.zarr");
+        let geometry = Geometry {
+            shape: [300, 20, 5],
+            spacing: [0.5, 0.5, 2.0],
+            origin: [1.0, 2.0, 3.0],
+            unit: Some("micrometer".into()),
+        };
+        let store = StoreWriter::create(&path, false).unwrap();
+        let spec = ImageSpec { name: "image", geometry: &geometry, element: ElementType::U16, window: None };
+        let image = store.image("", &spec).unwrap();
+        for level in image.levels() {
+            for shard in level.shards() {
+                let voxels = shard.rows().flat_map(|(y, z)| (shard.lo[0]..shard.hi[0]).map(move |x| x + 7 * y + z));
+                level.write_shard(&shard, &voxels.map(|v| v as u16).collect::<Vec<u16>>()).unwrap();
+            }
+        }
+        store.finish().unwrap();
+        let reader = ImageReader::open(&path).unwrap();
+        assert_eq!(reader.levels().len(), image.levels().len());
+        assert_eq!((&reader.levels()[0].geometry, reader.levels()[0].element.as_str()), (&geometry, "uint16"));
+        let part = Box3::new([126, 3, 1], [130, 5, 3]);
+        let expected: Vec<f64> =
+            part.rows().flat_map(|(y, z)| (126..130).map(move |x| (x + 7 * y + z) as f64)).collect();
+        assert_eq!(reader.read_box(0, &part).unwrap(), expected);
+        assert_eq!(ImageReader::open(&path.join("labels")).unwrap_err().exit_code(), 2);
+    }
+}

@@ -1,0 +1,90 @@
+//! What a segmentation will take: memory that it must hold, scratch, output and a rough time, told before it starts.
+//!
+//! The cells of every object are counted as the run itself begins with them; the rest follows from the fields that are
+//! alive at one time. Everything is an upper bound but for objects whose search has to reach farther than its start.
+
+use super::object::first_cells;
+use super::settings::{Guides, SegmentSettings};
+use crate::grid::{Box3, BrickGrid};
+use crate::kernel::level_set::CELL_LEN;
+use crate::pipeline::marks::split;
+use crate::store::PlaneSource;
+
+/// What a run is expected to take.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Bytes that must be in memory at one time, beside the window of scratch pages.
+    pub held: u64,
+    /// Bytes of scratch at one time.
+    pub scratch: u64,
+    /// Bytes of scratch without which the run cannot even start to solve.
+    pub least_scratch: u64,
+    /// Bytes of the output, if nothing of it could be compressed.
+    pub output: u64,
+    /// Voxels near the marks, of all objects.
+    pub near_voxels: u64,
+    /// A rough guess of the seconds it takes.
+    pub seconds: f64,
+}
+
+/// Scratch a voxel near the marks takes while its object is solved: two time levels, distance, level, edges, image
+/// smoothed and not, each f32 and most with faces (3/8 more), and flags. The cells for presmoothing reach farther.
+const SOLVE_BYTES: u64 = 44;
+/// Scratch a voxel near the marks takes for the distance alone: state and result, with faces.
+const DISTANCE_BYTES: u64 = 11;
+/// What stays of it when the object is solved.
+const KEPT_BYTES: u64 = 6;
+/// Memory a cell takes whether stored or not: constant values and slots of all fields, bins.
+const GRID_CELL_BYTES: u64 = 80;
+/// Memory a stored cell takes beside its scratch: locks, waves, sums; its part of the mesh's bookkeeping.
+const STORED_CELL_BYTES: u64 = 1200;
+/// Memory a point of the cloud takes: its position, twice, and its place in the bins.
+const POINT_BYTES: u64 = 64;
+/// Buffers of one thread for cells and for patches of the surface.
+const THREAD_BYTES: u64 = 4 << 20;
+/// Voxels a thread holds to make a brick of a coarser level, and a chunk of a shard.
+const COARSE_VOXELS: u64 = 128 * 128 * 128 + 4 * 64 * 64 * 64;
+/// Seconds of one thread for a voxel near the marks, and for a voxel of the image.
+const SECONDS_PER_NEAR_VOXEL: f64 = 1.2e-6;
+const SECONDS_PER_VOXEL: f64 = 6e-8;
+
+/// Estimates the segmentation of `crop` with `threads` threads; `writes` says whether there is an output.
+#[must_use]
+pub fn estimate(
+    stack: &dyn PlaneSource,
+    crop: &Box3,
+    guides: &Guides<'_>,
+    settings: &SegmentSettings,
+    threads: u64,
+    writes: bool,
+) -> Estimate {
+    let size = stack.element().size() as u64;
+    let plane = stack.shape()[0].unsigned_abs() * stack.shape()[1].unsigned_abs() * size;
+    let (mut points, mut grid_cells, mut largest, mut near) = (0, 0, 0, 0);
+    for marks in split(guides.cloud) {
+        let (cloud, cells) = first_cells(&marks, guides.geometry, settings);
+        points = points.max(cloud);
+        grid_cells = grid_cells.max(cells.grid().len());
+        largest = largest.max(cells.len() as u64);
+        near += cells.len() as u64;
+    }
+    let voxels = crop.volume();
+    let grid = BrickGrid::new(crop.shape(), settings.brick);
+    let image = grid.len() * grid.brick_len() as u64 * size;
+    let (largest_voxels, near_voxels) = (largest * CELL_LEN as u64, near * CELL_LEN as u64);
+    // While planes come in: the plane, its cropped copy, and what is decoded; the latter two bounded by the plane.
+    let reading = threads * (3 * plane + (2 << 20));
+    let solving = points * POINT_BYTES + grid_cells * GRID_CELL_BYTES + largest * STORED_CELL_BYTES;
+    let writing = if writes { threads * COARSE_VOXELS * size.max(4) } else { 0 };
+    // Decoders keep their buffers.
+    let decoders = threads * plane;
+    let coarse = if writes { voxels * size * 3 / 4 } else { 0 };
+    Estimate {
+        held: reading.max(decoders + (solving + threads * THREAD_BYTES).max(writing)),
+        scratch: image + (SOLVE_BYTES * largest_voxels).max(coarse) + KEPT_BYTES * near_voxels,
+        least_scratch: image + DISTANCE_BYTES * largest_voxels,
+        output: if writes { voxels * (size + 1) * 3 / 2 + 5 * near_voxels } else { 0 },
+        near_voxels,
+        seconds: (near_voxels as f64 * SECONDS_PER_NEAR_VOXEL + voxels as f64 * SECONDS_PER_VOXEL) / threads as f64,
+    }
+}
