@@ -20,6 +20,8 @@ use strandline::pipeline::band::{Reaches, make_band};
 use strandline::pipeline::evolve::{Stop, TimeLoop, evolve};
 
 const STEPS: u32 = 5;
+/// Each program runs this often, taking turns; its fastest run counts.
+const REPEATS: usize = 3;
 const OMEGA: f64 = 1.2;
 const VELOCITY: PlainVelocity =
     PlainVelocity { theta: 0.7, rho: 0.3, delta: 0.1, epsilon: 0.01, tau: 0.5, normalised: true };
@@ -65,7 +67,7 @@ struct Cost {
     seconds: f64,
     assembly: f64,
     iterations: u64,
-    steps: u32,
+    fill: f64,
     u: Vec<f64>,
 }
 
@@ -114,7 +116,7 @@ fn plain(scene: &Scene, tolerance: f64) -> Cost {
             }
         }
     }
-    Cost { seconds: started.elapsed().as_secs_f64(), assembly, iterations, steps: STEPS, u }
+    Cost { seconds: started.elapsed().as_secs_f64(), assembly, iterations, fill: 1.0, u }
 }
 
 /// Our pipeline on the same band.
@@ -136,11 +138,13 @@ fn ours(scene: &Scene, threads: usize, tolerance: f64) -> Cost {
     };
     let settings =
         TimeLoop { velocity, stop: Stop::L2(0.0), max_steps: STEPS, omega: OMEGA as f32, solver_tolerance: tolerance };
+    let cells = (0..band.solved.set().len() as u32).filter(|slot| band.solved.read(*slot, |s| s.contains(&1))).count();
+    let fill = band.voxels as f64 / (cells * CELL * CELL * CELL) as f64;
     let started = Instant::now();
     let done = evolve(&stage, &lab.engine, &mut band, Some(&edges), [1.0; 3], &settings).expect("steps are taken");
     let seconds = started.elapsed().as_secs_f64();
     let u = whole(&band.u[0]).into_iter().map(f64::from).collect();
-    Cost { seconds, assembly: 0.0, iterations: done.sor_iterations, steps: done.steps, u }
+    Cost { seconds, assembly: 0.0, iterations: done.sor_iterations, fill, u }
 }
 
 fn main() {
@@ -150,23 +154,31 @@ fn main() {
     println!("shell of radius {}: {voxels} band voxels of {}, {STEPS} steps", scene.radius, scene.grid.len());
     let per_step = |seconds: f64| seconds * 1e9 / (voxels as f64 * f64::from(STEPS));
     for tolerance in [1e-3, 1e-4, 1e-5] {
-        let reference = plain(&scene, tolerance);
+        let mut best: [Option<Cost>; 3] = [None, None, None];
+        for _ in 0..REPEATS {
+            let costs = [plain(&scene, tolerance), ours(&scene, 1, tolerance), ours(&scene, 2, tolerance)];
+            for (best, cost) in best.iter_mut().zip(costs) {
+                if best.as_ref().is_none_or(|b| cost.seconds < b.seconds) {
+                    *best = Some(cost);
+                }
+            }
+        }
+        let [reference, one, two] = best.map(|cost| cost.expect("every program has run"));
         println!("corrections below {tolerance:e}");
         println!(
             "  plain f64    {:7.1} ns, of these assembly {:.1}; {:.1} iterations a step",
             per_step(reference.seconds),
             per_step(reference.assembly),
-            reference.iterations as f64 / f64::from(reference.steps)
+            reference.iterations as f64 / f64::from(STEPS)
         );
-        for threads in [1, 2] {
-            let cost = ours(&scene, threads, tolerance);
+        for (name, cost) in [("1 thread ", one), ("2 threads", two)] {
             let difference = cost.u.iter().zip(&reference.u).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             println!(
-                "  {threads} thread{}    {:7.1} ns, {:.1} iterations a step, ratio {:.2}, largest difference of u {difference:.1e}",
-                if threads == 1 { " " } else { "s" },
+                "  {name}    {:7.1} ns, {:.1} iterations a step, ratio {:.2}, cells {:.0} % full, largest difference of u {difference:.1e}",
                 per_step(cost.seconds),
-                cost.iterations as f64 / f64::from(cost.steps),
-                reference.seconds / cost.seconds
+                cost.iterations as f64 / f64::from(STEPS),
+                reference.seconds / cost.seconds,
+                100.0 * cost.fill
             );
         }
     }

@@ -67,7 +67,9 @@ impl Scene {
 
     fn mask(&self) -> CellMask {
         let mut solved = vec![0; CELL_LEN];
-        self.cell().for_each(|(v, at)| solved[at] = self.solved[self.grid.at(v)]);
+        for (v, at) in self.cell() {
+            solved[at] = self.solved[self.grid.at(v)];
+        }
         let end: [i64; 3] = std::array::from_fn(|a| (self.lo[a] + CELL as i64).min(self.grid.shape[a]));
         let valid = std::array::from_fn(|a| (end[a] - self.lo[a]) as usize);
         let mut mask = CellMask::new();
@@ -159,7 +161,9 @@ fn smooth_fields_are_assembled_as_printed() {
     for spacing in [ISOTROPIC, MICROSCOPE] {
         for (shape, lo) in PLACES {
             let scene = Scene::smooth(shape, lo, spacing);
-            velocities(spacing[0]).iter().for_each(|v| scene.check(v, 1e-4));
+            for velocity in &velocities(spacing[0]) {
+                scene.check(velocity, 1e-4);
+            }
         }
     }
 }
@@ -169,7 +173,9 @@ fn rough_fields_are_assembled_as_printed() {
     for (seed, (shape, lo)) in PLACES.into_iter().enumerate() {
         for spacing in [ISOTROPIC, MICROSCOPE] {
             let scene = Scene::rough(shape, lo, spacing, seed as u64);
-            velocities(spacing[0]).iter().for_each(|v| scene.check(v, 2e-5));
+            for velocity in &velocities(spacing[0]) {
+                scene.check(velocity, 2e-5);
+            }
         }
     }
 }
@@ -233,6 +239,8 @@ fn linear_fields_have_their_exact_gradient() {
         let mut g = vec![0.0; CELL_LEN];
         edge_detector(&u, spacing, 0.5, 1000.0, &mut Planes::new(), &mut g);
         let detector = 1.0 / (1.0 + 1000.0 * (0.5 * exact).powi(2));
-        g.iter().for_each(|&g| assert!((f64::from(g) / detector - 1.0).abs() < 1e-4, "{g} for {detector}"));
+        for g in g {
+            assert!((f64::from(g) / detector - 1.0).abs() < 1e-4, "{g} for {detector}");
+        }
     }
 }

@@ -130,7 +130,7 @@ fn ours(
     let sources = Sources { geometry, positions: cloud, bins: &bins };
     let stage = lab.engine.stage("distance", 0);
     let farthest = farthest.unwrap_or(f32::INFINITY);
-    let distance = cloud_distance(&stage, &lab.engine, &sources, &set, method, farthest).unwrap();
+    let distance = cloud_distance(&stage, &lab.engine, &sources, &set, method, farthest).expect("room for a distance");
     (whole(&distance), set.len())
 }
 

@@ -98,7 +98,7 @@ fn flood(lab: &Lab, set: &Arc<BrickSet>, d: &[f32], farthest: f32) -> Tagging {
     let sources = Sources { geometry: &geometry, positions: &[], bins: &bins };
     let mut distance = lab.field(set, d);
     (0..set.grid().len()).for_each(|id| distance.set_absent(id, farthest));
-    tag(&lab.engine.stage("tagging", 0), &lab.engine, &sources, &distance).unwrap()
+    tag(&lab.engine.stage("tagging", 0), &lab.engine, &sources, &distance).expect("room in scratch")
 }
 
 /// Flood and basins as the plain programs find them; a place is one where the flood may enter.
@@ -137,8 +137,8 @@ fn flood_of_cloud(lab: &Lab, geometry: &Geometry, cloud: &[[f64; 3]], farthest: 
     let sources = Sources { geometry, positions: cloud, bins: &bins };
     let stage = lab.engine.stage("start", 0);
     let farthest = farthest.unwrap_or(f32::INFINITY);
-    let distance = cloud_distance(&stage, &lab.engine, &sources, &set, Method::Fsm, farthest).unwrap();
-    let tagging = tag(&stage, &lab.engine, &sources, &distance).unwrap();
+    let distance = cloud_distance(&stage, &lab.engine, &sources, &set, Method::Fsm, farthest).expect("room in scratch");
+    let tagging = tag(&stage, &lab.engine, &sources, &distance).expect("room in scratch");
     (whole(&distance), tagging)
 }
 

@@ -18,7 +18,9 @@ const GRIDS: [([i64; 3], [f64; 3]); 3] =
 fn smoothed(lab: &Lab, shape: [i64; 3], spacing: [f64; 3], sigma: f64, image: &[f32]) -> Vec<f32> {
     let set = dense(shape, CELL as i64);
     let source = lab.field(&set, image);
-    whole(&presmooth(&lab.engine.stage("heat", 0), &lab.engine, &source, &set, spacing, sigma).unwrap())
+    whole(
+        &presmooth(&lab.engine.stage("heat", 0), &lab.engine, &source, &set, spacing, sigma).expect("room in scratch"),
+    )
 }
 
 /// A product of cosines is an eigenvector of the discrete Laplacian with mirrored borders: it is only damped.

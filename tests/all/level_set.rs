@@ -60,11 +60,13 @@ fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
     let set = dense(geometry.shape, CELL as i64);
     let sources = Sources { geometry: &geometry, positions: &cloud, bins: &bins };
     let stage = lab.engine.stage("sponge", 0);
-    let distance = cloud_distance(&stage, &lab.engine, &sources, &set, Method::Fsm, f32::INFINITY).unwrap();
-    let tagging = tag(&stage, &lab.engine, &sources, &distance).unwrap();
+    let distance =
+        cloud_distance(&stage, &lab.engine, &sources, &set, Method::Fsm, f32::INFINITY).expect("room in scratch");
+    let tagging = tag(&stage, &lab.engine, &sources, &distance).expect("room in scratch");
     let reaches = Reaches { beta: 0.25, inner: 0.5, outer: 0.5 };
-    let mut band = make_band(&stage, &lab.engine, &distance, &tagging.level, &reaches).unwrap();
-    let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta)).unwrap();
+    let mut band = make_band(&stage, &lab.engine, &distance, &tagging.level, &reaches).expect("room in scratch");
+    let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta))
+        .expect("room in scratch");
     let (mesh, measures) = surface(&geometry, &whole(&band.u[0]));
     assert!(measures.is_closed());
     let near = PatchIndex::new(&mesh.vertices, &mesh.triangles, h).hausdorff_from(distinct(&cloud)).expect("a surface");

@@ -16,7 +16,7 @@ pub(crate) struct PlainVelocity {
 }
 
 /// The norms G1..G24, without regularisation; `u(i, j, k)` are the values around the voxel, offsets -1, 0, 1.
-#[inline(always)]
+#[inline]
 pub(crate) fn gradient_norms(u: impl Fn(i64, i64, i64) -> f64, [hj, hi, hk]: [f64; 3]) -> [f64; 24] {
     let corner = |i: i64, j: i64, k: i64| {
         0.125 * (u(0, 0, 0) + u(i, 0, 0) + u(0, j, 0) + u(0, 0, k) + u(i, j, 0) + u(i, 0, k) + u(0, j, k) + u(i, j, k))
@@ -67,13 +67,13 @@ pub(crate) fn gradient_norms(u: impl Fn(i64, i64, i64) -> f64, [hj, hi, hk]: [f6
 }
 
 /// The mean of the 24 norms, without regularisation.
-#[inline(always)]
+#[inline]
 pub(crate) fn mean_norm(norms: &[f64; 24]) -> f64 {
     norms.iter().sum::<f64>() / 24.0
 }
 
-/// The coefficients a_pq towards -x, +x, -y, +y, -z, +z; `d(q)`, `g(q)` are the differences to the six neighbours.
-#[inline(always)]
+/// The coefficients `a_pq` towards -x, +x, -y, +y, -z, +z; `d(q)`, `g(q)` are the differences to the six neighbours.
+#[inline]
 pub(crate) fn coefficients(
     norms: &[f64; 24],
     d: [f64; 6],
