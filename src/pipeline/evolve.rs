@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard};
 use crate::grid::{FACES, Slot};
 use crate::kernel::level_set::CELL;
-use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, SCHEME_LAYERS, Velocity, assemble};
+use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, SCHEME_LAYERS, SCHEME_LEN, Velocity, assemble};
 use crate::kernel::level_set::sor::{CellSums, motion, relax};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -63,12 +63,21 @@ struct Worker {
     g: HaloTile<f32>,
     mask: CellMask,
     planes: Planes,
+    scheme: Vec<f32>,
 }
 
 impl Worker {
     fn new() -> Self {
         let tile = || HaloTile::new(CELL);
-        Self { old: tile(), u: tile(), d: tile(), g: tile(), mask: CellMask::new(), planes: Planes::new() }
+        Self {
+            old: tile(),
+            u: tile(),
+            d: tile(),
+            g: tile(),
+            mask: CellMask::new(),
+            planes: Planes::new(),
+            scheme: vec![0.0; SCHEME_LEN],
+        }
     }
 }
 
@@ -90,7 +99,8 @@ struct Solver<'a> {
     spacing: [f64; 3],
     all: HaloPlan,
     faces: HaloPlan,
-    schemes: BrickArray<f32>,
+    /// The schemes of the step, where the window has room for them; else they are made again at each visit.
+    schemes: Option<BrickArray<f32>>,
     workers: Workers<Worker>,
 }
 
@@ -110,7 +120,7 @@ pub fn evolve(
     let mut done = Evolution { steps: 0, sor_iterations: 0, stopped_by: "max-steps", residual: f64::INFINITY };
     let plans = [HaloPlan::new(grid, Reach::All), HaloPlan::new(grid, Reach::Faces)];
     let mut workers = Workers::new(Worker::new);
-    let mut schemes = BrickArray::with_layers(engine.scratch(), band.solved.set(), SCHEME_LAYERS)?;
+    let mut schemes = room_for_schemes(engine, band)?;
     let mut cell_iterations = 0;
     // Cells without a solved voxel never change: both time levels hold their start.
     copy_start(stage, band)?;
@@ -136,6 +146,20 @@ pub fn evolve(
     done.sor_iterations = cell_iterations.div_ceil(band.solved.set().len().max(1) as u64);
     stage.iterated(done.sor_iterations, done.residual);
     Ok(done)
+}
+
+/// Bricks for the schemes of all cells, if they and the band fit the window together: streaming them through the disk
+/// would cost more than making them again, which gives the same bits.
+fn room_for_schemes(engine: &Engine, band: &Band) -> Result<Option<BrickArray<f32>>> {
+    // Of every voxel: two time levels, distance and edges with their faces, flags.
+    const BAND_BYTES: u64 = 4 * (4 + 2) + 1;
+    let set = band.solved.set();
+    let voxels = set.len() as u64 * set.grid().brick_len() as u64;
+    let need = voxels * (BAND_BYTES + 4 * SCHEME_LAYERS as u64);
+    if need > engine.scratch().window() {
+        return Ok(None);
+    }
+    BrickArray::with_layers(engine.scratch(), set, SCHEME_LAYERS).map(Some)
 }
 
 fn copy_start(stage: &Stage<'_>, band: &Band) -> Result<()> {
@@ -200,34 +224,42 @@ impl Solver<'_> {
         self.engine.comm().sum(&partial)
     }
 
-    /// Takes up a cell: assembles its scheme in the first round, relaxes it, writes it back.
+    /// Takes up a cell: assembles its scheme unless it was kept, relaxes it, writes it back.
     fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize, last: Visit) -> Visit {
         let [old, new] = &self.band.u;
         read_mask(&self.band.solved, slot, &mut w.mask);
         if w.mask.count == 0 {
             return Visit::default();
         }
-        let relax = |w: &mut Worker, scheme: &[f32]| {
-            relax(w.u.data_mut(), scheme, &w.mask, self.settings.omega, LOCAL_ITERATIONS)
-        };
-        let (gradient, squares) = if round == 0 {
+        if round == 0 || self.schemes.is_none() {
             self.all.gather(old, slot, Boundary::Mirror, &mut w.old);
+        }
+        if round == 0 {
             w.u.clone_from(&w.old);
             // Cells of the first colour start from old ghosts; the second colour's neighbours are already new.
             if colour == 1 {
                 self.faces.gather_halo(new, slot, Boundary::Mirror, &mut w.u);
             }
-            self.schemes.write(slot, |scheme| (self.assemble(w, slot, scheme), relax(w, scheme)))
         } else {
             self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
-            (last.gradient, self.schemes.read(slot, |scheme| relax(w, scheme)))
+        }
+        let mut scheme = std::mem::take(&mut w.scheme);
+        let (gradient, squares) = match &self.schemes {
+            None => (self.assemble(w, slot, &mut scheme), self.relax(w, &scheme)),
+            Some(kept) if round == 0 => kept.write(slot, |kept| (self.assemble(w, slot, kept), self.relax(w, kept))),
+            Some(kept) => (last.gradient, kept.read(slot, |kept| self.relax(w, kept))),
         };
+        w.scheme = scheme;
         self.faces.scatter(&w.u, new, slot);
         Visit {
             sums: old.read(slot, |old| motion(w.u.data(), old, &w.mask)),
             gradient,
             correction: (squares / f64::from(w.mask.count)).sqrt(),
         }
+    }
+
+    fn relax(&self, w: &mut Worker, scheme: &[f32]) -> f64 {
+        relax(w.u.data_mut(), scheme, &w.mask, self.settings.omega, LOCAL_ITERATIONS)
     }
 
     fn assemble(&self, w: &mut Worker, slot: Slot, scheme: &mut [f32]) -> f64 {

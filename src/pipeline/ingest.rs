@@ -1,6 +1,6 @@
 //! A stack becomes bricks: planes are decoded in parallel, a slab at a time, and written into the bricks they cross.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::intensity::GreyRange;
 use crate::error::{Error, Result};
@@ -57,19 +57,23 @@ pub fn ingest<T: Sample>(
     let plane_len = (width * height) as usize;
     let planes: Vec<i64> = (crop.lo[2]..crop.hi[2]).collect();
     let workers = Workers::new(move || vec![T::default(); plane_len]);
-    let counts = stage.run(&planes, &workers, |plane, &z| {
+    // Counts add up the same in any order, and one histogram for all planes bounds the memory.
+    let histogram = Mutex::new(Histogram::default());
+    stage.run(&planes, &workers, |plane, &z| {
         stack.read_plane(z, T::buffer(plane))?;
         let part = Box3::new([crop.lo[0], crop.lo[1], z], [crop.hi[0], crop.hi[1], z + 1]);
         let whole = Box3::new([0, 0, z], [width, height, z + 1]);
         let cropped = crop_plane(plane, &whole, &part);
         bricks.write_box(&part.translate(crop.lo.map(|v| -v)), &cropped)?;
-        Histogram::of(&cropped).ok_or_else(|| {
+        let counts = Histogram::of(&cropped).ok_or_else(|| {
             Error::input(format!(
                 "plane {z} holds a value that is no number (NaN or infinite); crop it away or repair the image"
             ))
-        })
+        })?;
+        histogram.lock().unwrap_or_else(PoisonError::into_inner).merge(counts);
+        Ok(())
     })?;
-    let histogram = counts.into_iter().reduce(Histogram::merge).unwrap_or_default();
+    let histogram = histogram.into_inner().unwrap_or_else(PoisonError::into_inner);
     stage.voxels(crop.volume());
     let range = histogram.range(percentiles);
     Ok(Image { bricks, range, extremes: [histogram.low, histogram.high] })
@@ -120,12 +124,11 @@ impl Histogram {
         Some(Self { bins: bins.into_iter().collect(), low, high })
     }
 
-    fn merge(mut self, other: Self) -> Self {
+    fn merge(&mut self, other: Self) {
         for (bin, count) in other.bins {
             *self.bins.entry(bin).or_insert(0) += count;
         }
         (self.low, self.high) = (self.low.min(other.low), self.high.max(other.high));
-        self
     }
 
     /// The values below which the given percentages lie; the extremes when those coincide.

@@ -44,6 +44,12 @@ impl Scratch {
         self.window.set_limit(bytes);
     }
 
+    /// How many bytes may be resident.
+    #[must_use]
+    pub fn window(&self) -> u64 {
+        self.window.limit()
+    }
+
     /// The folder the files are in.
     #[must_use]
     pub fn dir(&self) -> &Path {
