@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::budget::{Budget, peak_resident};
+use super::budget::{Budget, machine_memory, peak_resident};
 use super::cancel::Cancel;
 use super::comm::{Comm, SelfComm};
 use super::progress::Progress;
@@ -60,6 +60,7 @@ impl Engine {
         cancel: Cancel,
         progress: Arc<dyn Progress>,
     ) -> Result<Self> {
+        scratch.set_page_cache(machine_memory().saturating_sub(budget.total) / 2);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(|n| format!("strandline-{n}"))

@@ -44,6 +44,11 @@ impl Scratch {
         self.window.set_limit(bytes);
     }
 
+    /// Says how much scratch the system can hold in its page cache; what goes beyond is written behind.
+    pub fn set_page_cache(&self, bytes: u64) {
+        self.window.set_page_cache(bytes);
+    }
+
     /// How many bytes may be resident.
     #[must_use]
     pub fn window(&self) -> u64 {

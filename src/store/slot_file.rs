@@ -41,8 +41,10 @@ struct Mapping {
 struct Pages(Arc<Mapping>);
 
 impl Droppable for Pages {
-    fn drop_pages(&self, start: usize, len: usize) {
-        start_write_back(&self.0.file, start, len);
+    fn drop_pages(&self, start: usize, len: usize, write_back: bool) {
+        if write_back {
+            start_write_back(&self.0.file, start, len);
+        }
         // SAFETY: the mapping is shared and backed by a file, so dropped pages keep their contents in the page cache
         // and the next access maps them again; no reference into the map can see a change.
         let dropped = unsafe { self.0.raw.unchecked_advise_range(UncheckedAdvice::DontNeed, start, len) };

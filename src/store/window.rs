@@ -17,8 +17,9 @@ const REFERENCED: u8 = 2;
 
 /// A mapped file as the window sees it.
 pub(super) trait Droppable: Send + Sync {
-    /// Starts writing a range back and takes it out of memory; what it holds stays.
-    fn drop_pages(&self, start: usize, len: usize);
+    /// Takes a range out of the process's memory; what it holds stays. With `write_back` the system is asked to begin
+    /// writing it to the disk.
+    fn drop_pages(&self, start: usize, len: usize, write_back: bool);
 }
 
 /// The residency of one mapped file, cut into segments.
@@ -31,6 +32,7 @@ pub(super) struct Segments {
 
 impl Segments {
     pub(super) fn new(bytes: usize, pages: Box<dyn Droppable>, window: Arc<Window>) -> Arc<Self> {
+        window.allocated.fetch_add(bytes as u64, Relaxed);
         let states = (0..bytes.div_ceil(SEGMENT_BYTES)).map(|_| AtomicU8::new(DROPPED)).collect();
         Arc::new(Self { states, bytes, pages, window })
     }
@@ -61,7 +63,7 @@ impl Segments {
             return false;
         }
         self.states[segment].store(DROPPED, Relaxed);
-        self.pages.drop_pages(segment * SEGMENT_BYTES, self.segment_len(segment));
+        self.pages.drop_pages(segment * SEGMENT_BYTES, self.segment_len(segment), self.window.writes_behind());
         true
     }
 
@@ -71,6 +73,7 @@ impl Segments {
             .map(|s| self.segment_len(s) as u64)
             .sum();
         self.window.resident.fetch_sub(resident, Relaxed);
+        self.window.allocated.fetch_sub(self.bytes as u64, Relaxed);
     }
 }
 
@@ -84,6 +87,10 @@ impl Drop for Segments {
 pub struct Window {
     limit: AtomicU64,
     resident: AtomicU64,
+    /// Bytes of all scratch files.
+    allocated: AtomicU64,
+    /// Bytes of scratch that the system can be expected to hold in its page cache.
+    page_cache: AtomicU64,
     queue: Mutex<VecDeque<(Weak<Segments>, usize)>>,
     /// Bricks that were not resident when they were used.
     pub(super) loads: AtomicU64,
@@ -123,6 +130,8 @@ impl Window {
         Arc::new(Self {
             limit: AtomicU64::new(limit),
             resident: AtomicU64::new(0),
+            allocated: AtomicU64::new(0),
+            page_cache: AtomicU64::new(0),
             queue: Mutex::default(),
             loads: AtomicU64::new(0),
             bytes_read: AtomicU64::new(0),
@@ -134,6 +143,16 @@ impl Window {
     pub fn set_limit(&self, limit: u64) {
         self.limit.store(limit, Relaxed);
         self.shrink();
+    }
+
+    /// Says how much scratch the system can hold in its page cache. Beyond that, dropped pages are written to the disk
+    /// at once, so that they are clean when memory runs short; below it, writing them would only cost time.
+    pub fn set_page_cache(&self, bytes: u64) {
+        self.page_cache.store(bytes, Relaxed);
+    }
+
+    fn writes_behind(&self) -> bool {
+        self.allocated.load(Relaxed) > self.page_cache.load(Relaxed)
     }
 
     /// How many bytes may be resident.

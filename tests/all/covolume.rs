@@ -3,7 +3,7 @@
 
 use strandline::kernel::image::edge_detector::edge_detector;
 use strandline::kernel::level_set::covolume::{
-    CellMask, Coefficients, Fields, Planes, Velocity, assemble, mean_gradient,
+    CellMask, Fields, Planes, SCHEME_LEN, Velocity, assemble, mean_gradient,
 };
 use strandline::kernel::level_set::{CELL, CELL_LEN};
 
@@ -27,6 +27,12 @@ struct Scene {
 /// Values as f32 would hold them, so that both sides start from the same.
 fn rounded(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values.map(|v| f64::from(v as f32)).collect()
+}
+
+/// A scheme as the kernel gives it, and the sum of gradient norms.
+struct Scheme {
+    values: Vec<f32>,
+    gradient_sum: f64,
 }
 
 impl Scene {
@@ -88,12 +94,13 @@ impl Scene {
         gradient_norms(value, spacing)
     }
 
-    fn assembled(&self, velocity: &PlainVelocity) -> Coefficients {
+    fn assembled(&self, velocity: &PlainVelocity) -> Scheme {
         let [u, d, g] = [0, 1, 2].map(|f| self.grown(f));
         let fields = Fields { u: &u, d: &d, g: if velocity.rho == 0.0 { &[] } else { &g } };
-        let mut out = Coefficients::new();
-        assemble(fields, &self.mask(), self.spacing, &single(velocity), &mut Planes::new(), &mut out);
-        out
+        let mut values = vec![0.0; SCHEME_LEN];
+        let mask = self.mask();
+        let gradient_sum = assemble(fields, &mask, self.spacing, &single(velocity), &mut Planes::new(), &mut values);
+        Scheme { values, gradient_sum }
     }
 
     /// Compares weights, right side and the sum of gradient norms with the printed scheme, relative to `tolerance`.
@@ -108,13 +115,14 @@ impl Scene {
             let diagonal = 1.0 - (0..6).filter(|&q| inside[q]).map(|q| a[q]).sum::<f64>();
             for q in 0..6 {
                 let expected = if inside[q] { -a[q] / diagonal } else { 0.0 };
-                let found = f64::from(out.weights[q][at]);
+                let found = f64::from(out.values[q * CELL_LEN + at]);
                 assert!(
                     (found - expected).abs() <= tolerance * expected + 1e-7,
                     "weight {q} of {v:?}: {found} for {expected}, {velocity:?}"
                 );
             }
-            let (found, expected) = (f64::from(out.right[at]), self.fields[0][self.grid.at(v)] / diagonal);
+            let (found, expected) =
+                (f64::from(out.values[6 * CELL_LEN + at]), self.fields[0][self.grid.at(v)] / diagonal);
             assert!((found - expected).abs() <= tolerance * expected, "right of {v:?}: {found} for {expected}");
             sum += velocity.epsilon.hypot(mean_norm(&norms));
         }
@@ -187,12 +195,12 @@ fn voxels_that_are_held_keep_their_value() {
     let mask = scene.mask();
     let mut held = 0;
     for (v, at) in scene.cell().filter(|(_, at)| mask.solved[*at] == 0) {
-        assert!(out.weights.iter().all(|w| w[at] == 0.0), "{v:?}");
         // Rows without any solved voxel are not assembled; nobody reads them.
         let y = at / CELL % CELL;
         let z = at / (CELL * CELL);
-        if (mask.rows[0]..mask.rows[1]).contains(&y) && (mask.planes[0]..mask.planes[1]).contains(&z) {
-            assert_eq!(out.right[at], scene.fields[0][scene.grid.at(v)] as f32, "{v:?}");
+        if (mask.rows[z][0]..mask.rows[z][1]).contains(&y) {
+            assert!((0..6).all(|q| out.values[q * CELL_LEN + at] == 0.0), "{v:?}");
+            assert_eq!(out.values[6 * CELL_LEN + at], scene.fields[0][scene.grid.at(v)] as f32, "{v:?}");
             held += 1;
         }
     }

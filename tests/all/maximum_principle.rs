@@ -2,7 +2,7 @@
 //! before for any tau and eps, constants stay; and against the linear system of the printed scheme in f64.
 
 use proptest::prelude::*;
-use strandline::kernel::level_set::covolume::{CellMask, Coefficients, Fields, Planes, Velocity, assemble};
+use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, SCHEME_LEN, Velocity, assemble};
 use strandline::kernel::level_set::sor::relax;
 use strandline::kernel::level_set::{CELL, CELL_LEN};
 use strandline::pipeline::evolve::{Evolution, Stop, TimeLoop, evolve};
@@ -171,7 +171,7 @@ proptest! {
         let (mut u, d, g) = (grown(&problem.u), grown(&problem.d), grown(&problem.g));
         let mut mask = CellMask::new();
         mask.set(&problem.solved, [CELL; 3], [[true; 2]; 3]);
-        let mut scheme = Coefficients::new();
+        let mut scheme = vec![0.0; SCHEME_LEN];
         let fields = Fields { u: &u, d: &d, g: &g };
         assemble(fields, &mask, problem.spacing, &problem.single(), &mut Planes::new(), &mut scheme);
         let mut corrections = f64::INFINITY;
