@@ -57,7 +57,7 @@ pub fn ingest<T: Sample>(
     let plane_len = (width * height) as usize;
     let planes: Vec<i64> = (crop.lo[2]..crop.hi[2]).collect();
     let workers = Workers::new(move || vec![T::default(); plane_len]);
-    let counts = stage.run(&planes, &workers, |plane, &z| {
+    let read = |plane: &mut Vec<T>, &z: &i64| {
         stack.read_plane(z, T::buffer(plane))?;
         let part = Box3::new([crop.lo[0], crop.lo[1], z], [crop.hi[0], crop.hi[1], z + 1]);
         let whole = Box3::new([0, 0, z], [width, height, z + 1]);
@@ -68,8 +68,12 @@ pub fn ingest<T: Sample>(
                 "plane {z} holds a value that is no number (NaN or infinite); crop it away or repair the image"
             ))
         })
-    })?;
-    let histogram = counts.into_iter().reduce(Histogram::merge).unwrap_or_default();
+    };
+    // A histogram can take a megabyte: those of a few planes are added up before more are made.
+    let mut histogram = Histogram::default();
+    for batch in planes.chunks(8 * engine.threads()) {
+        histogram = stage.run(batch, &workers, read)?.into_iter().fold(histogram, Histogram::merge);
+    }
     stage.voxels(crop.volume());
     let range = histogram.range(percentiles);
     Ok(Image { bricks, range, extremes: [histogram.low, histogram.high] })

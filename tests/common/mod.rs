@@ -1,5 +1,6 @@
 //! Shapes, files and slow plain references that several tests share.
 
+pub(crate) mod ball;
 pub(crate) mod npy;
 pub(crate) mod random;
 pub(crate) mod tiff_bytes;
