@@ -2,7 +2,7 @@
 #![allow(missing_docs)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use strandline::kernel::level_set::covolume::{CellMask, Coefficients, Fields, Planes, Velocity, assemble};
+use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, SCHEME_LEN, Velocity, assemble};
 use strandline::kernel::level_set::{CELL_LEN, sor};
 
 fn level_set(c: &mut Criterion) {
@@ -13,7 +13,7 @@ fn level_set(c: &mut Criterion) {
     let mut mask = CellMask::new();
     mask.set(&[1; CELL_LEN], [16; 3], [[false; 2]; 3]);
     let velocity = Velocity { theta: 1.0, rho: 0.5, delta: 0.1, epsilon: 0.01, tau: 1.0, normalised: true };
-    let (mut work, mut scheme) = (Planes::new(), Coefficients::new());
+    let (mut work, mut scheme) = (Planes::new(), vec![0.0; SCHEME_LEN]);
     let mut group = c.benchmark_group("level_set");
     group.throughput(Throughput::Elements(CELL_LEN as u64));
     let fields = Fields { u: &u, d: &d, g: &g };

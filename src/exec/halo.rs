@@ -93,7 +93,7 @@ impl HaloPlan {
             for z in 0..valid[2] {
                 for y in 0..valid[1] {
                     let from = tile.at(0, y as isize, z as isize);
-                    brick[(z * edge + y) * edge..][..valid[0]].copy_from_slice(&tile.data()[from..][..valid[0]]);
+                    copy_row(&mut brick[(z * edge + y) * edge..][..valid[0]], &tile.data()[from..][..valid[0]]);
                 }
             }
         });
@@ -131,8 +131,20 @@ impl HaloPlan {
                 1 => z0 * edge + x0,
                 _ => y0 * edge + x0,
             } as usize;
-            tile.data_mut()[to..][..width].copy_from_slice(&face[from..][..width]);
+            copy_row(&mut tile.data_mut()[to..][..width], &face[from..][..width]);
         }
+    }
+}
+
+/// Copies a row. Rows of a whole cell, by far the most, and single ghosts are copied without a call.
+#[inline(always)]
+fn copy_row<T: Copy>(to: &mut [T], from: &[T]) {
+    if let (Ok(to), Ok(from)) = (<&mut [T; 16]>::try_from(&mut *to), <&[T; 16]>::try_from(from)) {
+        *to = *from;
+    } else if let ([to], [from]) = (&mut *to, from) {
+        *to = *from;
+    } else {
+        to.copy_from_slice(from);
     }
 }
 
@@ -158,7 +170,7 @@ fn copy_brick<T: Element>(brick: &[T], shape: [usize; 3], tile: &mut HaloTile<T>
     for z in 0..shape[2] {
         for y in 0..shape[1] {
             let to = tile.at(0, y as isize, z as isize);
-            tile.data_mut()[to..][..shape[0]].copy_from_slice(&brick[(z * edge + y) * edge..][..shape[0]]);
+            copy_row(&mut tile.data_mut()[to..][..shape[0]], &brick[(z * edge + y) * edge..][..shape[0]]);
         }
     }
 }
@@ -178,8 +190,8 @@ fn scatter_faces<T: Element>(tile: &HaloTile<T>, faces: &mut [T]) {
             let out = &mut out[row * edge..][..width];
             match face.axis {
                 0 => out.iter_mut().enumerate().for_each(|(y, v)| *v = tile.data()[tile.at(layer, y as isize, r)]),
-                1 => out.copy_from_slice(&tile.data()[tile.at(0, layer, r)..][..width]),
-                _ => out.copy_from_slice(&tile.data()[tile.at(0, r, layer)..][..width]),
+                1 => copy_row(out, &tile.data()[tile.at(0, layer, r)..][..width]),
+                _ => copy_row(out, &tile.data()[tile.at(0, r, layer)..][..width]),
             }
         }
     }

@@ -1,15 +1,14 @@
 //! The time loop of the level set over the cells of the band (algorithms: section 5, "Time loop"; section 10).
 //!
 //! A step assembles the scheme of each cell from the old values and relaxes it; cells of even and odd parity take
-//! turns until the corrections are small. Coefficients are made anew at each visit: that costs less than moving
-//! them through memory, and a cell's whole work stays in cache.
+//! turns, and those that needed corrections are taken up again until the corrections are small.
 
 use super::band::{Band, read_mask};
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard};
-use crate::grid::Slot;
+use crate::grid::{FACES, Slot};
 use crate::kernel::level_set::CELL;
-use crate::kernel::level_set::covolume::{CellMask, Coefficients, Fields, Planes, Velocity, assemble};
+use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, SCHEME_LAYERS, SCHEME_LEN, Velocity, assemble};
 use crate::kernel::level_set::sor::{CellSums, motion, relax};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -34,7 +33,8 @@ pub struct TimeLoop {
     pub max_steps: u32,
     /// Over-relaxation.
     pub omega: f32,
-    /// A step is solved when the root mean square of the corrections is below this.
+    /// A step is solved when no cell needed corrections above this (root mean square) when it was last taken up; what is
+    /// left then is about a tenth.
     pub solver_tolerance: f64,
 }
 
@@ -43,7 +43,7 @@ pub struct TimeLoop {
 pub struct Evolution {
     /// Steps taken.
     pub steps: u32,
-    /// Relaxations of each cell, all steps together.
+    /// Relaxations of a cell, all steps together, mean over the cells.
     pub sor_iterations: u64,
     /// Which rule ended it.
     pub stopped_by: &'static str,
@@ -51,8 +51,8 @@ pub struct Evolution {
     pub residual: f64,
 }
 
-/// Relaxations of a cell each time it is taken up.
-const LOCAL_ITERATIONS: usize = 2;
+/// Relaxations of a cell each time it is taken up: enough to shrink its corrections about tenfold.
+const LOCAL_ITERATIONS: usize = 3;
 /// Visits of a cell in one step at most; the tolerance is reached long before.
 const MAX_VISITS: usize = 30;
 
@@ -63,7 +63,7 @@ struct Worker {
     g: HaloTile<f32>,
     mask: CellMask,
     planes: Planes,
-    scheme: Coefficients,
+    scheme: Vec<f32>,
 }
 
 impl Worker {
@@ -76,7 +76,7 @@ impl Worker {
             g: tile(),
             mask: CellMask::new(),
             planes: Planes::new(),
-            scheme: Coefficients::new(),
+            scheme: vec![0.0; SCHEME_LEN],
         }
     }
 }
@@ -86,6 +86,8 @@ impl Worker {
 struct Visit {
     sums: CellSums,
     gradient: f64,
+    /// Root mean square of the first corrections: how far from solved the cell was when it was taken up.
+    correction: f64,
 }
 
 struct Solver<'a> {
@@ -97,6 +99,8 @@ struct Solver<'a> {
     spacing: [f64; 3],
     all: HaloPlan,
     faces: HaloPlan,
+    /// The schemes of the step, where the window has room for them; else they are made again at each visit.
+    schemes: Option<BrickArray<f32>>,
     workers: Workers<Worker>,
 }
 
@@ -116,16 +120,18 @@ pub fn evolve(
     let mut done = Evolution { steps: 0, sor_iterations: 0, stopped_by: "max-steps", residual: f64::INFINITY };
     let plans = [HaloPlan::new(grid, Reach::All), HaloPlan::new(grid, Reach::Faces)];
     let mut workers = Workers::new(Worker::new);
+    let mut schemes = room_for_schemes(engine, band)?;
+    let mut cell_iterations = 0;
     // Cells without a solved voxel never change: both time levels hold their start.
     copy_start(stage, band)?;
     while done.steps < settings.max_steps {
         let [all, faces] = plans.clone();
-        let solver = Solver { engine, stage, band, edges, settings, spacing, all, faces, workers };
+        let solver = Solver { engine, stage, band, edges, settings, spacing, all, faces, schemes, workers };
         let (step, visits) = solver.step()?;
-        workers = solver.workers;
+        (schemes, workers) = (solver.schemes, solver.workers);
         band.u.swap(0, 1);
         done.steps += 1;
-        done.sor_iterations += visits * LOCAL_ITERATIONS as u64;
+        cell_iterations += visits * LOCAL_ITERATIONS as u64;
         let (residual, limit, name) = match settings.stop {
             Stop::Surface(limit) => (step.speed, limit, "surface"),
             Stop::L2(limit) => (step.l2, limit, "l2"),
@@ -136,8 +142,24 @@ pub fn evolve(
             break;
         }
     }
+    // Cells are relaxed as often as they need: reported is the mean over all of them.
+    done.sor_iterations = cell_iterations.div_ceil(band.solved.set().len().max(1) as u64);
     stage.iterated(done.sor_iterations, done.residual);
     Ok(done)
+}
+
+/// Bricks for the schemes of all cells, if they and the band fit the window together: streaming them through the disk
+/// would cost more than making them again, which gives the same bits.
+fn room_for_schemes(engine: &Engine, band: &Band) -> Result<Option<BrickArray<f32>>> {
+    // Of every voxel: two time levels, distance and edges with their faces, flags.
+    const BAND_BYTES: u64 = 4 * (4 + 2) + 1;
+    let set = band.solved.set();
+    let voxels = set.len() as u64 * set.grid().brick_len() as u64;
+    let need = voxels * (BAND_BYTES + 4 * SCHEME_LAYERS as u64);
+    if need > engine.scratch().window() {
+        return Ok(None);
+    }
+    BrickArray::with_layers(engine.scratch(), set, SCHEME_LAYERS).map(Some)
 }
 
 fn copy_start(stage: &Stage<'_>, band: &Band) -> Result<()> {
@@ -160,23 +182,26 @@ struct Step {
 }
 
 impl Solver<'_> {
-    /// One time step from `band.u[0]` to `band.u[1]`; returns its motion and how often each cell was visited.
+    /// One time step from `band.u[0]` to `band.u[1]`; returns its motion and the number of visits.
+    ///
+    /// All cells are taken up once; then again those that needed corrections, and their neighbours.
     fn step(&self) -> Result<(Step, u64)> {
         let set = self.band.solved.set();
-        let waves = checkerboard(set, |_| true);
         let mut visits = vec![Visit::default(); set.len()];
-        let mut rounds = 0;
-        loop {
-            for (colour, wave) in waves.iter().enumerate() {
-                let results = self
-                    .stage
-                    .run(wave, &self.workers, |worker, &slot| Ok(self.visit(worker, slot, rounds, colour)))?;
+        let mut due = vec![true; set.len()];
+        let mut visited = 0;
+        for round in 0..MAX_VISITS {
+            for (colour, wave) in checkerboard(set, |slot| due[slot as usize]).iter().enumerate() {
+                let results = self.stage.run(wave, &self.workers, |worker, &slot| {
+                    Ok(self.visit(worker, slot, round, colour, visits[slot as usize]))
+                })?;
                 self.engine.comm().publish_faces(wave)?;
                 wave.iter().zip(results).for_each(|(&slot, visit)| visits[slot as usize] = visit);
+                visited += wave.len() as u64;
             }
-            rounds += 1;
-            let correction = self.sum(&visits, |v| v.sums.correction_squared)? / self.band.voxels.max(1) as f64;
-            if correction.sqrt() < self.settings.solver_tolerance || rounds >= MAX_VISITS {
+            let unsolved = |slot: Slot| visits[slot as usize].correction > self.settings.solver_tolerance;
+            due = (0..set.len() as Slot).map(|slot| unsolved(slot) || self.beside(slot).any(&unsolved)).collect();
+            if !due.contains(&true) {
                 break;
             }
         }
@@ -185,7 +210,12 @@ impl Solver<'_> {
         let swept = self.sum(&visits, |v| v.sums.moved)? * volume;
         let l2 = (self.sum(&visits, |v| v.sums.moved_squared)? * volume).sqrt();
         let speed = swept / (area * f64::from(self.settings.velocity.tau)).max(f64::MIN_POSITIVE);
-        Ok((Step { speed, l2 }, rounds as u64))
+        Ok((Step { speed, l2 }, visited))
+    }
+
+    /// The cells that share a face with one.
+    fn beside(&self, slot: Slot) -> impl Iterator<Item = Slot> + '_ {
+        FACES.into_iter().filter_map(move |face| self.band.solved.set().neighbour(slot, face.offset()))
     }
 
     /// Sums over cells in grid order.
@@ -194,20 +224,16 @@ impl Solver<'_> {
         self.engine.comm().sum(&partial)
     }
 
-    /// Assembles a cell's scheme, relaxes it, writes it back.
-    fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) -> Visit {
+    /// Takes up a cell: assembles its scheme unless it was kept, relaxes it, writes it back.
+    fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize, last: Visit) -> Visit {
         let [old, new] = &self.band.u;
         read_mask(&self.band.solved, slot, &mut w.mask);
         if w.mask.count == 0 {
             return Visit::default();
         }
-        self.all.gather(old, slot, Boundary::Mirror, &mut w.old);
-        self.faces.gather(&self.band.distance, slot, Boundary::Mirror, &mut w.d);
-        if let Some(edges) = self.edges {
-            self.faces.gather(edges, slot, Boundary::Mirror, &mut w.g);
+        if round == 0 || self.schemes.is_none() {
+            self.all.gather(old, slot, Boundary::Mirror, &mut w.old);
         }
-        let fields = Fields { u: w.old.data(), d: w.d.data(), g: w.g.data() };
-        assemble(fields, &w.mask, self.spacing, &self.settings.velocity, &mut w.planes, &mut w.scheme);
         if round == 0 {
             w.u.clone_from(&w.old);
             // Cells of the first colour start from old ghosts; the second colour's neighbours are already new.
@@ -217,8 +243,31 @@ impl Solver<'_> {
         } else {
             self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
         }
-        let correction = relax(w.u.data_mut(), &w.scheme, &w.mask, self.settings.omega, LOCAL_ITERATIONS);
+        let mut scheme = std::mem::take(&mut w.scheme);
+        let (gradient, squares) = match &self.schemes {
+            None => (self.assemble(w, slot, &mut scheme), self.relax(w, &scheme)),
+            Some(kept) if round == 0 => kept.write(slot, |kept| (self.assemble(w, slot, kept), self.relax(w, kept))),
+            Some(kept) => (last.gradient, kept.read(slot, |kept| self.relax(w, kept))),
+        };
+        w.scheme = scheme;
         self.faces.scatter(&w.u, new, slot);
-        Visit { sums: motion(w.u.data(), w.old.data(), &w.mask, correction), gradient: w.scheme.gradient_sum }
+        Visit {
+            sums: old.read(slot, |old| motion(w.u.data(), old, &w.mask)),
+            gradient,
+            correction: (squares / f64::from(w.mask.count)).sqrt(),
+        }
+    }
+
+    fn relax(&self, w: &mut Worker, scheme: &[f32]) -> f64 {
+        relax(w.u.data_mut(), scheme, &w.mask, self.settings.omega, LOCAL_ITERATIONS)
+    }
+
+    fn assemble(&self, w: &mut Worker, slot: Slot, scheme: &mut [f32]) -> f64 {
+        self.faces.gather(&self.band.distance, slot, Boundary::Mirror, &mut w.d);
+        if let Some(edges) = self.edges {
+            self.faces.gather(edges, slot, Boundary::Mirror, &mut w.g);
+        }
+        let fields = Fields { u: w.old.data(), d: w.d.data(), g: w.g.data() };
+        assemble(fields, &w.mask, self.spacing, &self.settings.velocity, &mut w.planes, scheme)
     }
 }

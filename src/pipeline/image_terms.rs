@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
 use crate::grid::{BrickSet, Slot};
 use crate::kernel::image::{edge_detector::edge_detector, heat};
-use crate::kernel::level_set::covolume::{CellMask, Coefficients, Planes};
+use crate::kernel::level_set::covolume::{CellMask, Planes, SCHEME_LEN};
 use crate::kernel::level_set::sor::relax;
 use crate::kernel::level_set::{CELL, CELL_LEN};
 use crate::store::{BoxSource, BrickArray};
@@ -59,7 +59,10 @@ pub fn edges(
 }
 
 /// One implicit step of the heat equation on the cells within five sigma of the band.
-fn presmooth(
+///
+/// # Errors
+/// When the image cannot be read, scratch runs out or the run is interrupted.
+pub fn presmooth(
     stage: &Stage<'_>,
     engine: &Engine,
     image: &dyn BoxSource<f32>,
@@ -107,7 +110,7 @@ fn relax_heat(
     sigma: f64,
 ) -> Result<()> {
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
-    let workers = Workers::new(|| (HaloTile::new(CELL), CellMask::new(), Coefficients::new()));
+    let workers = Workers::new(|| (HaloTile::new(CELL), CellMask::new(), vec![0.0; SCHEME_LEN]));
     let waves = checkerboard(set, |_| true);
     let voxels = (set.len() * CELL_LEN) as f64;
     for round in 1..=HEAT_ROUNDS {

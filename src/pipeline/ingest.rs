@@ -1,6 +1,6 @@
 //! A stack becomes bricks: planes are decoded in parallel, a slab at a time, and written into the bricks they cross.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::intensity::GreyRange;
 use crate::error::{Error, Result};
@@ -57,16 +57,23 @@ pub fn ingest<T: Sample>(
     let plane_len = (width * height) as usize;
     let planes: Vec<i64> = (crop.lo[2]..crop.hi[2]).collect();
     let workers = Workers::new(move || vec![T::default(); plane_len]);
+<<<<<<< HEAD
     let read = |plane: &mut Vec<T>, &z: &i64| {
+=======
+    // Counts add up the same in any order, and one histogram for all planes bounds the memory.
+    let histogram = Mutex::new(Histogram::default());
+    stage.run(&planes, &workers, |plane, &z| {
+>>>>>>> 8b5089f34aec4fe096aff3d8f41d036c40673e34
         stack.read_plane(z, T::buffer(plane))?;
         let part = Box3::new([crop.lo[0], crop.lo[1], z], [crop.hi[0], crop.hi[1], z + 1]);
         let whole = Box3::new([0, 0, z], [width, height, z + 1]);
         let cropped = crop_plane(plane, &whole, &part);
         bricks.write_box(&part.translate(crop.lo.map(|v| -v)), &cropped)?;
-        Histogram::of(&cropped).ok_or_else(|| {
+        let counts = Histogram::of(&cropped).ok_or_else(|| {
             Error::input(format!(
                 "plane {z} holds a value that is no number (NaN or infinite); crop it away or repair the image"
             ))
+<<<<<<< HEAD
         })
     };
     // A histogram can take a megabyte: those of a few planes are added up before more are made.
@@ -74,6 +81,13 @@ pub fn ingest<T: Sample>(
     for batch in planes.chunks(8 * engine.threads()) {
         histogram = stage.run(batch, &workers, read)?.into_iter().fold(histogram, Histogram::merge);
     }
+=======
+        })?;
+        histogram.lock().unwrap_or_else(PoisonError::into_inner).merge(counts);
+        Ok(())
+    })?;
+    let histogram = histogram.into_inner().unwrap_or_else(PoisonError::into_inner);
+>>>>>>> 8b5089f34aec4fe096aff3d8f41d036c40673e34
     stage.voxels(crop.volume());
     let range = histogram.range(percentiles);
     Ok(Image { bricks, range, extremes: [histogram.low, histogram.high] })
@@ -124,12 +138,11 @@ impl Histogram {
         Some(Self { bins: bins.into_iter().collect(), low, high })
     }
 
-    fn merge(mut self, other: Self) -> Self {
+    fn merge(&mut self, other: Self) {
         for (bin, count) in other.bins {
             *self.bins.entry(bin).or_insert(0) += count;
         }
         (self.low, self.high) = (self.low.min(other.low), self.high.max(other.high));
-        self
     }
 
     /// The values below which the given percentages lie; the extremes when those coincide.

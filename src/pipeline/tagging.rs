@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::distance::Sources;
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
-use crate::grid::{BrickId, BrickSet, FACES, Slot};
+use crate::grid::{BrickId, BrickSet, FACES, Face, Slot};
 use crate::kernel::level_set::basins::{self, Piece};
 use crate::kernel::level_set::flood;
 use crate::store::BrickArray;
@@ -45,8 +45,8 @@ pub struct Tagging {
 pub fn tag(stage: &Stage<'_>, engine: &Engine, sources: &Sources<'_>, distance: &BrickArray<f32>) -> Result<Tagging> {
     let mut far = FarRegions::new(distance.set(), distance.absent(0));
     let level = flood_all(stage, engine, distance, &mut far)?;
-    let mut basins = find_basins(stage, engine, distance, &level, &far)?;
-    locate_saddles(stage, sources, distance, &level, &mut basins)?;
+    let (mut basins, pieces) = find_basins(stage, engine, distance, &level, &far)?;
+    locate_saddles(stage, sources, [distance, &level], &pieces, &mut basins)?;
     basins.sort_by(|a, b| b.depth.total_cmp(&a.depth).then(b.voxels.cmp(&a.voxels)));
     Ok(Tagging { level, basins })
 }
@@ -170,7 +170,7 @@ fn find_basins(
     distance: &BrickArray<f32>,
     level: &BrickArray<f32>,
     far: &FarRegions,
-) -> Result<Vec<Basin>> {
+) -> Result<(Vec<Basin>, Pieces)> {
     let set = distance.set();
     let labels: BrickArray<u16> = BrickArray::with_faces(engine.scratch(), set)?;
     let edge = set.grid().edge() as usize;
@@ -220,7 +220,38 @@ fn find_basins(
             }
         }
     }
-    Ok(persisting(&pieces, &mut join))
+    let (basins, basin) = persisting(&pieces, &mut join);
+    let far = (0..set.grid().len()).map(|id| far_first.wrapping_add(far.region[id as usize])).collect();
+    Ok((basins, Pieces { labels, first, far, basin }))
+}
+
+/// The labelled pieces and the basins they belong to.
+struct Pieces {
+    /// Labels within each brick, from 1 on; 0 is no piece.
+    labels: BrickArray<u16>,
+    /// The piece that label 1 of each slot stands for.
+    first: Vec<u32>,
+    /// The piece that each brick which is not stored belongs to; meaningless for stored ones.
+    far: Vec<u32>,
+    /// The basin of each piece, where it persists.
+    basin: Vec<Option<u32>>,
+}
+
+impl Pieces {
+    /// The basin that a label of a slot's brick belongs to.
+    fn basin(&self, slot: Slot, label: u16) -> Option<u32> {
+        (label != 0).then(|| self.basin[(self.first[slot as usize] + u32::from(label) - 1) as usize]).flatten()
+    }
+
+    /// The basin beyond a face of a slot's brick, beside a ghost with the given label.
+    fn basin_beyond(&self, slot: Slot, face: Face, label: u16) -> Option<u32> {
+        let set = self.labels.set();
+        let id = set.grid().neighbour(set.id(slot), face.offset())?;
+        match set.slot(id) {
+            Some(neighbour) => self.basin(neighbour, label),
+            None => self.basin[self.far[id as usize] as usize],
+        }
+    }
 }
 
 /// Joins the labelled voxels of a face with the far region beyond it, where that is a basin.
@@ -238,64 +269,87 @@ fn join_far(
     }
 }
 
-/// Adds up the joined pieces and keeps the basins that persist.
-fn persisting(pieces: &[Piece], join: &mut DisjointSets) -> Vec<Basin> {
+/// Adds up the joined pieces and keeps the basins that persist; tells for each piece which one it is part of.
+fn persisting(pieces: &[Piece], join: &mut DisjointSets) -> (Vec<Basin>, Vec<Option<u32>>) {
     let mut whole: Vec<Piece> = pieces.to_vec();
-    for n in 0..pieces.len() as u32 {
-        let root = join.find(n);
-        if root != n {
-            let piece = pieces[n as usize];
-            let sum = &mut whole[root as usize];
-            sum.voxels += piece.voxels;
-            sum.depth = sum.depth.max(piece.depth);
+    let roots: Vec<u32> = (0..pieces.len() as u32).map(|n| join.find(n)).collect();
+    for (n, &root) in roots.iter().enumerate().filter(|(n, root)| *n as u32 != **root) {
+        let sum = &mut whole[root as usize];
+        sum.voxels += pieces[n].voxels;
+        sum.depth = sum.depth.max(pieces[n].depth);
+    }
+    let (mut basins, mut names) = (Vec::new(), vec![None; pieces.len()]);
+    for (n, p) in whole.iter().enumerate().filter(|(n, _)| roots[*n] == *n as u32) {
+        if p.depth > 0.0 && p.depth >= PERSISTENCE * p.saddle {
+            names[n] = Some(basins.len() as u32);
+            basins.push(Basin { voxels: p.voxels, depth: p.depth, saddle: p.saddle, place: [0; 3] });
         }
     }
-    (0..pieces.len() as u32)
-        .filter(|&n| join.find(n) == n)
-        .map(|n| whole[n as usize])
-        .filter(|p| p.depth > 0.0 && p.depth >= PERSISTENCE * p.saddle)
-        .map(|p| Basin { voxels: p.voxels, depth: p.depth, saddle: p.saddle, place: [0; 3] })
-        .collect()
+    let basin = roots.iter().map(|&root| names[root as usize]).collect();
+    (basins, basin)
 }
 
-/// Finds the first voxel in grid order that has the saddle's value both in d and in b: where the flood enters.
+/// Finds where the flood enters each basin: the first voxel in grid order that lies beside it and has the saddle's
+/// value both in d and in b. The value alone would not do: equal objects have equal saddles.
 fn locate_saddles(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
-    distance: &BrickArray<f32>,
-    level: &BrickArray<f32>,
+    [distance, level]: [&BrickArray<f32>; 2],
+    pieces: &Pieces,
     basins: &mut [Basin],
 ) -> Result<()> {
     let set = distance.set();
-    let wanted: Vec<f32> = basins.iter().map(|b| b.saddle).collect();
-    let edge = set.grid().edge();
-    let found = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
-        let part = set.grid().brick_box(set.id(slot));
-        let mut places = vec![None; wanted.len()];
-        distance.read(slot, |d| {
-            level.read(slot, |b| {
-                for (y, z) in part.rows() {
-                    let row = (((z - part.lo[2]) * edge + y - part.lo[1]) * edge) as usize;
-                    for x in 0..(part.hi[0] - part.lo[0]) {
-                        let at = row + x as usize;
-                        if d[at] == b[at] {
-                            for (n, _) in wanted.iter().enumerate().filter(|(_, w)| **w == d[at]) {
-                                places[n].get_or_insert([part.lo[0] + x, y, z]);
-                            }
-                        }
-                    }
-                }
-            });
-        });
-        Ok(places)
+    let plan = HaloPlan::new(*set.grid(), Reach::Faces);
+    let edge = set.grid().edge() as usize;
+    let saddles: Vec<f32> = basins.iter().map(|b| b.saddle).collect();
+    let found = stage.run(&one_wave(set), &Workers::new(move || HaloTile::new(edge)), |labels, &slot| {
+        if saddles.is_empty() {
+            return Ok(Vec::new());
+        }
+        plan.gather(&pieces.labels, slot, Boundary::Constant(0), labels);
+        Ok(distance.read(slot, |d| level.read(slot, |b| entries(labels, slot, d, b, pieces, &saddles))))
     })?;
     let order = |v: &[i64; 3]| sources.geometry.domain().offset_of(*v);
     for (n, basin) in basins.iter_mut().enumerate() {
-        if let Some(place) = found.iter().filter_map(|places| places[n]).min_by_key(order) {
+        let places = found.iter().flatten().filter(|(name, _)| *name == n as u32);
+        if let Some(place) = places.map(|(_, place)| *place).min_by_key(order) {
             basin.place = place;
         }
     }
     Ok(())
+}
+
+/// The voxels of one brick through which the flood may enter a basin.
+fn entries(
+    labels: &HaloTile<u16>,
+    slot: Slot,
+    d: &[f32],
+    b: &[f32],
+    pieces: &Pieces,
+    saddles: &[f32],
+) -> Vec<(u32, [i64; 3])> {
+    let set = pieces.labels.set();
+    let (edge, part) = (labels.edge(), set.grid().brick_box(set.id(slot)));
+    let mut found = Vec::new();
+    for (y, z) in part.translate(part.lo.map(|v| -v)).rows() {
+        for x in 0..part.shape()[0] {
+            let value = d[(z as usize * edge + y as usize) * edge + x as usize];
+            if value != b[(z as usize * edge + y as usize) * edge + x as usize] || !saddles.contains(&value) {
+                continue;
+            }
+            for face in FACES {
+                let beside: [i64; 3] = std::array::from_fn(|a| [x, y, z][a] + face.offset()[a]);
+                let [i, j, k] = beside.map(|v| v as isize);
+                let label = labels.data()[labels.at(i, j, k)];
+                let inside = (0..3).all(|a| 0 <= beside[a] && beside[a] < part.shape()[a]);
+                let basin = if inside { pieces.basin(slot, label) } else { pieces.basin_beyond(slot, face, label) };
+                if let Some(basin) = basin.filter(|&n| saddles[n as usize] == value) {
+                    found.push((basin, std::array::from_fn(|a| part.lo[a] + [x, y, z][a])));
+                }
+            }
+        }
+    }
+    found
 }
 
 /// Disjoint sets with path halving.

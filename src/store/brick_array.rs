@@ -44,6 +44,12 @@ impl Scratch {
         self.window.set_limit(bytes);
     }
 
+    /// How many bytes may be resident.
+    #[must_use]
+    pub fn window(&self) -> u64 {
+        self.window.limit()
+    }
+
     /// The folder the files are in.
     #[must_use]
     pub fn dir(&self) -> &Path {
@@ -54,6 +60,8 @@ impl Scratch {
 /// One field over a set of bricks.
 pub struct BrickArray<T: Element> {
     set: Arc<BrickSet>,
+    /// Values of one brick, all layers together.
+    brick_len: usize,
     bricks: SlotFile<T>,
     faces: Option<SlotFile<T>>,
     absent: Vec<T>,
@@ -65,8 +73,19 @@ impl<T: Element> BrickArray<T> {
     /// # Errors
     /// When the scratch folder cannot hold it.
     pub fn new(scratch: &Scratch, set: &Arc<BrickSet>) -> Result<Self> {
-        let bricks = SlotFile::create(&scratch.dir, &scratch.window, set.grid().brick_len(), set.len())?;
-        Ok(Self { set: set.clone(), bricks, faces: None, absent: vec![T::default(); set.grid().len() as usize] })
+        Self::with_layers(scratch, set, 1)
+    }
+
+    /// A field of several values per voxel, `[layer][z][y][x]` in each brick, without faces. Boxes are read from and
+    /// written to the first layer.
+    ///
+    /// # Errors
+    /// When the scratch folder cannot hold it.
+    pub fn with_layers(scratch: &Scratch, set: &Arc<BrickSet>, layers: usize) -> Result<Self> {
+        let brick_len = layers * set.grid().brick_len();
+        let bricks = SlotFile::create(&scratch.dir, &scratch.window, brick_len, set.len())?;
+        let absent = vec![T::default(); set.grid().len() as usize];
+        Ok(Self { set: set.clone(), brick_len, bricks, faces: None, absent })
     }
 
     /// A field of zeros with faces: for what kernels read with a halo.
@@ -97,9 +116,9 @@ impl<T: Element> BrickArray<T> {
         self.absent[id as usize]
     }
 
-    /// Lends out a brick's voxels, `edge`^3, for reading.
+    /// Lends out a brick's voxels, `edge`^3 for each layer, for reading.
     pub fn read<R>(&self, slot: Slot, f: impl FnOnce(&[T]) -> R) -> R {
-        self.bricks.read(slot as usize, 0..self.set.grid().brick_len(), f)
+        self.bricks.read(slot as usize, 0..self.brick_len, f)
     }
 
     /// Lends out a brick's voxels for writing. The faces follow with [`BrickArray::write_faces`].

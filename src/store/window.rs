@@ -136,6 +136,12 @@ impl Window {
         self.shrink();
     }
 
+    /// How many bytes may be resident.
+    #[must_use]
+    pub fn limit(&self) -> u64 {
+        self.limit.load(Relaxed)
+    }
+
     /// Bytes resident now, by the window's own account.
     #[must_use]
     pub fn resident(&self) -> u64 {

@@ -3,6 +3,12 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod covolume;
+mod distance;
+mod flood;
+mod heat;
+mod level_set;
+mod maximum_principle;
 mod mesh_ply;
 mod points;
 mod surfaces;

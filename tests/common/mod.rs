@@ -1,7 +1,10 @@
 //! Shapes, files and slow plain references that several tests share.
 
 pub(crate) mod ball;
+pub(crate) mod clouds;
+pub(crate) mod lab;
 pub(crate) mod npy;
+pub(crate) mod plain_scheme;
 pub(crate) mod random;
 pub(crate) mod tiff_bytes;
 pub(crate) mod tiff_planes;

@@ -53,10 +53,12 @@ pub struct CellMask {
     pub solved: Vec<u8>,
     /// Weights of the lower and upper neighbour along each axis: 0 at the domain's border, else 1.
     pub open: [[[f32; CELL]; 2]; 3],
-    /// Rows (y) and planes (z) that hold solved voxels, half open.
-    pub rows: [usize; 2],
-    /// See `rows`.
+    /// 1 for columns (x) inside the domain, 0 for those beyond its end.
+    pub columns: [f32; CELL],
+    /// Planes (z) that hold solved voxels, half open.
     pub planes: [usize; 2],
+    /// Rows (y) of each plane that hold solved voxels, half open.
+    pub rows: [[usize; 2]; CELL],
     /// Number of solved voxels.
     pub count: u32,
 }
@@ -65,7 +67,14 @@ impl CellMask {
     /// A mask in which nothing is solved.
     #[must_use]
     pub fn new() -> Self {
-        Self { solved: vec![0; CELL_LEN], open: [[[1.0; CELL]; 2]; 3], rows: [0; 2], planes: [0; 2], count: 0 }
+        Self {
+            solved: vec![0; CELL_LEN],
+            open: [[[1.0; CELL]; 2]; 3],
+            columns: [1.0; CELL],
+            planes: [0; 2],
+            rows: [[0; 2]; CELL],
+            count: 0,
+        }
     }
 
     /// Takes over a cell's flags; `valid` voxels along each axis are inside the domain, and `border[axis]` says
@@ -73,16 +82,17 @@ impl CellMask {
     pub fn set(&mut self, solved: &[u8], valid: [usize; 3], border: [[bool; 2]; 3]) {
         self.solved.copy_from_slice(solved);
         self.count = 0;
-        (self.rows, self.planes) = ([CELL, 0], [CELL, 0]);
+        (self.rows, self.planes) = ([[CELL, 0]; CELL], [CELL, 0]);
         for (row, flags) in solved.chunks_exact(CELL).enumerate() {
             let count: u32 = flags.iter().map(|&f| u32::from(f)).sum();
             if count > 0 {
                 let (y, z) = (row % CELL, row / CELL);
-                self.rows = [self.rows[0].min(y), self.rows[1].max(y + 1)];
+                self.rows[z] = [self.rows[z][0].min(y), self.rows[z][1].max(y + 1)];
                 self.planes = [self.planes[0].min(z), self.planes[1].max(z + 1)];
                 self.count += count;
             }
         }
+        self.columns = std::array::from_fn(|x| if x < valid[0] { 1.0 } else { 0.0 });
         self.open = [[[1.0; CELL]; 2]; 3];
         for axis in 0..3 {
             if border[axis][0] {
@@ -95,36 +105,26 @@ impl CellMask {
     }
 }
 
+impl CellMask {
+    /// The rows on which the vertices or z-faces below plane `z` are needed: those of the planes on both its sides.
+    fn rows_around(&self, z: usize) -> [usize; 2] {
+        let below = z.checked_sub(1).map_or([CELL, 0], |z| self.rows[z]);
+        let above = self.rows.get(z).copied().unwrap_or([CELL, 0]);
+        [below[0].min(above[0]), below[1].max(above[1])]
+    }
+}
+
 impl Default for CellMask {
     fn default() -> Self {
         Self::new()
     }
 }
 
-/// The scheme of one cell, divided by its diagonal; arrays dense over the cell.
-#[derive(Clone, Debug)]
-pub struct Coefficients {
-    /// Weights of the neighbours across -x, +x, -y, +y, -z, +z.
-    pub weights: [Vec<f32>; 6],
-    /// The old value divided by the diagonal.
-    pub right: Vec<f32>,
-    /// Sum over the solved voxels of `M_p`, the norm of the gradient of u.
-    pub gradient_sum: f64,
-}
-
-impl Coefficients {
-    /// Room for one cell.
-    #[must_use]
-    pub fn new() -> Self {
-        Self { weights: std::array::from_fn(|_| vec![0.0; CELL_LEN]), right: vec![0.0; CELL_LEN], gradient_sum: 0.0 }
-    }
-}
-
-impl Default for Coefficients {
-    fn default() -> Self {
-        Self::new()
-    }
-}
+/// Layers of a scheme: the weights of the neighbours across -x, +x, -y, +y, -z, +z, then the old value divided by the
+/// diagonal; each dense over the cell.
+pub const SCHEME_LAYERS: usize = 7;
+/// Values of a scheme.
+pub const SCHEME_LEN: usize = SCHEME_LAYERS * CELL_LEN;
 
 /// Planes that the assembly rolls through.
 #[derive(Clone, Debug)]
@@ -153,7 +153,10 @@ impl Default for Planes {
     }
 }
 
-/// Assembles the scheme of one cell, on the widest vector unit the processor has (the bits are the same on any).
+/// Assembles the scheme of one cell (rows without solved voxels are left as they are) and returns the sum of `M_p`, the
+/// norm of the gradient of u, over the solved voxels.
+///
+/// Runs on the widest vector unit the processor has; the bits are the same on any.
 ///
 /// # Panics
 /// When a field is not a grown cell (g may be empty when `rho` is 0).
@@ -163,10 +166,10 @@ pub fn assemble(
     spacing: [f64; 3],
     velocity: &Velocity,
     work: &mut Planes,
-    out: &mut Coefficients,
-) {
+    scheme: &mut [f32],
+) -> f64 {
     vectorised!({ fields: Fields<'_>, mask: &CellMask, spacing: [f64; 3], velocity: &Velocity, work: &mut Planes,
-        out: &mut Coefficients } => assemble_cell);
+        scheme: &mut [f32] } => assemble_cell -> f64)
 }
 
 #[inline(always)]
@@ -176,8 +179,8 @@ fn assemble_cell(
     spacing: [f64; 3],
     velocity: &Velocity,
     work: &mut Planes,
-    out: &mut Coefficients,
-) {
+    scheme: &mut [f32],
+) -> f64 {
     let metric = Metric {
         inverse_spacing: spacing.map(|h| (1.0 / h) as f32),
         epsilon_squared: velocity.epsilon * velocity.epsilon,
@@ -186,26 +189,28 @@ fn assemble_cell(
     let mut sums = [0.0f32; CELL];
     let [first, end] = mask.planes;
     if first < end {
-        vertex_plane(fields.u, first, &mut work.low);
-        z_faces(fields.u, first, &work.low, &metric, &mut work.z_low);
+        let rows = mask.rows_around(first);
+        vertex_plane(fields.u, first, rows, &mut work.low);
+        z_faces(fields.u, first, rows, &work.low, &metric, &mut work.z_low);
     }
     for z in first..end {
-        vertex_plane(fields.u, z + 1, &mut work.high);
-        x_faces(fields.u, z, &work.low, &work.high, &metric, &mut work.x);
-        y_faces(fields.u, z, &work.low, &work.high, &metric, &mut work.y);
-        z_faces(fields.u, z + 1, &work.high, &metric, &mut work.z_high);
-        for y in mask.rows[0]..mask.rows[1] {
+        let (rows, next) = (mask.rows[z], mask.rows_around(z + 1));
+        vertex_plane(fields.u, z + 1, next, &mut work.high);
+        x_faces(fields.u, z, rows, [&work.low, &work.high], &metric, &mut work.x);
+        y_faces(fields.u, z, rows, [&work.low, &work.high], &metric, &mut work.y);
+        z_faces(fields.u, z + 1, next, &work.high, &metric, &mut work.z_high);
+        for y in rows[0]..rows[1] {
             let row = Row { y, z, work, mask, metric: &metric, step, velocity };
             if velocity.rho == 0.0 {
-                row.assemble::<false>(fields, out, &mut sums);
+                row.assemble::<false>(fields, scheme, &mut sums);
             } else {
-                row.assemble::<true>(fields, out, &mut sums);
+                row.assemble::<true>(fields, scheme, &mut sums);
             }
         }
         std::mem::swap(&mut work.low, &mut work.high);
         std::mem::swap(&mut work.z_low, &mut work.z_high);
     }
-    out.gradient_sum = sums.iter().map(|&s| f64::from(s)).sum();
+    sums.iter().map(|&s| f64::from(s)).sum()
 }
 
 /// One row of voxels of the cell being assembled.
@@ -227,7 +232,7 @@ fn window<const N: usize>(values: &[f32], start: usize) -> &[f32; N] {
 
 impl Row<'_> {
     #[inline(always)]
-    fn assemble<const EDGES: bool>(&self, fields: Fields<'_>, out: &mut Coefficients, sums: &mut [f32; CELL]) {
+    fn assemble<const EDGES: bool>(&self, fields: Fields<'_>, scheme: &mut [f32], sums: &mut [f32; CELL]) {
         let (y, z, mask, v) = (self.y, self.z, self.mask, self.velocity);
         let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
         let flat = y * GROWN;
@@ -259,13 +264,13 @@ impl Row<'_> {
             sums[x] += f32::from(solved[x]) * mean[x];
             diagonal[x] = 1.0 / diagonal[x];
         }
-        for (weights, c) in out.weights.iter_mut().zip(&c) {
-            let weights = &mut weights[at..at + CELL];
+        for (layer, c) in c.iter().enumerate() {
+            let weights = &mut scheme[layer * CELL_LEN + at..][..CELL];
             for x in 0..CELL {
                 weights[x] = c[x] * diagonal[x];
             }
         }
-        let right = &mut out.right[at..at + CELL];
+        let right = &mut scheme[6 * CELL_LEN + at..][..CELL];
         for x in 0..CELL {
             right[x] = u[x] * diagonal[x];
         }
@@ -346,13 +351,14 @@ fn mean_gradient_cell(u: &[f32], spacing: [f64; 3], work: &mut Planes, out: &mut
     let metric = Metric { inverse_spacing: spacing.map(|h| (1.0 / h) as f32), epsilon_squared: f32::MIN_POSITIVE };
     let mask = CellMask::new();
     let velocity = Velocity { theta: 0.0, rho: 0.0, delta: 0.0, epsilon: 0.0, tau: 0.0, normalised: false };
-    vertex_plane(u, 0, &mut work.low);
-    z_faces(u, 0, &work.low, &metric, &mut work.z_low);
+    let rows = [0, CELL];
+    vertex_plane(u, 0, rows, &mut work.low);
+    z_faces(u, 0, rows, &work.low, &metric, &mut work.z_low);
     for z in 0..CELL {
-        vertex_plane(u, z + 1, &mut work.high);
-        x_faces(u, z, &work.low, &work.high, &metric, &mut work.x);
-        y_faces(u, z, &work.low, &work.high, &metric, &mut work.y);
-        z_faces(u, z + 1, &work.high, &metric, &mut work.z_high);
+        vertex_plane(u, z + 1, rows, &mut work.high);
+        x_faces(u, z, rows, [&work.low, &work.high], &metric, &mut work.x);
+        y_faces(u, z, rows, [&work.low, &work.high], &metric, &mut work.y);
+        z_faces(u, z + 1, rows, &work.high, &metric, &mut work.z_high);
         for y in 0..CELL {
             let row = Row { y, z, work, mask: &mask, metric: &metric, step: [0.0; 3], velocity: &velocity };
             out[(z * CELL + y) * CELL..][..CELL].copy_from_slice(&row.mean_norms(y * GROWN));

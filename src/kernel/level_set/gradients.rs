@@ -37,17 +37,22 @@ pub(crate) struct Metric {
 /// Rows of a plane that hold voxels or their upper faces, as a flat length.
 pub(crate) const FLAT: usize = (CELL + 1) * GROWN;
 
-/// Vertex values of plane `k` of vertices: the mean of the eight voxels around each.
+/// Vertex values of plane `k` of vertices, on and one beyond the given rows: the mean of the eight voxels around each.
 ///
 /// Vertex (i, j, k) is the lower corner of voxel (i, j, k); its place in `out` is that voxel's in a grown plane.
 #[inline(always)]
-pub(crate) fn vertex_plane(u: &[f32], k: usize, out: &mut [f32]) {
-    let below = &u[k * PLANE..][..PLANE];
-    let above = &u[(k + 1) * PLANE..][..PLANE];
-    // Local voxel (i, j) lies at (i + 1, j + 1): the four voxels around vertex (i, j) start at flat place n.
+pub(crate) fn vertex_plane(u: &[f32], k: usize, rows: [usize; 2], out: &mut [f32]) {
     // The very last place would be a vertex that nobody reads.
-    let out = &mut out[..FLAT - 1];
-    for n in 0..FLAT - 1 {
+    let (start, end) = (rows[0] * GROWN, (rows[1] * GROWN + GROWN).min(FLAT - 1));
+    if start >= end {
+        return;
+    }
+    let len = end - start;
+    // Local voxel (i, j) lies at (i + 1, j + 1): the four voxels around vertex (i, j) start at the vertex's own place.
+    let below = &u[k * PLANE + start..][..len + GROWN + 1];
+    let above = &u[(k + 1) * PLANE + start..][..len + GROWN + 1];
+    let out = &mut out[start..end];
+    for n in 0..len {
         let low = (below[n] + below[n + 1]) + (below[n + GROWN] + below[n + GROWN + 1]);
         let high = (above[n] + above[n + 1]) + (above[n + GROWN] + above[n + GROWN + 1]);
         out[n] = 0.125 * (low + high);
@@ -84,42 +89,66 @@ fn tetrahedron(across: f32, z1: f32, z2: f32, mean: f32, inverse_edge: f32, inve
 }
 
 /// Norms of the lower x-faces of voxel plane `k`: place n holds the face between voxels (i - 1, j) and (i, j).
+/// `vertices` are the planes of vertices below and above.
 #[inline(always)]
-pub(crate) fn x_faces(u: &[f32], k: usize, low: &[f32], high: &[f32], metric: &Metric, out: &mut FaceNorms) {
-    let u = &u[(k + 1) * PLANE + GROWN..][..FLAT];
+pub(crate) fn x_faces(
+    u: &[f32],
+    k: usize,
+    rows: [usize; 2],
+    vertices: [&[f32]; 2],
+    metric: &Metric,
+    out: &mut FaceNorms,
+) {
+    let (start, len) = (rows[0] * GROWN, (rows[1].saturating_sub(rows[0])) * GROWN);
+    let u = &u[(k + 1) * PLANE + GROWN + start..][..len + 1];
+    let [low, high] = vertices.map(|v| &v[start..][..len + GROWN]);
     let [ix, iy, iz] = metric.inverse_spacing;
-    let (inverse, norm) = (&mut out.inverse[..FLAT], &mut out.norm[..FLAT]);
-    let (low, high) = (&low[..FLAT + GROWN], &high[..FLAT + GROWN]);
-    for n in 0..CELL * GROWN {
+    let (inverse, norm) = (&mut out.inverse[start..][..len], &mut out.norm[start..][..len]);
+    for n in 0..len {
         let (p, q) = (u[n + 1], u[n]);
-        let vertices = [low[n], low[n + GROWN], high[n], high[n + GROWN]];
-        (inverse[n], norm[n]) = face_sums((q - p) * ix, 0.5 * (p + q), vertices, [iy, iz], metric.epsilon_squared);
+        let corners = [low[n], low[n + GROWN], high[n], high[n + GROWN]];
+        (inverse[n], norm[n]) = face_sums((q - p) * ix, 0.5 * (p + q), corners, [iy, iz], metric.epsilon_squared);
     }
 }
 
 /// Norms of the lower y-faces of voxel plane `k`, the upper ones of the last row included.
 #[inline(always)]
-pub(crate) fn y_faces(u: &[f32], k: usize, low: &[f32], high: &[f32], metric: &Metric, out: &mut FaceNorms) {
-    let u = &u[(k + 1) * PLANE..][..PLANE];
+pub(crate) fn y_faces(
+    u: &[f32],
+    k: usize,
+    rows: [usize; 2],
+    vertices: [&[f32]; 2],
+    metric: &Metric,
+    out: &mut FaceNorms,
+) {
+    if rows[0] >= rows[1] {
+        return;
+    }
+    let (start, len) = (rows[0] * GROWN, (rows[1] - rows[0] + 1) * GROWN - 1);
+    let u = &u[(k + 1) * PLANE + start..][..len + GROWN + 1];
+    let [low, high] = vertices.map(|v| &v[start..][..len + 1]);
     let [ix, iy, iz] = metric.inverse_spacing;
-    let (inverse, norm) = (&mut out.inverse[..FLAT], &mut out.norm[..FLAT]);
-    let (low, high) = (&low[..FLAT + 1], &high[..FLAT + 1]);
-    for n in 0..FLAT - 1 {
+    let (inverse, norm) = (&mut out.inverse[start..][..len], &mut out.norm[start..][..len]);
+    for n in 0..len {
         let (p, q) = (u[n + GROWN + 1], u[n + 1]);
-        let vertices = [low[n], low[n + 1], high[n], high[n + 1]];
-        (inverse[n], norm[n]) = face_sums((q - p) * iy, 0.5 * (p + q), vertices, [ix, iz], metric.epsilon_squared);
+        let corners = [low[n], low[n + 1], high[n], high[n + 1]];
+        (inverse[n], norm[n]) = face_sums((q - p) * iy, 0.5 * (p + q), corners, [ix, iz], metric.epsilon_squared);
     }
 }
 
 /// Norms of the lower z-faces of voxel plane `k`; `k == CELL` gives the upper ones of the last plane.
 #[inline(always)]
-pub(crate) fn z_faces(u: &[f32], k: usize, vertices: &[f32], metric: &Metric, out: &mut FaceNorms) {
-    let below = &u[k * PLANE + GROWN..][..FLAT];
-    let above = &u[(k + 1) * PLANE + GROWN..][..FLAT];
+pub(crate) fn z_faces(u: &[f32], k: usize, rows: [usize; 2], vertices: &[f32], metric: &Metric, out: &mut FaceNorms) {
+    if rows[0] >= rows[1] {
+        return;
+    }
+    let (start, len) = (rows[0] * GROWN, (rows[1] - rows[0]) * GROWN - 1);
+    let below = &u[k * PLANE + GROWN + start..][..len + 1];
+    let above = &u[(k + 1) * PLANE + GROWN + start..][..len + 1];
+    let v = &vertices[start..][..len + GROWN + 1];
     let [ix, iy, iz] = metric.inverse_spacing;
-    let (inverse, norm) = (&mut out.inverse[..FLAT], &mut out.norm[..FLAT]);
-    let v = &vertices[..FLAT + GROWN];
-    for n in 0..CELL * GROWN - 1 {
+    let (inverse, norm) = (&mut out.inverse[start..][..len], &mut out.norm[start..][..len]);
+    for n in 0..len {
         let (p, q) = (above[n + 1], below[n + 1]);
         let corners = [v[n], v[n + 1], v[n + GROWN], v[n + GROWN + 1]];
         (inverse[n], norm[n]) = face_sums((q - p) * iz, 0.5 * (p + q), corners, [ix, iy], metric.epsilon_squared);

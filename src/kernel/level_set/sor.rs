@@ -5,14 +5,12 @@
 //! can change a bit. The values stay in [0, 1]: the solution does (maximum principle), and the clamp keeps
 //! over-relaxed iterates there on their way.
 
-use super::covolume::{CellMask, Coefficients};
-use super::{CELL, GROWN, PLANE};
+use super::covolume::CellMask;
+use super::{CELL, CELL_LEN, GROWN, PLANE};
 
 /// Sums over the solved voxels of a cell after it was relaxed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CellSums {
-    /// Squares of the first corrections `r + sum w u_q - u_p`: how far the cell was from solved when it was taken up.
-    pub correction_squared: f64,
     /// `|u - u_old|`.
     pub moved: f64,
     /// `(u - u_old)^2`.
@@ -24,13 +22,13 @@ pub struct CellSums {
 }
 
 /// Relaxes a cell `iterations` times. `u` is the grown cell, ghosts current; returns the squares of first corrections.
-pub fn relax(u: &mut [f32], scheme: &Coefficients, mask: &CellMask, omega: f32, iterations: usize) -> f64 {
-    vectorised!({ u: &mut [f32], scheme: &Coefficients, mask: &CellMask, omega: f32, iterations: usize }
+pub fn relax(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, iterations: usize) -> f64 {
+    vectorised!({ u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, iterations: usize }
         => relax_cell -> f64)
 }
 
 #[inline(always)]
-fn relax_cell(u: &mut [f32], scheme: &Coefficients, mask: &CellMask, omega: f32, iterations: usize) -> f64 {
+fn relax_cell(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, iterations: usize) -> f64 {
     let mut first = [0.0f32; CELL];
     half_sweep(u, scheme, mask, omega, 0, &mut first);
     half_sweep(u, scheme, mask, omega, 1, &mut first);
@@ -44,26 +42,21 @@ fn relax_cell(u: &mut [f32], scheme: &Coefficients, mask: &CellMask, omega: f32,
 
 /// Corrects the voxels of one colour, those with `x + y + z` of parity `colour`.
 #[inline(always)]
-fn half_sweep(
-    u: &mut [f32],
-    scheme: &Coefficients,
-    mask: &CellMask,
-    omega: f32,
-    colour: usize,
-    squares: &mut [f32; CELL],
-) {
-    // Omega on the voxels of the colour, 0 between: rows of either parity start one place apart.
-    let turns: [f32; CELL + 1] = std::array::from_fn(|n| if n % 2 == 0 { omega } else { 0.0 });
+fn half_sweep(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, colour: usize, squares: &mut [f32; CELL]) {
+    // Omega on the voxels of the colour, 0 between and beyond the domain, for rows that start with either colour.
+    let turns: [[f32; CELL]; 2] = std::array::from_fn(|start| {
+        std::array::from_fn(|x| if (x + start) % 2 == 0 { omega * mask.columns[x] } else { 0.0 })
+    });
     let inverse_square = 1.0 / (omega * omega);
     for z in mask.planes[0]..mask.planes[1] {
-        for y in mask.rows[0]..mask.rows[1] {
+        for y in mask.rows[z][0]..mask.rows[z][1] {
             let at = (z * CELL + y) * CELL;
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
-            let turn: &[f32; CELL] = turns[(colour + y + z) % 2..].first_chunk().expect("one longer than a row");
-            let mut sum = *row(&scheme.right, at);
+            let turn = &turns[(colour + y + z) % 2];
+            let mut sum = *row(scheme, 6 * CELL_LEN + at);
             let places = [center - 1, center + 1, center - GROWN, center + GROWN, center - PLANE, center + PLANE];
-            for (weights, place) in scheme.weights.iter().zip(places) {
-                let (weights, neighbour) = (row(weights, at), row(u, place));
+            for (layer, place) in places.into_iter().enumerate() {
+                let (weights, neighbour) = (row(scheme, layer * CELL_LEN + at), row(u, place));
                 for x in 0..CELL {
                     sum[x] += weights[x] * neighbour[x];
                 }
@@ -83,24 +76,24 @@ fn row(values: &[f32], start: usize) -> &[f32; CELL] {
     values[start..start + CELL].first_chunk().expect("a row of the cell")
 }
 
-/// Compares a relaxed cell with the old one, both grown.
+/// Compares a relaxed cell, grown, with the old one, dense over the cell.
 #[must_use]
-pub fn motion(u: &[f32], old: &[f32], mask: &CellMask, correction_squared: f64) -> CellSums {
-    vectorised!({ u: &[f32], old: &[f32], mask: &CellMask, correction_squared: f64 } => motion_cell -> CellSums)
+pub fn motion(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
+    vectorised!({ u: &[f32], old: &[f32], mask: &CellMask } => motion_cell -> CellSums)
 }
 
 #[inline(always)]
-fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask, correction_squared: f64) -> CellSums {
+fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
     let mut moved = [0.0f32; CELL];
     let mut squared = [0.0f32; CELL];
     let mut grown = [0.0f32; CELL];
     let mut largest = [0.0f32; CELL];
     for z in mask.planes[0]..mask.planes[1] {
-        for y in mask.rows[0]..mask.rows[1] {
+        for y in mask.rows[z][0]..mask.rows[z][1] {
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
-            let (u, old) = (row(u, center), row(old, center));
+            let (u, old) = (row(u, center), row(old, (z * CELL + y) * CELL));
             for x in 0..CELL {
-                let step = u[x] - old[x];
+                let step = mask.columns[x] * (u[x] - old[x]);
                 moved[x] += step.abs();
                 squared[x] += step * step;
                 grown[x] += step;
@@ -110,7 +103,6 @@ fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask, correction_squared: f64)
     }
     let sum = |lanes: [f32; CELL]| lanes.iter().map(|&s| f64::from(s)).sum();
     CellSums {
-        correction_squared,
         moved: sum(moved),
         moved_squared: sum(squared),
         grown: sum(grown),

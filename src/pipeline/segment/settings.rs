@@ -117,7 +117,7 @@ impl SegmentSettings {
             stop: self.stop,
             max_steps: self.max_steps,
             omega: self.omega as f32,
-            solver_tolerance: 1e-4,
+            solver_tolerance: 1e-3,
         }
     }
 

@@ -1,0 +1,178 @@
+//! Whole reconstructions and motions: the Sponge's figures as the papers' algorithms give them in f64 on the same
+//! cloud and settings, and a sphere that shrinks by its curvature at the exact rate.
+
+use std::f64::consts::PI;
+
+use strandline::grid::{BrickGrid, Geometry, PointBins};
+use strandline::kernel::level_set::CELL;
+use strandline::kernel::level_set::covolume::Velocity;
+use strandline::kernel::surface::{MarchingCubes, Measures, Patch, PatchIndex, SurfaceMeasure, Welder, cells_of_brick};
+use strandline::pipeline::band::{Reaches, make_band};
+use strandline::pipeline::distance::{Method, Sources, cloud_distance};
+use strandline::pipeline::evolve::{Evolution, Stop, TimeLoop, evolve};
+use strandline::pipeline::tagging::tag;
+use strandline::store::MeshBuffer;
+
+use crate::common::clouds::{grid_around, sponge};
+use crate::common::lab::{Lab, PlainGrid, dense, whole};
+use crate::common::plain_scheme::{gradient_norms, mean_norm};
+
+/// The surface u = 0.5 of a field over the whole grid.
+fn surface(geometry: &Geometry, u: &[f32]) -> (MeshBuffer, Measures) {
+    let part = geometry.domain();
+    let cells = cells_of_brick(&part, geometry.shape, false);
+    let (mut patch, mut welder, mut mesh) = (Patch::default(), Welder::new(geometry), MeshBuffer::default());
+    let mut measure = SurfaceMeasure::new(geometry.position(geometry.shape.map(|n| n / 2)));
+    MarchingCubes::new(geometry.shape, 0.5).extract(u, &part, &cells, &mut patch);
+    welder.add(&patch, &mut mesh).expect("memory takes any mesh");
+    welder.triangles_of(&patch).for_each(|(corners, positions)| measure.add(corners, positions));
+    (mesh, measure.measures())
+}
+
+/// Each position once.
+fn distinct(cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut kept: Vec<[f64; 3]> = Vec::new();
+    for p in cloud {
+        if kept.iter().all(|q| (0..3).any(|a| (p[a] - q[a]).abs() > 1e-9)) {
+            kept.push(*p);
+        }
+    }
+    kept
+}
+
+fn settings(h: f64, theta: f32, delta: f32) -> TimeLoop {
+    let tau = (h / 4.0) as f32;
+    TimeLoop {
+        velocity: Velocity { theta, rho: 0.0, delta, epsilon: 0.01, tau, normalised: true },
+        stop: Stop::L2(1e-4),
+        max_steps: 1000,
+        omega: 1.2,
+        solver_tolerance: 1e-6,
+    }
+}
+
+/// The Sponge reconstructed with beta = 0.25, in the band d <= 2 beta: volume, mean distance of the cloud.
+fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
+    let cloud = sponge();
+    let geometry = grid_around(&cloud, h);
+    let grid = BrickGrid::new(geometry.shape, CELL as i64);
+    let bins = PointBins::new(grid, &geometry, &cloud);
+    let set = dense(geometry.shape, CELL as i64);
+    let sources = Sources { geometry: &geometry, positions: &cloud, bins: &bins };
+    let stage = lab.engine.stage("sponge", 0);
+    let distance =
+        cloud_distance(&stage, &lab.engine, &sources, &set, Method::Fsm, f32::INFINITY).expect("room in scratch");
+    let tagging = tag(&stage, &lab.engine, &sources, &distance).expect("room in scratch");
+    let reaches = Reaches { beta: 0.25, inner: 0.5, outer: 0.5 };
+    let mut band = make_band(&stage, &lab.engine, &distance, &tagging.level, &reaches).expect("room in scratch");
+    let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta))
+        .expect("room in scratch");
+    let (mesh, measures) = surface(&geometry, &whole(&band.u[0]));
+    assert!(measures.is_closed());
+    let near = PatchIndex::new(&mesh.vertices, &mesh.triangles, h).hausdorff_from(distinct(&cloud)).expect("a surface");
+    (measures.volume, near.mean, done)
+}
+
+/// Volumes within 1 %, the mean distance of the cloud (each position once) within 3 %.
+#[test]
+fn the_sponge_has_the_figures_of_the_papers_algorithms() {
+    let lab = Lab::new(2);
+    for (delta, volume, mean) in [(0.0, 2.195, 0.0076), (0.025, 1.939, 0.0213), (0.05, 1.839, 0.0359)] {
+        let found = sponge_figures(&lab, 0.05, delta);
+        assert!((found.0 / volume - 1.0).abs() < 0.01, "delta {delta}: {found:?} for {volume}");
+        assert!((found.1 / mean - 1.0).abs() < 0.03, "delta {delta}: {found:?} for {mean}");
+        assert_eq!(found.2.stopped_by, "l2");
+        // The papers' SOR takes 5 to 7 iterations a step.
+        assert!(found.2.sor_iterations < 12 * u64::from(found.2.steps), "{found:?}");
+    }
+}
+
+/// A cone about the origin, cut off at 0 and 1, whose level 0.5 is the sphere of this radius.
+fn cone(geometry: &Geometry, radius: f64) -> Vec<f32> {
+    let grid = PlainGrid { shape: geometry.shape };
+    let distance = |v| geometry.position(v).iter().map(|x| x * x).sum::<f64>().sqrt();
+    grid.voxels().map(|v| (0.5 + (radius - distance(v)) / 1.2).clamp(0.0, 1.0) as f32).collect()
+}
+
+fn centred(shape: [i64; 3], spacing: [f64; 3]) -> Geometry {
+    let origin = std::array::from_fn(|a| -0.5 * (shape[a] - 1) as f64 * spacing[a]);
+    Geometry { shape, spacing, origin, unit: None }
+}
+
+/// Motion by mean curvature: `dr/dt = -2 delta / r`, so `r^2 = r0^2 - 4 delta t`.
+#[test]
+fn a_sphere_shrinks_by_its_curvature() {
+    let lab = Lab::new(2);
+    for (shape, spacing) in [([46; 3], [0.05; 3]), ([46, 40, 26], [0.05, 0.06, 0.09])] {
+        let geometry = centred(shape, spacing);
+        let u = cone(&geometry, 0.8);
+        let (d, solved) = (vec![0.0; u.len()], vec![1; u.len()]);
+        let mut band = lab.band(shape, &u, &d, &solved);
+        let mut run = TimeLoop { stop: Stop::L2(0.0), max_steps: 10, ..settings(0.02, 0.0, 0.1) };
+        run.velocity.epsilon = 1e-3;
+        let stage = lab.engine.stage("sphere", 0);
+        for leg in 1..=4 {
+            evolve(&stage, &lab.engine, &mut band, None, spacing, &run).unwrap();
+            let time = f64::from(leg * run.max_steps) * f64::from(run.velocity.tau);
+            let exact = (0.64 - 4.0 * 0.1 * time).sqrt();
+            let radius = (0.75 / PI * surface(&geometry, &whole(&band.u[0])).1.volume).cbrt();
+            assert!((radius / exact - 1.0).abs() < 0.005, "{spacing:?}, t = {time}: {radius} for {exact}");
+        }
+    }
+}
+
+/// The surface moves towards the points at unit speed: the front of `theta = 1` alone comes to rest on them.
+#[test]
+fn the_front_rests_where_the_distance_is_zero() {
+    let lab = Lab::new(2);
+    let geometry = centred([44; 3], [0.05; 3]);
+    let u = cone(&geometry, 0.8);
+    let grid = PlainGrid { shape: geometry.shape };
+    let length = |v| geometry.position(v).iter().map(|x| x * x).sum::<f64>().sqrt();
+    for target in [0.6, 0.9] {
+        let d: Vec<f32> = grid.voxels().map(|v| (length(v) - target).abs() as f32).collect();
+        let mut band = lab.band(geometry.shape, &u, &d, &vec![1; u.len()]);
+        let stage = lab.engine.stage("sphere", 0);
+        let run = TimeLoop { max_steps: 60, ..settings(0.05, 1.0, 0.0) };
+        evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &run).unwrap();
+        let radius = (0.75 / PI * surface(&geometry, &whole(&band.u[0])).1.volume).cbrt();
+        assert!((radius - target).abs() < 0.005, "{radius} for {target}");
+    }
+}
+
+/// One and two threads take the same steps to the same bits, on a domain that cuts cells short on every axis; what the
+/// loop says of its last step is what the fields say.
+#[test]
+fn threads_change_no_bit_of_the_level_set() {
+    let geometry = centred([37, 44, 29], [0.05, 0.04, 0.07]);
+    let grid = PlainGrid { shape: geometry.shape };
+    let u = cone(&geometry, 0.6);
+    let d: Vec<f32> = grid.voxels().map(|v| (geometry.position(v)[0].abs() - 0.55).abs() as f32).collect();
+    let g: Vec<f32> = grid.voxels().map(|v| 1.0 / (1.0 + geometry.position(v)[1].powi(2)) as f32).collect();
+    let solved: Vec<u8> = d.iter().map(|d| u8::from(*d < 0.5)).collect();
+    let runs = [1, 2].map(|threads| {
+        let lab = Lab::new(threads);
+        let mut band = lab.band(geometry.shape, &u, &d, &solved);
+        let edges = lab.field(band.solved.set(), &g);
+        let mut run = TimeLoop { stop: Stop::Surface(0.0), max_steps: 12, ..settings(0.05, 0.7, 0.05) };
+        run.velocity.rho = 0.4;
+        let stage = lab.engine.stage("threads", 0);
+        let done = evolve(&stage, &lab.engine, &mut band, Some(&edges), geometry.spacing, &run).unwrap();
+        (whole(&band.u[0]), whole(&band.u[1]), done, run)
+    });
+    let [(new, before, done, run), (second, _, other, _)] = &runs;
+    assert_eq!(done, other);
+    assert!(new.iter().zip(second).all(|(a, b)| a.to_bits() == b.to_bits()));
+    assert!(new.iter().zip(&u).zip(&solved).all(|((new, old), s)| *s == 1 || new == old), "held voxels stay");
+    let motion: f64 = new.iter().zip(before).map(|(n, b)| f64::from((n - b).abs())).sum();
+    let area: f64 = grid
+        .voxels()
+        .filter(|v| solved[grid.at(*v)] == 1)
+        .map(|v| {
+            let value = |i, j, k| f64::from(before[grid.at([v[0] + j, v[1] + i, v[2] + k])]);
+            mean_norm(&gradient_norms(value, geometry.spacing)).hypot(0.01)
+        })
+        .sum();
+    let speed = motion / (area * f64::from(run.velocity.tau));
+    assert!((done.residual / speed - 1.0).abs() < 1e-4, "{} for {speed}", done.residual);
+}

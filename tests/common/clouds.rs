@@ -1,0 +1,40 @@
+//! Point clouds by formula.
+
+use std::f64::consts::PI;
+
+use strandline::grid::Geometry;
+
+/// The papers' Sponge with r = 1 about the origin, both ends of both angles in, duplicates kept: 231 points at a step
+/// of pi / 10 (Kósa & Mikula 2023, eq. 11, with y = r cos p cos t).
+pub(crate) fn sponge() -> Vec<[f64; 3]> {
+    let step = PI / 10.0;
+    let point = |p: f64, t: f64| {
+        let s = p.sin().powi(2);
+        [(0.207 + 2.003 * s - 1.123 * s * s) * p.cos() * t.sin(), p.cos() * t.cos(), p.sin()]
+    };
+    (0..=20).flat_map(|p| (0..=10).map(move |t| point(f64::from(p) * step, f64::from(t) * step))).collect()
+}
+
+/// About `count` evenly spread points of a sphere (Fibonacci lattice), those of `keep` only.
+pub(crate) fn sphere(centre: [f64; 3], radius: f64, count: usize, keep: impl Fn([f64; 3]) -> bool) -> Vec<[f64; 3]> {
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    let directions = (0..count).map(|n| {
+        let (height, turn) = (1.0 - (2 * n + 1) as f64 / count as f64, golden * n as f64);
+        let ring = (1.0 - height * height).sqrt();
+        [ring * turn.cos(), ring * turn.sin(), height]
+    });
+    directions.filter(|d| keep(*d)).map(|d| std::array::from_fn(|a| centre[a] + radius * d[a])).collect()
+}
+
+/// The papers' grid around a cloud: a sixth of the largest extent on every side.
+pub(crate) fn grid_around(cloud: &[[f64; 3]], h: f64) -> Geometry {
+    let low: [f64; 3] = std::array::from_fn(|a| cloud.iter().map(|p| p[a]).fold(f64::INFINITY, f64::min));
+    let high: [f64; 3] = std::array::from_fn(|a| cloud.iter().map(|p| p[a]).fold(f64::NEG_INFINITY, f64::max));
+    let padding = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max) / 6.0;
+    Geometry {
+        shape: std::array::from_fn(|a| ((high[a] - low[a] + 2.0 * padding) / h).floor() as i64 + 2),
+        spacing: [h; 3],
+        origin: low.map(|v| v - padding),
+        unit: None,
+    }
+}
