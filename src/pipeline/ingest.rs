@@ -57,13 +57,9 @@ pub fn ingest<T: Sample>(
     let plane_len = (width * height) as usize;
     let planes: Vec<i64> = (crop.lo[2]..crop.hi[2]).collect();
     let workers = Workers::new(move || vec![T::default(); plane_len]);
-<<<<<<< HEAD
-    let read = |plane: &mut Vec<T>, &z: &i64| {
-=======
     // Counts add up the same in any order, and one histogram for all planes bounds the memory.
     let histogram = Mutex::new(Histogram::default());
     stage.run(&planes, &workers, |plane, &z| {
->>>>>>> 8b5089f34aec4fe096aff3d8f41d036c40673e34
         stack.read_plane(z, T::buffer(plane))?;
         let part = Box3::new([crop.lo[0], crop.lo[1], z], [crop.hi[0], crop.hi[1], z + 1]);
         let whole = Box3::new([0, 0, z], [width, height, z + 1]);
@@ -73,21 +69,11 @@ pub fn ingest<T: Sample>(
             Error::input(format!(
                 "plane {z} holds a value that is no number (NaN or infinite); crop it away or repair the image"
             ))
-<<<<<<< HEAD
-        })
-    };
-    // A histogram can take a megabyte: those of a few planes are added up before more are made.
-    let mut histogram = Histogram::default();
-    for batch in planes.chunks(8 * engine.threads()) {
-        histogram = stage.run(batch, &workers, read)?.into_iter().fold(histogram, Histogram::merge);
-    }
-=======
         })?;
         histogram.lock().unwrap_or_else(PoisonError::into_inner).merge(counts);
         Ok(())
     })?;
     let histogram = histogram.into_inner().unwrap_or_else(PoisonError::into_inner);
->>>>>>> 8b5089f34aec4fe096aff3d8f41d036c40673e34
     stage.voxels(crop.volume());
     let range = histogram.range(percentiles);
     Ok(Image { bricks, range, extremes: [histogram.low, histogram.high] })

@@ -27,9 +27,9 @@ pub struct Estimate {
     pub seconds: f64,
 }
 
-/// Scratch a voxel near the marks takes while its object is solved: two time levels, distance, level, edges, image
-/// smoothed and not, each f32 and most with faces (3/8 more), and flags. The cells for presmoothing reach farther.
-const SOLVE_BYTES: u64 = 44;
+/// Scratch a voxel near the marks takes while its object is solved: two time levels, distance and edges, f32 with faces
+/// (3/8 more), flags, and the scheme's seven coefficients. Presmoothing before that takes less, though it reaches farther.
+const SOLVE_BYTES: u64 = 52;
 /// Scratch a voxel near the marks takes for the distance alone: state and result, with faces.
 const DISTANCE_BYTES: u64 = 11;
 /// What stays of it when the object is solved.
