@@ -305,7 +305,9 @@ impl Job {
         lines.push(format!("{} voxels near the marks", grouped(estimate.near_voxels)));
         lines.push(format!("memory: {held} must be held, {allowed} are allowed"));
         lines.push(format!("temporary fields: about {scratch} in {folder}"));
-        lines.push(format!("output: up to {} before compression", bytes(estimate.output)));
+        if self.needs_store() {
+            lines.push(format!("output: up to {} before compression", bytes(estimate.output)));
+        }
         lines.push(format!("time: very roughly {}\n", duration(estimate.seconds)));
         print(&lines.join("\n"));
     }

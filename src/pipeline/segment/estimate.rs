@@ -45,7 +45,7 @@ const THREAD_BYTES: u64 = 4 << 20;
 /// Voxels a thread holds to make a brick of a coarser level, and a chunk of a shard.
 const COARSE_VOXELS: u64 = 128 * 128 * 128 + 4 * 64 * 64 * 64;
 /// Seconds of one thread for a voxel near the marks, and for a voxel of the image.
-const SECONDS_PER_NEAR_VOXEL: f64 = 4e-6;
+const SECONDS_PER_NEAR_VOXEL: f64 = 2.5e-6;
 const SECONDS_PER_VOXEL: f64 = 6e-8;
 
 /// Estimates the segmentation of `crop` with `threads` threads; `writes` says whether there is an output.
