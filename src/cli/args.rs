@@ -18,6 +18,7 @@ pub(super) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Find objects in a 3-D image, guided by border points
+    #[command(after_help = HELP_ON_SEGMENT)]
     Segment(Box<SegmentArgs>),
     /// Segment the built-in stack of a plant embryo
     Demo(DemoArgs),
@@ -25,10 +26,11 @@ pub(super) enum Command {
     Info(InfoArgs),
 }
 
+const HELP_ON_SEGMENT: &str = "\
+Lengths are physical, in the unit of the image; triples are x,y,z; the centre of the first voxel is 0,0,0.
+Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 130 interrupted, 143 terminated.";
+
 /// Find objects in a 3-D image, guided by border points that were marked on it.
-///
-/// Lengths are physical, triples are x,y,z. Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input,
-/// 130 interrupted, 143 terminated.
 #[derive(Clone, Debug, Args)]
 pub(super) struct SegmentArgs {
     /// TIFF stack, or a folder with one TIFF file for each slice
@@ -151,6 +153,7 @@ pub(super) struct ResourceArgs {
 /// Where results go.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Output")]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct OutputArgs {
     /// OME-Zarr store to write; none computes and reports, and writes no field
     #[arg(short, long = "output", value_name = "OUT.zarr|none", required = true)]

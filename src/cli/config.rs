@@ -144,8 +144,9 @@ pub(super) fn check_outputs(output: &OutputArgs) -> Result<()> {
             return Err(Error::usage("is named for two outputs; give each a name of its own").at(path));
         }
         seen.push(path);
-        if path.is_dir() {
-            return Err(Error::usage("is a folder; give the name of a file").at(path));
+        // A device or a folder would be replaced by a file.
+        if path.exists() && !path.is_file() {
+            return Err(Error::usage("is no regular file; give another name").at(path));
         }
         if path.exists() && !output.overwrite {
             let what = "exists already; choose another name, or give --overwrite to replace it";

@@ -72,7 +72,7 @@ impl Console {
     /// One line on stderr that is no note: what is about to be done.
     pub(super) fn say(&self, line: &str) {
         if self.voice != Voice::Quiet {
-            self.line(&self.lock(), line);
+            draw_line(&self.lock(), line);
         }
     }
 
@@ -94,17 +94,6 @@ impl Console {
         self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn line(&self, open: &Open, line: &str) {
-        let write = || {
-            // Nobody is left to tell when stderr is closed.
-            let _ = writeln!(stderr(), "{line}");
-        };
-        match &open.bar {
-            Some(bar) => bar.suspend(write),
-            None => write(),
-        }
-    }
-
     fn plain_line(&self) {
         let open = self.lock();
         let Some(since) = open.since else { return };
@@ -114,7 +103,19 @@ impl Console {
         } else {
             format!("{} steps", grouped(steps))
         };
-        self.line(&open, &format!("{}  {far}  {}", open.names.join(", "), duration(since.elapsed().as_secs_f64())));
+        draw_line(&open, &format!("{}  {far}  {}", open.names.join(", "), duration(since.elapsed().as_secs_f64())));
+    }
+}
+
+/// Writes a line above the bar, if one is drawn.
+fn draw_line(open: &Open, line: &str) {
+    let write = || {
+        // Nobody is left to tell when stderr is closed.
+        let _ = writeln!(stderr(), "{line}");
+    };
+    match &open.bar {
+        Some(bar) => bar.suspend(write),
+        None => write(),
     }
 }
 
@@ -191,7 +192,7 @@ impl Progress for Console {
     fn note(&self, line: &str) {
         self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(line.into());
         if self.voice != Voice::Quiet {
-            self.line(&self.lock(), &format!("note: {line}"));
+            draw_line(&self.lock(), &format!("note: {line}"));
         }
     }
 
@@ -207,7 +208,7 @@ impl Progress for Console {
         let ended = std::mem::take(&mut *open);
         if let Some(since) = ended.since.filter(|_| self.voice == Voice::Verbose) {
             let seconds = since.elapsed().as_secs_f64();
-            self.line(&open, &format!("{}  done  {seconds:.1} s", ended.names.join(", ")));
+            draw_line(&open, &format!("{}  done  {seconds:.1} s", ended.names.join(", ")));
         }
     }
 }

@@ -6,7 +6,7 @@ use clap::Parser;
 
 use super::args::{Cli, Command, DemoArgs};
 use super::print;
-use super::segment::Job;
+use super::segment::{Job, Names};
 use super::values::Output;
 use crate::error::{Error, Result};
 
@@ -36,7 +36,11 @@ pub(super) fn run(args: &DemoArgs, typed: &[String]) -> Result<()> {
     segment.output.output = Output::Store(args.output.clone());
     segment.output.overwrite = overwrite;
     segment.output.quiet = args.quiet;
-    let job = Job::new("demo", *segment, typed)?;
+    let names = Names {
+        image: "the built-in arabidopsis-embryo.tif".into(),
+        points: vec!["the built-in arabidopsis-marks.csv".into()],
+    };
+    let job = Job::new("demo", names, *segment, typed)?;
     job.run(&job.estimate())?;
     if !args.quiet {
         print(&farewell(&args.output));

@@ -35,7 +35,7 @@ type Lines = Vec<(String, String)>;
 
 fn table(lines: &Lines) -> String {
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    lines.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
+    lines.iter().fold(String::new(), |text, (name, value)| text + &format!("{name:<width$}  {value}\n"))
 }
 
 fn line(name: &str, value: impl Into<String>) -> (String, String) {

@@ -25,6 +25,8 @@ use crate::store::{PlaneSource, Scratch, free_space};
 /// A segmentation that is ready to start: all inputs are open and checked.
 pub(super) struct Job {
     pub(super) command: &'static str,
+    /// How the image and its marks are called in messages and in the report.
+    names: Names,
     typed: Vec<String>,
     args: SegmentArgs,
     settings: SegmentSettings,
@@ -39,9 +41,17 @@ pub(super) struct Job {
     started: Instant,
 }
 
+/// How the inputs are called.
+pub(super) struct Names {
+    pub(super) image: String,
+    pub(super) points: Vec<String>,
+}
+
 /// Runs the command.
 pub(super) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
-    let job = Job::new("segment", args.clone(), typed)?;
+    let points = args.points.iter().map(|path| path.display().to_string()).collect();
+    let names = Names { image: args.image.display().to_string(), points };
+    let job = Job::new("segment", names, args.clone(), typed)?;
     let estimate = job.estimate();
     if args.output.dry_run {
         job.print_plan(&estimate);
@@ -52,7 +62,7 @@ pub(super) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
 
 impl Job {
     /// Understands what was typed and opens the inputs.
-    pub(super) fn new(command: &'static str, args: SegmentArgs, typed: &[String]) -> Result<Self> {
+    pub(super) fn new(command: &'static str, names: Names, args: SegmentArgs, typed: &[String]) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
         let settings = config::settings(&args.picture, &args.level_set, &args.distance, &args.resources)?;
@@ -78,7 +88,21 @@ impl Job {
         }
         let typed = typed.to_vec();
         let stack = opened.stack;
-        Ok(Self { command, typed, args, settings, resources, stack, geometry, crop, marks, console, cancel, started })
+        Ok(Self {
+            command,
+            names,
+            typed,
+            args,
+            settings,
+            resources,
+            stack,
+            geometry,
+            crop,
+            marks,
+            console,
+            cancel,
+            started,
+        })
     }
 
     /// What the run will take.
@@ -123,9 +147,12 @@ impl Job {
     pub(super) fn run(&self, estimate: &Estimate) -> Result<Outcome> {
         let window = self.fits(estimate)?;
         self.console.say(&format!(
-            "{}: {} object(s), about {}; memory up to {}, {} of temporary fields in {}",
-            self.args.image.display(),
-            self.marks.files.len(),
+            "{}: {}, about {}; memory up to {}, {} of temporary fields in {}",
+            self.names.image,
+            match self.marks.files.len() {
+                1 => "1 object".into(),
+                objects => format!("{objects} objects"),
+            },
             duration(estimate.seconds),
             bytes(self.resources.memory),
             bytes(estimate.scratch),
@@ -213,8 +240,8 @@ impl Job {
     fn report(&self, engine: &Engine, outcome: &Outcome) -> Report {
         let (picture, output) = (&self.args.picture, &self.args.output);
         let settings = Settings {
-            image: self.args.image.display().to_string(),
-            points: self.args.points.iter().map(|path| path.display().to_string()).collect(),
+            image: self.names.image.clone(),
+            points: self.names.points.clone(),
             output: output.store().map(|path| path.display().to_string()),
             channel: picture.channel,
             time: picture.time,
@@ -266,25 +293,23 @@ impl Job {
     }
 
     fn print_plan(&self, estimate: &Estimate) {
-        let mut text = format!("{}\n", self.describe());
+        let mut lines = vec![self.describe()];
         for object in split(&self.marks.cloud) {
             let points: usize = object.contours.iter().map(Vec::len).sum();
             let file = self.marks.files[&object.object].display();
             let contours = if object.drawn { format!(" on {} contours", object.contours.len()) } else { String::new() };
-            text.push_str(&format!("object {}: {points} marks{contours}, {file}\n", object.object));
+            lines.push(format!("object {}: {points} marks{contours}, {file}", object.object));
         }
-        text.push_str(&format!(
-            "{} voxels near the marks\nmemory: {} held, {} allowed\ntemporary fields: about {} in {}\n\
-             output: up to {} before compression\ntime: very roughly {}\n",
-            grouped(estimate.near_voxels),
-            bytes(estimate.held),
-            bytes(self.resources.memory),
-            bytes(estimate.scratch),
-            self.resources.scratch.display(),
-            bytes(estimate.output),
-            duration(estimate.seconds)
-        ));
-        print(&text);
+        let (held, allowed) = (bytes(estimate.held), bytes(self.resources.memory));
+        let (scratch, folder) = (bytes(estimate.scratch), self.resources.scratch.display());
+        lines.push(format!("{} voxels near the marks", grouped(estimate.near_voxels)));
+        lines.push(format!("memory: {held} must be held, {allowed} are allowed"));
+        lines.push(format!("temporary fields: about {scratch} in {folder}"));
+        if self.needs_store() {
+            lines.push(format!("output: up to {} before compression", bytes(estimate.output)));
+        }
+        lines.push(format!("time: very roughly {}\n", duration(estimate.seconds)));
+        print(&lines.join("\n"));
     }
 }
 

@@ -82,7 +82,7 @@ pub(super) fn parse_size(text: &str) -> Result<u64, String> {
         _ => return Err("give bytes, or a number with KiB, MiB, GiB, TiB, kB, MB, GB or TB, such as 4GiB".into()),
     };
     let bytes = number.parse::<f64>().map_err(|_| "give a positive number, such as 512MiB".to_string())? * factor;
-    if bytes >= 1.0 && bytes < 1e18 { Ok(bytes as u64) } else { Err("give a size such as 512MiB".into()) }
+    if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err("give a size such as 512MiB".into()) }
 }
 
 /// A distance method by its name in the table.

@@ -15,7 +15,10 @@ pub fn free_space(folder: &Path) -> Option<u64> {
     let code = unsafe { libc::statvfs(name.as_ptr(), status.as_mut_ptr()) };
     // SAFETY: the structure holds integers only, for which the zeros it was made of are valid whatever the call did.
     let status = unsafe { status.assume_init() };
-    (code == 0).then(|| (status.f_bavail as u64).saturating_mul(status.f_frsize as u64))
+    // The types differ between systems.
+    #[allow(clippy::unnecessary_cast)]
+    let room = (status.f_bavail as u64).saturating_mul(status.f_frsize as u64);
+    (code == 0).then_some(room)
 }
 
 #[cfg(test)]

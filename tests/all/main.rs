@@ -13,6 +13,7 @@ mod mesh_ply;
 mod points;
 mod surfaces;
 
+mod cli;
 mod layering;
 mod tiff_derived;
 mod tiff_handmade;

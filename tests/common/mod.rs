@@ -1,5 +1,6 @@
 //! Shapes, files and slow plain references that several tests share.
 
+pub(crate) mod ball;
 pub(crate) mod clouds;
 pub(crate) mod lab;
 pub(crate) mod npy;

@@ -27,9 +27,9 @@ pub struct Estimate {
     pub seconds: f64,
 }
 
-/// Scratch a voxel near the marks takes while its object is solved: two time levels, distance, level, edges, image
-/// smoothed and not, each f32 and most with faces (3/8 more), and flags. The cells for presmoothing reach farther.
-const SOLVE_BYTES: u64 = 44;
+/// Scratch a voxel near the marks takes while its object is solved: two time levels, distance and edges, f32 with faces
+/// (3/8 more), flags, and the scheme's seven coefficients. Presmoothing before that takes less, though it reaches farther.
+const SOLVE_BYTES: u64 = 52;
 /// Scratch a voxel near the marks takes for the distance alone: state and result, with faces.
 const DISTANCE_BYTES: u64 = 11;
 /// What stays of it when the object is solved.
@@ -45,7 +45,7 @@ const THREAD_BYTES: u64 = 4 << 20;
 /// Voxels a thread holds to make a brick of a coarser level, and a chunk of a shard.
 const COARSE_VOXELS: u64 = 128 * 128 * 128 + 4 * 64 * 64 * 64;
 /// Seconds of one thread for a voxel near the marks, and for a voxel of the image.
-const SECONDS_PER_NEAR_VOXEL: f64 = 1.2e-6;
+const SECONDS_PER_NEAR_VOXEL: f64 = 2.5e-6;
 const SECONDS_PER_VOXEL: f64 = 6e-8;
 
 /// Estimates the segmentation of `crop` with `threads` threads; `writes` says whether there is an output.
