@@ -70,7 +70,7 @@ pub fn ingest<T: Sample>(
                 "plane {z} holds a value that is no number (NaN or infinite); crop it away or repair the image"
             ))
         })?;
-        histogram.lock().unwrap_or_else(PoisonError::into_inner).merge(counts);
+        histogram.lock().unwrap_or_else(PoisonError::into_inner).merge(&counts);
         Ok(())
     })?;
     let histogram = histogram.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -90,58 +90,51 @@ fn crop_plane<T: Copy>(plane: &[T], whole: &Box3, part: &Box3) -> Vec<T> {
 /// 2^8 have bins of their own; counts add up the same in any order.
 #[derive(Clone, Debug)]
 struct Histogram {
-    bins: std::collections::BTreeMap<u32, u64>,
+    bins: Vec<u64>,
     low: f64,
     high: f64,
 }
 
+/// Bins are named by this many upper bits of a value's pattern.
+const BIN_BITS: u32 = 20;
+
 impl Default for Histogram {
     fn default() -> Self {
-        Self { bins: std::collections::BTreeMap::default(), low: f64::INFINITY, high: f64::NEG_INFINITY }
+        Self { bins: vec![0; 1 << BIN_BITS], low: f64::INFINITY, high: f64::NEG_INFINITY }
     }
 }
 
 impl Histogram {
+    /// The histogram of some values; none when one of them is no finite number.
     fn of<T: Element>(values: &[T]) -> Option<Self> {
-        let mut bins = std::collections::HashMap::new();
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let mut last = (0, 0u64);
+        let mut counts = Self::default();
         for value in values {
             let value = value.to_f64();
             if !value.is_finite() {
                 return None;
             }
-            (low, high) = (low.min(value), high.max(value));
-            let bin = bin_of(value);
-            if bin == last.0 {
-                last.1 += 1;
-            } else {
-                *bins.entry(last.0).or_insert(0) += last.1;
-                last = (bin, 1);
-            }
+            (counts.low, counts.high) = (counts.low.min(value), counts.high.max(value));
+            counts.bins[bin_of(value) as usize] += 1;
         }
-        *bins.entry(last.0).or_insert(0) += last.1;
-        Some(Self { bins: bins.into_iter().collect(), low, high })
+        Some(counts)
     }
 
-    fn merge(&mut self, other: Self) {
-        for (bin, count) in other.bins {
-            *self.bins.entry(bin).or_insert(0) += count;
-        }
+    fn merge(&mut self, other: &Self) {
+        self.bins.iter_mut().zip(&other.bins).for_each(|(mine, theirs)| *mine += theirs);
         (self.low, self.high) = (self.low.min(other.low), self.high.max(other.high));
     }
 
     /// The values below which the given percentages lie; the extremes when those coincide.
     fn range(&self, percentiles: [f64; 2]) -> GreyRange {
-        let total: u64 = self.bins.values().sum();
+        let total: u64 = self.bins.iter().sum();
         let at = |percent: f64| {
             let rank = (percent / 100.0 * total as f64) as u64;
             let mut seen = 0;
-            let bin = self.bins.iter().find_map(|(&bin, &count)| {
+            let bin = self.bins.iter().position(|&count| {
                 seen += count;
-                (seen > rank).then_some(bin)
+                seen > rank
             });
-            bin.map_or(self.high, |b| value_of(b).clamp(self.low, self.high))
+            bin.map_or(self.high, |b| value_of(b as u32).clamp(self.low, self.high))
         };
         let (low, high) = (at(percentiles[0]), at(percentiles[1]));
         if low < high { GreyRange { low, high } } else { GreyRange { low: self.low, high: self.high } }
@@ -152,12 +145,12 @@ impl Histogram {
 fn bin_of(value: f64) -> u32 {
     let bits = (value as f32).to_bits();
     let ordered = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
-    ordered >> 12
+    ordered >> (u32::BITS - BIN_BITS)
 }
 
 /// The lowest value of a bin.
 fn value_of(bin: u32) -> f64 {
-    let ordered = bin << 12;
+    let ordered = bin << (u32::BITS - BIN_BITS);
     let bits = if ordered >> 31 == 1 { ordered & !(1 << 31) } else { !ordered };
     f64::from(f32::from_bits(bits))
 }
