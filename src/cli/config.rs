@@ -166,8 +166,8 @@ pub(super) fn check_outputs(output: &OutputArgs) -> Result<()> {
 mod tests {
     use clap::Parser;
 
-    use super::super::args::{Cli, Command, SegmentArgs};
     use super::*;
+    use crate::cli::args::{Cli, Command, SegmentArgs};
 
     fn typed(flags: &str) -> Box<SegmentArgs> {
         let words = "strandline segment image.tif --points marks.csv -o none".split(' ');
