@@ -18,7 +18,7 @@ fn level_set(c: &mut Criterion) {
     group.throughput(Throughput::Elements(CELL_LEN as u64));
     let fields = Fields { u: &u, d: &d, g: &g };
     group.bench_function("assemble", |b| {
-        b.iter(|| assemble(fields, &mask, [1.0; 3], &velocity, &mut work, &mut scheme))
+        b.iter(|| assemble(fields, &mask, [1.0; 3], &velocity, &mut work, &mut scheme));
     });
     let mut v = u.clone();
     group.bench_function("relax4", |b| b.iter(|| sor::relax(&mut v, &scheme, &mask, 1.2, 4)));

@@ -58,7 +58,7 @@ fn control_group_limits(read: &impl Fn(&str) -> Option<String>) -> Vec<u64> {
     limits.iter().filter_map(|path| read(path)?.trim().parse().ok()).collect()
 }
 
-/// The most memory this process has had resident so far (VmHWM), in bytes; 0 where the system does not tell.
+/// The most memory this process has had resident so far (`VmHWM`), in bytes; 0 where the system does not tell.
 #[must_use]
 pub fn peak_resident() -> u64 {
     std::fs::read_to_string("/proc/self/status")

@@ -260,7 +260,7 @@ mod tests {
                     for row in 0..shape[1] * 4 {
                         assert_eq!(x[row * 4..][..shape[0]], y[row * 4..][..shape[0]]);
                     }
-                })
+                });
             });
             for face in FACES {
                 let used = [shape[1], shape[0], shape[0]][face.axis];

@@ -83,7 +83,7 @@ fn fill_cell(band: &Band, distance: &BrickArray<f32>, level: &BrickArray<f32>, r
     let fill = |d: &[f32], b: &[f32]| {
         band.distance.write(slot, |out| out.copy_from_slice(d));
         band.u[0].write(slot, |u| {
-            u.iter_mut().zip(d.iter().zip(b)).for_each(|(u, (&d, &b))| *u = classify(d, b, reaches).0)
+            u.iter_mut().zip(d.iter().zip(b)).for_each(|(u, (&d, &b))| *u = classify(d, b, reaches).0);
         });
         let valid = set.grid().brick_box(id).shape().map(|n| n as usize);
         let edge = set.grid().edge() as usize;
@@ -98,12 +98,11 @@ fn fill_cell(band: &Band, distance: &BrickArray<f32>, level: &BrickArray<f32>, r
             count
         })
     };
-    let count = match distance.set().slot(id) {
-        Some(from) => distance.read(from, |d| level.read(from, |b| fill(d, b))),
-        None => {
-            let len = set.grid().brick_len();
-            fill(&vec![distance.absent(id); len], &vec![level.absent(id); len])
-        }
+    let count = if let Some(from) = distance.set().slot(id) {
+        distance.read(from, |d| level.read(from, |b| fill(d, b)))
+    } else {
+        let len = set.grid().brick_len();
+        fill(&vec![distance.absent(id); len], &vec![level.absent(id); len])
     };
     band.distance.refresh_faces(slot);
     band.u[0].refresh_faces(slot);
@@ -174,12 +173,11 @@ pub fn enclosed_voxels(u: &BrickArray<f32>) -> Result<u64> {
     let mut values = vec![0.0; grid.brick_len()];
     for id in 0..grid.len() {
         let part = grid.brick_box(id);
-        match u.constant_in(&part) {
-            Some(value) => count += if value >= 0.5 { part.volume() } else { 0 },
-            None => {
-                u.read_box(&part, &mut values[..part.len()])?;
-                count += values[..part.len()].iter().filter(|v| **v >= 0.5).count() as u64;
-            }
+        if let Some(value) = u.constant_in(&part) {
+            count += if value >= 0.5 { part.volume() } else { 0 }
+        } else {
+            u.read_box(&part, &mut values[..part.len()])?;
+            count += values[..part.len()].iter().filter(|v| **v >= 0.5).count() as u64;
         }
     }
     Ok(count)

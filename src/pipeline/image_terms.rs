@@ -29,20 +29,21 @@ const HEAT_OMEGA: f32 = 1.4;
 const HEAT_TOLERANCE: f64 = 2e-5;
 const HEAT_ROUNDS: usize = 60;
 
-/// The edge detector g on the cells of `band`, from an image normalised to [0, 1] over the band's grid.
+/// The edge detector g on the cells of `band`, from the smoothed image on (at least) these cells.
 ///
 /// # Errors
-/// When the image cannot be read, scratch runs out or the run is interrupted.
+/// When scratch runs out or the run is interrupted.
+///
+/// # Panics
+/// When a cell of the band was not smoothed.
 pub fn edges(
-    stages: [&Stage<'_>; 2],
+    stage: &Stage<'_>,
     engine: &Engine,
-    image: &dyn BoxSource<f32>,
+    smoothed: &BrickArray<f32>,
     band: &Arc<BrickSet>,
     spacing: [f64; 3],
-    settings: &EdgeSettings,
+    k: f32,
 ) -> Result<BrickArray<f32>> {
-    let smoothed = presmooth(stages[0], engine, image, band, spacing, settings.sigma)?;
-    let stage = stages[1];
     let edges = BrickArray::with_faces(engine.scratch(), band)?;
     let plan = HaloPlan::new(*band.grid(), Reach::All);
     let workers = Workers::new(|| (HaloTile::new(CELL), Planes::new()));
@@ -50,15 +51,16 @@ pub fn edges(
     stage.voxels((band.len() * CELL_LEN) as u64);
     stage.run(&one_wave(band), &workers, |(tile, planes), &slot| {
         let wide = smoothed.set().slot(band.id(slot)).expect("smoothed cells cover the band");
-        plan.gather(&smoothed, wide, Boundary::Mirror, tile);
-        edges.write(slot, |g| edge_detector(tile.data(), spacing, length, settings.k, planes, g));
+        plan.gather(smoothed, wide, Boundary::Mirror, tile);
+        edges.write(slot, |g| edge_detector(tile.data(), spacing, length, k, planes, g));
         edges.refresh_faces(slot);
         Ok(())
     })?;
     Ok(edges)
 }
 
-/// One implicit step of the heat equation on the cells within five sigma of the band.
+/// One implicit step of the heat equation on the cells within five sigma of the band, from an image normalised to
+/// [0, 1] over the band's grid.
 ///
 /// # Errors
 /// When the image cannot be read, scratch runs out or the run is interrupted.

@@ -177,7 +177,7 @@ mod tests {
         let cloud = cloud_of(&marks, &grid(), true);
         let cap: Vec<_> = cloud.iter().filter(|p| p[2] == 3.0).collect();
         assert!(cap.len() >= 15 * 15 && cap.len() <= 17 * 17 + 64, "{}", cap.len());
-        assert!(cloud.iter().any(|p| *p == [5.0, 5.0, 7.0]));
+        assert!(cloud.contains(&[5.0, 5.0, 7.0]));
         assert!(cloud_of(&marks, &grid(), false).iter().all(|p| p[2] == 4.0 || p[2] == 6.0));
     }
 

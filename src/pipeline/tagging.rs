@@ -113,7 +113,9 @@ fn flood_all(
     let set = distance.set().clone();
     let mut level = BrickArray::with_faces(engine.scratch(), &set)?;
     for (region, bricks) in far.bricks.iter().enumerate() {
-        bricks.iter().for_each(|&id| level.set_absent(id, far.level[region]));
+        for &id in bricks {
+            level.set_absent(id, far.level[region]);
+        }
     }
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
     let edge = set.grid().edge() as usize;
@@ -123,7 +125,9 @@ fn flood_all(
     while dirty.iter().any(|&d| d) {
         let due = checkerboard(&set, |slot| dirty[slot as usize]);
         for wave in due {
-            wave.iter().for_each(|&slot| dirty[slot as usize] = false);
+            for &slot in &wave {
+                dirty[slot as usize] = false;
+            }
             let risen = stage.run(&wave, &workers, |tile, &slot| {
                 plan.gather(&level, slot, Boundary::Constant(f32::INFINITY), tile);
                 let rose = distance.read(slot, |d| flood::relax(tile, d));

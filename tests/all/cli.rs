@@ -106,7 +106,7 @@ fn unusable_marks_are_told_with_code_2() {
         rows.lines().map(row).collect::<String>()
     };
     let one = rows.lines().next().unwrap();
-    let slice: String = rows.lines().take(24).map(|line| format!("{line}\n")).collect();
+    let slice: String = rows.split_inclusive('\n').take(24).collect();
     for (marks, reason) in [
         (String::new(), "no point"),
         (format!("{one}\n"), "object 1 has one point"),

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use strandline::grid::BrickSet;
 use strandline::kernel::level_set::CELL;
 use strandline::pipeline::image_terms::{EdgeSettings, edges, presmooth};
+use strandline::store::BrickArray;
 
 use crate::common::lab::{Lab, PlainGrid, dense, whole};
 use crate::common::plain_scheme::{gradient_norms, mean_norm};
@@ -105,6 +106,19 @@ fn without_a_width_nothing_is_smoothed() {
     assert_eq!(smoothed(&Lab::new(1), grid.shape, [1.0; 3], 0.0, &image), image);
 }
 
+/// The edge detector of an image on a set of cells, smoothed first.
+fn detected(
+    lab: &Lab,
+    image: &BrickArray<f32>,
+    set: &Arc<BrickSet>,
+    spacing: [f64; 3],
+    settings: &EdgeSettings,
+) -> BrickArray<f32> {
+    let stage = lab.engine.stage("edges", 0);
+    let smoothed = presmooth(&stage, &lab.engine, image, set, spacing, settings.sigma).expect("smoothing needs only scratch");
+    edges(&stage, &lab.engine, &smoothed, set, spacing, settings.k).expect("edges need only scratch")
+}
+
 #[test]
 fn edges_are_those_of_the_smoothed_image() {
     let (grid, spacing, sigma, k) = (PlainGrid { shape: [37, 21, 30] }, [0.2, 0.25, 0.9], 0.3, 50.0);
@@ -113,10 +127,9 @@ fn edges_are_those_of_the_smoothed_image() {
     let runs = [1, 2].map(|threads| {
         let lab = Lab::new(threads);
         let set = dense(grid.shape, CELL as i64);
-        let stages = [lab.engine.stage("heat", 0), lab.engine.stage("edges", 0)];
         let settings = EdgeSettings { sigma, k: k as f32 };
         let image = lab.field(&set, &image);
-        whole(&edges([&stages[0], &stages[1]], &lab.engine, &image, &set, spacing, &settings).unwrap())
+        whole(&detected(&lab, &image, &set, spacing, &settings))
     });
     assert!(runs[0].iter().zip(&runs[1]).all(|(a, b)| a.to_bits() == b.to_bits()), "threads changed a bit");
     for v in grid.voxels() {
@@ -138,10 +151,7 @@ fn a_part_of_the_cells_has_the_edges_of_the_whole() {
     let part = Arc::new(BrickSet::from_fn(*all.grid(), |id| all.grid().coords(id)[0] == 2));
     let source = lab.field(&all, &image);
     let settings = EdgeSettings { sigma: 2.0, k: 50.0 };
-    let [g, near] = [&all, &part].map(|set| {
-        let stages = [lab.engine.stage("heat", 0), lab.engine.stage("edges", 0)];
-        whole(&edges([&stages[0], &stages[1]], &lab.engine, &source, set, [1.0; 3], &settings).unwrap())
-    });
+    let [g, near] = [&all, &part].map(|set| whole(&detected(&lab, &source, set, [1.0; 3], &settings)));
     for v in grid.voxels().filter(|v| (32..48).contains(&v[0])) {
         let (found, exact) = (near[grid.at(v)], g[grid.at(v)]);
         assert!((found - exact).abs() < 2e-3, "{v:?}: {found} for {exact}");

@@ -11,5 +11,7 @@ use crate::kernel::level_set::covolume::{Planes, mean_gradient};
 /// When the arrays have other sizes.
 pub fn edge_detector(smoothed: &[f32], spacing: [f64; 3], length: f64, k: f32, work: &mut Planes, out: &mut [f32]) {
     mean_gradient(smoothed, spacing.map(|h| h / length), work, out);
-    out.iter_mut().for_each(|s| *s = 1.0 / (1.0 + k * *s * *s));
+    for s in out {
+        *s = 1.0 / (1.0 + k * *s * *s);
+    }
 }

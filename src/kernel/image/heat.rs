@@ -7,7 +7,7 @@
 use crate::kernel::level_set::covolume::CellMask;
 use crate::kernel::level_set::{CELL, CELL_LEN};
 
-/// Fills the scheme of one cell; `initial` is I_0 dense over the cell, `mask` says which faces are open.
+/// Fills the scheme of one cell; `initial` is `I_0` dense over the cell, `mask` says which faces are open.
 ///
 /// # Panics
 /// When `initial` is not a cell or `out` not a scheme.

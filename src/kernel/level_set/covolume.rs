@@ -15,7 +15,7 @@
 //! In: grown cells of u, d, g (f32; d in physical units, g in 0..1). Halo 1, all 26 directions for u. Work buffers:
 //! a few planes. Cost: 12 tetrahedra norms and about 60 operations per voxel.
 
-use super::gradients::{FLAT, FaceNorms, Metric, vertex_plane, x_faces, y_faces, z_faces};
+use super::gradients::{FaceNorms, Metric, vertex_plane, x_faces, y_faces, z_faces};
 use super::{CELL, CELL_LEN, GROWN, PLANE};
 
 /// What moves the surface.
@@ -366,5 +366,4 @@ fn mean_gradient_cell(u: &[f32], spacing: [f64; 3], work: &mut Planes, out: &mut
         std::mem::swap(&mut work.low, &mut work.high);
         std::mem::swap(&mut work.z_low, &mut work.z_high);
     }
-    debug_assert!(FLAT <= PLANE);
 }

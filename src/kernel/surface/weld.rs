@@ -126,8 +126,8 @@ impl Welder {
 
 #[cfg(test)]
 mod tests {
-    use super::super::MarchingCubes;
     use super::*;
+    use crate::kernel::surface::MarchingCubes;
     use crate::store::MeshBuffer;
 
     /// A slab of cells that all cross the plane z = 0.5, one patch per cell.

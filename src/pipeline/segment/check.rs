@@ -76,7 +76,11 @@ fn whole_numbers(points: &[[f64; 3]]) -> bool {
 /// What the marks would mean if they were read in another unit or order, where they would fit then.
 fn other_reading(points: &[[f64; 3]], image: &Geometry) -> Option<String> {
     let fits = |reading: &dyn Fn([f64; 3]) -> [f64; 3]| {
-        points.iter().filter(|&&p| holds(image, reading(p))).count() as f64 >= FITTING * points.len() as f64
+        let read: Vec<[f64; 3]> = points.iter().map(|&p| reading(p)).collect();
+        let [low, high] = bounds(&read);
+        // A reading that leaves next to nothing of the marks' extent would fit anywhere.
+        let drawn = (0..3).filter(|&a| high[a] - low[a] > 2.0 * image.spacing[a]).count() >= 2;
+        drawn && read.iter().filter(|&&p| holds(image, p)).count() as f64 >= FITTING * points.len() as f64
     };
     let h = image.spacing;
     if fits(&|p| std::array::from_fn(|a| p[a] * h[a])) && h != [1.0; 3] {
@@ -144,8 +148,8 @@ mod tests {
         assert!(text.contains("object 3") && text.contains("x -0.125 to 24.875") && text.contains("micrometer"));
         assert!(said(inside.iter().map(|p| p.map(|v| v * 1e3)).collect(), spacing).contains("divided by 1000"));
         assert!(said(inside.iter().map(|p| p.map(|v| v * 1e-3 - 1.0)).collect(), spacing).contains("--image-spacing"));
-        let turned = vec![[39.0, 3.0, 1.0], [38.0, 4.0, 1.5], [37.0, 5.0, 2.5], [36.0, 4.0, 3.5]];
-        assert!(said(turned, spacing).contains("z,y,x"));
+        let turned = vec![[39.0, 3.0, 55.0], [36.0, 8.0, 52.0], [33.0, 12.0, 58.0], [30.0, 6.0, 60.0]];
+        assert!(said(turned, [1.0; 3]).contains("z,y,x"));
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub enum Overlap {
 }
 
 /// An object on the image's grid.
-pub struct Placed<'a> {
+pub(super) struct Placed<'a> {
     /// Its label.
     pub label: u32,
     /// Its box in voxels of the image.
@@ -30,7 +30,7 @@ pub struct Placed<'a> {
 }
 
 /// The label volume as a source of boxes; nothing of it is stored.
-pub struct LabelVolume<'a> {
+pub(super) struct LabelVolume<'a> {
     shape: [i64; 3],
     /// Objects in the order in which they are painted: later ones win.
     objects: Vec<Placed<'a>>,
@@ -39,7 +39,7 @@ pub struct LabelVolume<'a> {
 impl<'a> LabelVolume<'a> {
     /// Puts the objects in their order.
     #[must_use]
-    pub fn new(shape: [i64; 3], mut objects: Vec<Placed<'a>>, overlap: Overlap) -> Self {
+    pub(super) fn new(shape: [i64; 3], mut objects: Vec<Placed<'a>>, overlap: Overlap) -> Self {
         objects.sort_by(|a, b| match overlap {
             Overlap::Smaller => b.volume.total_cmp(&a.volume).then(b.label.cmp(&a.label)),
             Overlap::Larger => a.volume.total_cmp(&b.volume).then(b.label.cmp(&a.label)),

@@ -11,14 +11,14 @@ use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::{Band, Reaches, make_band};
 use crate::pipeline::distance::{Sources, cloud_distance};
 use crate::pipeline::evolve::{Evolution, evolve};
-use crate::pipeline::image_terms::edges;
+use crate::pipeline::image_terms::{EdgeSettings, edges, presmooth};
 use crate::pipeline::intensity::{GreyRange, Normalised};
 use crate::pipeline::marks::{ObjectMarks, cloud_of, contour_gap};
 use crate::pipeline::tagging::{Basin, Tagging, tag};
 use crate::store::{BoxSource, BrickArray, Element};
 
 /// The image as the objects see it.
-pub struct Picture<'a, T: Element> {
+pub(super) struct Picture<'a, T: Element> {
     /// Its voxels.
     pub voxels: &'a dyn BoxSource<T>,
     /// The grey values taken as black and white.
@@ -58,7 +58,7 @@ pub struct ObjectReport {
 }
 
 /// A solved object before its surface is drawn.
-pub struct Solution {
+pub(super) struct Solution {
     /// The grid of its box.
     pub geometry: Geometry,
     /// Its box in voxels of the image; may reach past it.
@@ -90,7 +90,7 @@ const BAND_VOXELS: f64 = 4.0;
 ///
 /// # Errors
 /// When its marks enclose nothing, scratch runs out or the run is interrupted.
-pub fn solve<T: Element>(
+pub(super) fn solve<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
     marks: &ObjectMarks,
@@ -144,13 +144,15 @@ fn edge_field<T: Element>(
         return Ok(None);
     }
     let image = Normalised::new(picture.voxels, picture.range, window);
-    let smoothing = engine.stage(&name("presmoothing", marks), 0);
-    let detector = engine.stage(&name("edges", marks), 0);
-    let set = band.solved.set();
-    let edges = edges([&smoothing, &detector], engine, &image, set, geometry.spacing, &settings.edges(geometry))?;
-    smoothing.finish();
-    detector.finish();
-    Ok(Some(edges))
+    let (set, spacing) = (band.solved.set(), geometry.spacing);
+    let EdgeSettings { sigma, k } = settings.edges(geometry);
+    let stage = engine.stage(&name("presmoothing", marks), 0);
+    let smoothed = presmooth(&stage, engine, &image, set, spacing, sigma)?;
+    stage.finish();
+    let stage = engine.stage(&name("edges", marks), set.len() as u64);
+    let found = edges(&stage, engine, &smoothed, set, spacing, k)?;
+    stage.finish();
+    Ok(Some(found))
 }
 
 /// A cloud that encloses something, on a grid that reaches far enough around it.
