@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! file   | slot 0 | slot 1 | slot 2 | ...      slot = slot_len elements, native byte order, no padding
-//!        |---- segment 0 ----|---- segment 1   1 MiB each: what the window drops together
+//!        |---- segment 0 ----|---- segment 1   2 MiB each: what the window drops together
 //! ```
 //!
 //! The file has no name (it was unlinked when made), so it goes with the process whatever ends it, and nobody else

@@ -115,7 +115,8 @@ fn detected(
     settings: &EdgeSettings,
 ) -> BrickArray<f32> {
     let stage = lab.engine.stage("edges", 0);
-    let smoothed = presmooth(&stage, &lab.engine, image, set, spacing, settings.sigma).expect("smoothing needs only scratch");
+    let smoothed =
+        presmooth(&stage, &lab.engine, image, set, spacing, settings.sigma).expect("smoothing needs only scratch");
     edges(&stage, &lab.engine, &smoothed, set, spacing, settings.k).expect("edges need only scratch")
 }
 

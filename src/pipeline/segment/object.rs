@@ -65,6 +65,8 @@ pub(super) struct Solution {
     pub window: Box3,
     /// The segmentation function.
     pub u: BrickArray<f32>,
+    /// Distance to the cloud in the band; constant, the largest that was looked at, beyond.
+    pub distance: BrickArray<f32>,
     /// Points of the cloud.
     pub cloud_points: u64,
     /// Where the start surface lay.
@@ -114,15 +116,16 @@ pub(super) fn solve<T: Element>(
     let settings = settings.time_loop(&geometry);
     let evolution = evolve(&stage, engine, &mut band, edge_field.as_ref(), geometry.spacing, &settings)?;
     stage.finish();
-    let [u, _] = band.u;
+    let Band { u: [u, _], distance, voxels: band_voxels, .. } = band;
     Ok(Solution {
         geometry,
         window,
         u,
+        distance,
         cloud_points: cloud.len() as u64,
         beta: f64::from(reaches.beta),
         hole,
-        band_voxels: band.voxels,
+        band_voxels,
         evolution,
     })
 }

@@ -112,12 +112,14 @@ fn draw(
     stage.voxels(solution.band_voxels);
     stage.finish();
     if let Some(store) = store {
-        let group = if several { format!("levelset/object-{label}") } else { "levelset".into() };
-        let spec = ImageSpec { name: "levelset", geometry, element: ElementType::F32, window: Some([0.0, 1.0]) };
-        let levels = store.image(&group, &spec)?;
-        let stage = engine.stage(&format!("write u {label}"), 0);
-        write_levels::<f32>(&stage, engine, levels.levels(), u, Reduce::Mean)?;
-        stage.finish();
+        let farthest = f64::from(solution.distance.absent(0));
+        for (name, field, high) in [("levelset", u, 1.0), ("distance", &solution.distance, farthest)] {
+            let group = if several { format!("{name}/object-{label}") } else { name.into() };
+            let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
+            let stage = engine.stage(&format!("write {name} {label}"), 0);
+            write_levels::<f32>(&stage, engine, store.image(&group, &spec)?.levels(), field, Reduce::Mean)?;
+            stage.finish();
+        }
     }
     Ok(ObjectReport {
         label,
