@@ -463,5 +463,5 @@ fn other_programs_read_the_store() {
     let (store, expect) = (bench.path("out/x.zarr"), bench.path("expect.json"));
     let printed = python::run_script(interpreter, "check_store.py", &[&store, Path::new("--expect"), &expect]);
     let printed = printed.unwrap_or_else(|text| panic!("{text}"));
-    assert_eq!(printed.lines().filter(|line| line.starts_with("ok ")).count(), 3, "{printed}");
+    assert_eq!(printed.lines().filter(|line| line.starts_with("ok ")).count(), 4, "{printed}");
 }
