@@ -2,7 +2,8 @@
 #![allow(missing_docs)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, SCHEME_LEN, Velocity, assemble};
+use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
+use strandline::kernel::level_set::scheme::SCHEME_LEN;
 use strandline::kernel::level_set::{CELL_LEN, sor};
 
 fn level_set(c: &mut Criterion) {
@@ -20,8 +21,8 @@ fn level_set(c: &mut Criterion) {
     group.bench_function("assemble", |b| {
         b.iter(|| assemble(fields, &mask, [1.0; 3], &velocity, &mut work, &mut scheme));
     });
-    let mut v = u.clone();
-    group.bench_function("relax4", |b| b.iter(|| sor::relax(&mut v, &scheme, &mask, 1.2, 4)));
+    let (mut v, mut halves) = (u.clone(), sor::Halves::new());
+    group.bench_function("relax4", |b| b.iter(|| sor::relax(&mut v, &mut halves, &scheme, &mask, 1.2, 4)));
     group.finish();
 }
 

@@ -123,14 +123,21 @@ impl HaloPlan {
         // A ghost's index along an axis, as the neighbour counts it.
         let local = |voxel: i64, axis: usize| voxel - link.offset[axis] * edge;
         let width = ghosts.shape()[0] as usize;
+        if link.face.axis == 0 {
+            // A column of ghosts for each row of the face.
+            let (y, pitch) = (ghosts.lo[1], tile.pitch());
+            for z in ghosts.lo[2]..ghosts.hi[2] {
+                let to = tile.at(ghosts.lo[0] as isize, y as isize, z as isize);
+                let from = (local(z, 2) * edge + local(y, 1)) as usize;
+                let column = tile.data_mut()[to..].iter_mut().step_by(pitch);
+                column.zip(&face[from..][..ghosts.shape()[1] as usize]).for_each(|(ghost, value)| *ghost = *value);
+            }
+            return;
+        }
         for (y, z) in ghosts.rows() {
             let to = tile.at(ghosts.lo[0] as isize, y as isize, z as isize);
             let (x0, y0, z0) = (local(ghosts.lo[0], 0), local(y, 1), local(z, 2));
-            let from = match link.face.axis {
-                0 => z0 * edge + y0,
-                1 => z0 * edge + x0,
-                _ => y0 * edge + x0,
-            } as usize;
+            let from = (if link.face.axis == 1 { z0 } else { y0 } * edge + x0) as usize;
             copy_row(&mut tile.data_mut()[to..][..width], &face[from..][..width]);
         }
     }
@@ -189,7 +196,10 @@ fn scatter_faces<T: Element>(tile: &HaloTile<T>, faces: &mut [T]) {
             let r = row as isize;
             let out = &mut out[row * edge..][..width];
             match face.axis {
-                0 => out.iter_mut().enumerate().for_each(|(y, v)| *v = tile.data()[tile.at(layer, y as isize, r)]),
+                0 => {
+                    let column = tile.data()[tile.at(layer, 0, r)..].iter().step_by(tile.pitch());
+                    out.iter_mut().zip(column).for_each(|(v, value)| *v = *value);
+                }
                 1 => copy_row(out, &tile.data()[tile.at(0, layer, r)..][..width]),
                 _ => copy_row(out, &tile.data()[tile.at(0, r, layer)..][..width]),
             }

@@ -6,10 +6,11 @@
 use super::band::{Band, read_mask};
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard};
-use crate::grid::{FACES, Slot};
-use crate::kernel::level_set::CELL;
-use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, SCHEME_LAYERS, SCHEME_LEN, Velocity, assemble};
-use crate::kernel::level_set::sor::{CellSums, motion, relax};
+use crate::grid::{BrickSet, FACES, Slot};
+use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
+use crate::kernel::level_set::scheme::{SCHEME_LAYERS, SCHEME_LEN};
+use crate::kernel::level_set::sor::{CellSums, Corrections, Halves, motion, relax};
+use crate::kernel::level_set::{CELL, CELL_LEN, GROWN_LEN};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
 
@@ -33,8 +34,8 @@ pub struct TimeLoop {
     pub max_steps: u32,
     /// Over-relaxation.
     pub omega: f32,
-    /// A step is solved when no cell needed corrections above this (root mean square) when it was last taken up; what is
-    /// left then is about a tenth.
+    /// A step is solved when no cell was left with corrections above this (root mean square), and none beside it needed
+    /// such corrections later.
     pub solver_tolerance: f64,
 }
 
@@ -57,12 +58,12 @@ const LOCAL_ITERATIONS: usize = 3;
 const MAX_VISITS: usize = 30;
 
 struct Worker {
-    old: HaloTile<f32>,
     u: HaloTile<f32>,
     d: HaloTile<f32>,
     g: HaloTile<f32>,
     mask: CellMask,
     planes: Planes,
+    halves: Halves,
     scheme: Vec<f32>,
 }
 
@@ -70,13 +71,13 @@ impl Worker {
     fn new() -> Self {
         let tile = || HaloTile::new(CELL);
         Self {
-            old: tile(),
             u: tile(),
             d: tile(),
             g: tile(),
             mask: CellMask::new(),
             planes: Planes::new(),
-            scheme: vec![0.0; SCHEME_LEN],
+            halves: Halves::new(),
+            scheme: Vec::new(),
         }
     }
 }
@@ -87,7 +88,26 @@ struct Visit {
     sums: CellSums,
     gradient: f64,
     /// Root mean square of the first corrections: how far from solved the cell was when it was taken up.
-    correction: f64,
+    stirred: f64,
+    /// Root mean square of the last corrections.
+    left: f64,
+    /// The wave in which it was taken up.
+    wave: usize,
+}
+
+/// The order of the cells, made once.
+struct Cells {
+    /// Cells of even and of odd parity.
+    colours: [Vec<Slot>; 2],
+    /// The cells across the six faces of each; `Slot::MAX` where there is none.
+    beside: Vec<[Slot; 6]>,
+}
+
+impl Cells {
+    fn new(set: &BrickSet) -> Self {
+        let across = |slot| FACES.map(|face| set.neighbour(slot, face.offset()).unwrap_or(Slot::MAX));
+        Self { colours: checkerboard(set, |_| true), beside: (0..set.len() as Slot).map(across).collect() }
+    }
 }
 
 struct Solver<'a> {
@@ -97,11 +117,14 @@ struct Solver<'a> {
     edges: Option<&'a BrickArray<f32>>,
     settings: &'a TimeLoop,
     spacing: [f64; 3],
-    all: HaloPlan,
-    faces: HaloPlan,
-    /// The schemes of the step, where the window has room for them; else they are made again at each visit.
-    schemes: Option<BrickArray<f32>>,
-    workers: Workers<Worker>,
+    all: &'a HaloPlan,
+    faces: &'a HaloPlan,
+    /// What is kept of the cells, where the window has room for it; else it is made again at each visit.
+    kept: Option<&'a BrickArray<f32>>,
+    /// True in the first step, which fills the fixed part of what is kept.
+    first: bool,
+    workers: &'a Workers<Worker>,
+    cells: &'a Cells,
 }
 
 /// Moves the surface until it rests. The result is in `band.u[0]`.
@@ -118,17 +141,17 @@ pub fn evolve(
 ) -> Result<Evolution> {
     let grid = *band.solved.set().grid();
     let mut done = Evolution { steps: 0, sor_iterations: 0, stopped_by: "max-steps", residual: f64::INFINITY };
-    let plans = [HaloPlan::new(grid, Reach::All), HaloPlan::new(grid, Reach::Faces)];
-    let mut workers = Workers::new(Worker::new);
-    let mut schemes = room_for_schemes(engine, band)?;
+    let [all, faces] = &[HaloPlan::new(grid, Reach::All), HaloPlan::new(grid, Reach::Faces)];
+    let workers = &Workers::new(Worker::new);
+    let kept = room_to_keep(engine, band)?;
+    let cells = &Cells::new(band.solved.set());
     let mut cell_iterations = 0;
     // Cells without a solved voxel never change: both time levels hold their start.
     copy_start(stage, band)?;
     while done.steps < settings.max_steps {
-        let [all, faces] = plans.clone();
-        let solver = Solver { engine, stage, band, edges, settings, spacing, all, faces, schemes, workers };
+        let (kept, first) = (kept.as_ref(), done.steps == 0);
+        let solver = Solver { engine, stage, band, edges, settings, spacing, all, faces, kept, first, workers, cells };
         let (step, visits) = solver.step()?;
-        (schemes, workers) = (solver.schemes, solver.workers);
         band.u.swap(0, 1);
         done.steps += 1;
         cell_iterations += visits * LOCAL_ITERATIONS as u64;
@@ -148,18 +171,21 @@ pub fn evolve(
     Ok(done)
 }
 
-/// Bricks for the schemes of all cells, if they and the band fit the window together: streaming them through the disk
-/// would cost more than making them again, which gives the same bits.
-fn room_for_schemes(engine: &Engine, band: &Band) -> Result<Option<BrickArray<f32>>> {
+/// What is kept of a cell: its scheme of the step, then its distance and its edges with their halos, which never change.
+const KEPT_LAYERS: usize = SCHEME_LAYERS + (2 * GROWN_LEN).div_ceil(CELL_LEN);
+
+/// Bricks to keep all cells' schemes and fixed fields in, if they and the band fit the window together: streaming them
+/// through the disk would cost more than making them again, which gives the same bits.
+fn room_to_keep(engine: &Engine, band: &Band) -> Result<Option<BrickArray<f32>>> {
     // Of every voxel: two time levels, distance and edges with their faces, flags.
     const BAND_BYTES: u64 = 4 * (4 + 2) + 1;
     let set = band.solved.set();
     let voxels = set.len() as u64 * set.grid().brick_len() as u64;
-    let need = voxels * (BAND_BYTES + 4 * SCHEME_LAYERS as u64);
+    let need = voxels * (BAND_BYTES + 4 * KEPT_LAYERS as u64);
     if need > engine.scratch().window() {
         return Ok(None);
     }
-    BrickArray::with_layers(engine.scratch(), set, SCHEME_LAYERS).map(Some)
+    BrickArray::with_layers(engine.scratch(), set, KEPT_LAYERS).map(Some)
 }
 
 fn copy_start(stage: &Stage<'_>, band: &Band) -> Result<()> {
@@ -184,24 +210,25 @@ struct Step {
 impl Solver<'_> {
     /// One time step from `band.u[0]` to `band.u[1]`; returns its motion and the number of visits.
     ///
-    /// All cells are taken up once; then again those that needed corrections, and their neighbours.
+    /// All cells are taken up once; then again those that were left unsolved or whose neighbours were stirred since.
     fn step(&self) -> Result<(Step, u64)> {
         let set = self.band.solved.set();
         let mut visits = vec![Visit::default(); set.len()];
-        let mut due = vec![true; set.len()];
         let mut visited = 0;
         for round in 0..MAX_VISITS {
-            for (colour, wave) in checkerboard(set, |slot| due[slot as usize]).iter().enumerate() {
-                let results = self.stage.run(wave, &self.workers, |worker, &slot| {
+            let mut resting = true;
+            for (colour, cells) in self.cells.colours.iter().enumerate() {
+                let due = |slot: &Slot| round == 0 || self.due(&visits, *slot);
+                let wave: Vec<Slot> = cells.iter().copied().filter(due).collect();
+                let results = self.stage.run(&wave, self.workers, |worker, &slot| {
                     Ok(self.visit(worker, slot, round, colour, visits[slot as usize]))
                 })?;
-                self.engine.comm().publish_faces(wave)?;
+                self.engine.comm().publish_faces(&wave)?;
                 wave.iter().zip(results).for_each(|(&slot, visit)| visits[slot as usize] = visit);
                 visited += wave.len() as u64;
+                resting &= wave.is_empty();
             }
-            let unsolved = |slot: Slot| visits[slot as usize].correction > self.settings.solver_tolerance;
-            due = (0..set.len() as Slot).map(|slot| unsolved(slot) || self.beside(slot).any(&unsolved)).collect();
-            if !due.contains(&true) {
+            if resting {
                 break;
             }
         }
@@ -213,9 +240,12 @@ impl Solver<'_> {
         Ok((Step { speed, l2 }, visited))
     }
 
-    /// The cells that share a face with one.
-    fn beside(&self, slot: Slot) -> impl Iterator<Item = Slot> + '_ {
-        FACES.into_iter().filter_map(move |face| self.band.solved.set().neighbour(slot, face.offset()))
+    /// True when a cell was left unsolved, or beside it one that was taken up since needed corrections.
+    fn due(&self, visits: &[Visit], slot: Slot) -> bool {
+        let (tolerance, here) = (self.settings.solver_tolerance, visits[slot as usize]);
+        let stirred =
+            |q: &Slot| visits.get(*q as usize).is_some_and(|visit| visit.wave > here.wave && visit.stirred > tolerance);
+        here.left > tolerance || self.cells.beside[slot as usize].iter().any(stirred)
     }
 
     /// Sums over cells in grid order.
@@ -231,43 +261,72 @@ impl Solver<'_> {
         if w.mask.count == 0 {
             return Visit::default();
         }
-        if round == 0 || self.schemes.is_none() {
-            self.all.gather(old, slot, Boundary::Mirror, &mut w.old);
-        }
-        if round == 0 {
-            w.u.clone_from(&w.old);
-            // Cells of the first colour start from old ghosts; the second colour's neighbours are already new.
-            if colour == 1 {
-                self.faces.gather_halo(new, slot, Boundary::Mirror, &mut w.u);
+        let (gradient, corrections) = match self.kept {
+            Some(kept) if round > 0 => {
+                self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
+                (last.gradient, kept.read(slot, |kept| self.relax(w, &kept[..SCHEME_LEN])))
             }
-        } else {
-            self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
-        }
-        let mut scheme = std::mem::take(&mut w.scheme);
-        let (gradient, squares) = match &self.schemes {
-            None => (self.assemble(w, slot, &mut scheme), self.relax(w, &scheme)),
-            Some(kept) if round == 0 => kept.write(slot, |kept| (self.assemble(w, slot, kept), self.relax(w, kept))),
-            Some(kept) => (last.gradient, kept.read(slot, |kept| self.relax(w, kept))),
+            Some(kept) => kept.write(slot, |kept| {
+                let (scheme, fixed) = kept.split_at_mut(SCHEME_LEN);
+                let (d, g) = fixed.split_at_mut(GROWN_LEN);
+                if self.first {
+                    self.gather_fixed(w, slot);
+                    d.copy_from_slice(w.d.data());
+                    g[..GROWN_LEN].copy_from_slice(w.g.data());
+                }
+                self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
+                let fields = Fields { u: w.u.data(), d, g: &g[..GROWN_LEN] };
+                let gradient = self.assemble(fields, &w.mask, &mut w.planes, scheme);
+                self.take_new_values(w, slot, round, colour);
+                (gradient, self.relax(w, scheme))
+            }),
+            None => {
+                self.gather_fixed(w, slot);
+                self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
+                let mut scheme = std::mem::take(&mut w.scheme);
+                scheme.resize(SCHEME_LEN, 0.0);
+                let fields = Fields { u: w.u.data(), d: w.d.data(), g: w.g.data() };
+                let gradient = self.assemble(fields, &w.mask, &mut w.planes, &mut scheme);
+                self.take_new_values(w, slot, round, colour);
+                let corrections = self.relax(w, &scheme);
+                w.scheme = scheme;
+                (gradient, corrections)
+            }
         };
-        w.scheme = scheme;
         self.faces.scatter(&w.u, new, slot);
         Visit {
             sums: old.read(slot, |old| motion(w.u.data(), old, &w.mask)),
             gradient,
-            correction: (squares / f64::from(w.mask.count)).sqrt(),
+            stirred: (corrections.first / f64::from(w.mask.count)).sqrt(),
+            left: (corrections.last / f64::from(w.mask.count)).sqrt(),
+            wave: 2 * round + colour,
         }
     }
 
-    fn relax(&self, w: &mut Worker, scheme: &[f32]) -> f64 {
-        relax(w.u.data_mut(), scheme, &w.mask, self.settings.omega, LOCAL_ITERATIONS)
-    }
-
-    fn assemble(&self, w: &mut Worker, slot: Slot, scheme: &mut [f32]) -> f64 {
+    /// Reads what the forces are made of, with the halo across the faces.
+    fn gather_fixed(&self, w: &mut Worker, slot: Slot) {
         self.faces.gather(&self.band.distance, slot, Boundary::Mirror, &mut w.d);
         if let Some(edges) = self.edges {
             self.faces.gather(edges, slot, Boundary::Mirror, &mut w.g);
         }
-        let fields = Fields { u: w.old.data(), d: w.d.data(), g: w.g.data() };
-        assemble(fields, &w.mask, self.spacing, &self.settings.velocity, &mut w.planes, scheme)
+    }
+
+    /// Turns the tile from old values to where the solution stands. When a cell is first taken up that is its old
+    /// values; the second colour's neighbours are new already.
+    fn take_new_values(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) {
+        let new = &self.band.u[1];
+        if round > 0 {
+            self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
+        } else if colour == 1 {
+            self.faces.gather_halo(new, slot, Boundary::Mirror, &mut w.u);
+        }
+    }
+
+    fn relax(&self, w: &mut Worker, scheme: &[f32]) -> Corrections {
+        relax(w.u.data_mut(), &mut w.halves, scheme, &w.mask, self.settings.omega, LOCAL_ITERATIONS)
+    }
+
+    fn assemble(&self, fields: Fields<'_>, mask: &CellMask, planes: &mut Planes, scheme: &mut [f32]) -> f64 {
+        assemble(fields, mask, self.spacing, &self.settings.velocity, planes, scheme)
     }
 }

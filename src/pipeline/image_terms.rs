@@ -7,8 +7,9 @@ use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
 use crate::grid::{BrickSet, Slot};
 use crate::kernel::image::{edge_detector::edge_detector, heat};
-use crate::kernel::level_set::covolume::{CellMask, Planes, SCHEME_LEN};
-use crate::kernel::level_set::sor::relax;
+use crate::kernel::level_set::covolume::{CellMask, Planes};
+use crate::kernel::level_set::scheme::SCHEME_LEN;
+use crate::kernel::level_set::sor::{Halves, relax};
 use crate::kernel::level_set::{CELL, CELL_LEN};
 use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
@@ -112,20 +113,20 @@ fn relax_heat(
     sigma: f64,
 ) -> Result<()> {
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
-    let workers = Workers::new(|| (HaloTile::new(CELL), CellMask::new(), vec![0.0; SCHEME_LEN]));
+    let workers = Workers::new(|| (HaloTile::new(CELL), Halves::new(), CellMask::new(), vec![0.0; SCHEME_LEN]));
     let waves = checkerboard(set, |_| true);
     let voxels = (set.len() * CELL_LEN) as f64;
     for round in 1..=HEAT_ROUNDS {
         let mut squares = vec![0.0; set.len()];
         for wave in &waves {
-            let corrections = stage.run(wave, &workers, |(tile, mask, scheme), &slot| {
+            let corrections = stage.run(wave, &workers, |(tile, halves, mask, scheme), &slot| {
                 read_mask(solved, slot, mask);
                 close_to_absent(set, slot, mask);
                 initial.read(slot, |values| heat::scheme(values, mask, spacing, sigma, scheme));
                 plan.gather(smoothed, slot, Boundary::Mirror, tile);
-                let correction = relax(tile.data_mut(), scheme, mask, HEAT_OMEGA, HEAT_ITERATIONS);
+                let correction = relax(tile.data_mut(), halves, scheme, mask, HEAT_OMEGA, HEAT_ITERATIONS);
                 plan.scatter(tile, smoothed, slot);
-                Ok(correction)
+                Ok(correction.first)
             })?;
             wave.iter().zip(corrections).for_each(|(&slot, c)| squares[slot as usize] = c);
         }

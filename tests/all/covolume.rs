@@ -2,9 +2,8 @@
 //! one voxel and 24 tetrahedra at a time; gradients also against fields whose gradient is known.
 
 use strandline::kernel::image::edge_detector::edge_detector;
-use strandline::kernel::level_set::covolume::{
-    CellMask, Fields, Planes, SCHEME_LEN, Velocity, assemble, mean_gradient,
-};
+use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble, mean_gradient};
+use strandline::kernel::level_set::scheme::{SCHEME_LEN, scheme_place};
 use strandline::kernel::level_set::{CELL, CELL_LEN};
 
 use crate::common::lab::PlainGrid;
@@ -27,6 +26,11 @@ struct Scene {
 /// Values as f32 would hold them, so that both sides start from the same.
 fn rounded(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values.map(|v| f64::from(v as f32)).collect()
+}
+
+/// The voxel at a place of the cell.
+fn in_cell(at: usize) -> [usize; 3] {
+    [at % CELL, at / CELL % CELL, at / (CELL * CELL)]
 }
 
 /// A scheme as the kernel gives it, and the sum of gradient norms.
@@ -115,14 +119,14 @@ impl Scene {
             let diagonal = 1.0 - (0..6).filter(|&q| inside[q]).map(|q| a[q]).sum::<f64>();
             for q in 0..6 {
                 let expected = if inside[q] { -a[q] / diagonal } else { 0.0 };
-                let found = f64::from(out.values[q * CELL_LEN + at]);
+                let found = f64::from(out.values[scheme_place(q, in_cell(at))]);
                 assert!(
                     (found - expected).abs() <= tolerance * expected + 1e-7,
                     "weight {q} of {v:?}: {found} for {expected}, {velocity:?}"
                 );
             }
             let (found, expected) =
-                (f64::from(out.values[6 * CELL_LEN + at]), self.fields[0][self.grid.at(v)] / diagonal);
+                (f64::from(out.values[scheme_place(6, in_cell(at))]), self.fields[0][self.grid.at(v)] / diagonal);
             assert!((found - expected).abs() <= tolerance * expected, "right of {v:?}: {found} for {expected}");
             sum += velocity.epsilon.hypot(mean_norm(&norms));
         }
@@ -199,8 +203,8 @@ fn voxels_that_are_held_keep_their_value() {
         let y = at / CELL % CELL;
         let z = at / (CELL * CELL);
         if (mask.rows[z][0]..mask.rows[z][1]).contains(&y) {
-            assert!((0..6).all(|q| out.values[q * CELL_LEN + at] == 0.0), "{v:?}");
-            assert_eq!(out.values[6 * CELL_LEN + at], scene.fields[0][scene.grid.at(v)] as f32, "{v:?}");
+            assert!((0..6).all(|q| out.values[scheme_place(q, in_cell(at))] == 0.0), "{v:?}");
+            assert_eq!(out.values[scheme_place(6, in_cell(at))], scene.fields[0][scene.grid.at(v)] as f32, "{v:?}");
             held += 1;
         }
     }

@@ -2,8 +2,9 @@
 //! before for any tau and eps, constants stay; and against the linear system of the printed scheme in f64.
 
 use proptest::prelude::*;
-use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, SCHEME_LEN, Velocity, assemble};
-use strandline::kernel::level_set::sor::relax;
+use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
+use strandline::kernel::level_set::scheme::SCHEME_LEN;
+use strandline::kernel::level_set::sor::{Halves, relax};
 use strandline::kernel::level_set::{CELL, CELL_LEN};
 use strandline::pipeline::evolve::{Evolution, Stop, TimeLoop, evolve};
 
@@ -174,9 +175,9 @@ proptest! {
         let mut scheme = vec![0.0; SCHEME_LEN];
         let fields = Fields { u: &u, d: &d, g: &g };
         assemble(fields, &mask, problem.spacing, &problem.single(), &mut Planes::new(), &mut scheme);
-        let mut corrections = f64::INFINITY;
+        let (mut halves, mut corrections) = (Halves::new(), f64::INFINITY);
         for _ in 0..4000 {
-            corrections = relax(&mut u, &scheme, &mask, 1.2, 4);
+            corrections = relax(&mut u, &mut halves, &scheme, &mask, 1.2, 4).first;
             if corrections < CELL_LEN as f64 * 1e-14 {
                 break;
             }

@@ -5,6 +5,7 @@
 //! relaxation solves it.
 
 use crate::kernel::level_set::covolume::CellMask;
+use crate::kernel::level_set::scheme::{SCHEME_LAYERS, write_row};
 use crate::kernel::level_set::{CELL, CELL_LEN};
 
 /// Fills the scheme of one cell; `initial` is `I_0` dense over the cell, `mask` says which faces are open.
@@ -14,17 +15,24 @@ use crate::kernel::level_set::{CELL, CELL_LEN};
 pub fn scheme(initial: &[f32], mask: &CellMask, spacing: [f64; 3], sigma: f64, out: &mut [f32]) {
     assert_eq!(initial.len(), CELL_LEN, "a cell of intensities");
     let step = spacing.map(|h| (0.5 * sigma * sigma / (h * h)) as f32);
-    for row in 0..CELL * CELL {
+    vectorised!({ initial: &[f32], mask: &CellMask, step: [f32; 3], out: &mut [f32] } => scheme_rows);
+}
+
+#[inline(always)]
+fn scheme_rows(initial: &[f32], mask: &CellMask, step: [f32; 3], out: &mut [f32]) {
+    let (rows, _) = initial.as_chunks::<CELL>();
+    let (solved, _) = mask.solved.as_chunks::<CELL>();
+    for (row, (initial, solved)) in rows.iter().zip(solved).enumerate() {
         let (y, z) = (row % CELL, row / CELL);
-        for x in 0..CELL {
-            let place = [x, y, z];
-            let at = row * CELL + x;
-            let on = f32::from(mask.solved[at]);
-            let coefficient = |q: usize| on * step[q / 2] * mask.open[q / 2][q % 2][place[q / 2]];
-            let c: [f32; 6] = std::array::from_fn(coefficient);
-            let diagonal = 1.0 / (1.0 + (c[0] + c[1]) + (c[2] + c[3]) + (c[4] + c[5]));
-            (0..6).for_each(|q| out[q * CELL_LEN + at] = c[q] * diagonal);
-            out[6 * CELL_LEN + at] = initial[at] * diagonal;
+        let mut terms = [[0.0f32; CELL]; SCHEME_LAYERS];
+        for (q, c) in terms[..6].iter_mut().enumerate() {
+            let open = &mask.open[q / 2][q % 2];
+            let beyond = [*open, [open[y]; CELL], [open[z]; CELL]];
+            for x in 0..CELL {
+                c[x] = f32::from(solved[x]) * step[q / 2] * beyond[q / 2][x];
+            }
         }
+        terms[6] = *initial;
+        write_row(out, y, z, &mut terms);
     }
 }

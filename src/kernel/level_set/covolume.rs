@@ -16,6 +16,7 @@
 //! a few planes. Cost: 12 tetrahedra norms and about 60 operations per voxel.
 
 use super::gradients::{FaceNorms, Metric, vertex_plane, x_faces, y_faces, z_faces};
+use super::scheme::{SCHEME_LAYERS, write_row};
 use super::{CELL, CELL_LEN, GROWN, PLANE};
 
 /// What moves the surface.
@@ -119,12 +120,6 @@ impl Default for CellMask {
         Self::new()
     }
 }
-
-/// Layers of a scheme: the weights of the neighbours across -x, +x, -y, +y, -z, +z, then the old value divided by the
-/// diagonal; each dense over the cell.
-pub const SCHEME_LAYERS: usize = 7;
-/// Values of a scheme.
-pub const SCHEME_LEN: usize = SCHEME_LAYERS * CELL_LEN;
 
 /// Planes that the assembly rolls through.
 #[derive(Clone, Debug)]
@@ -245,8 +240,8 @@ impl Row<'_> {
         let at = (z * CELL + y) * CELL;
         let solved: &[u8; CELL] = mask.solved[at..at + CELL].first_chunk().expect("a row of the cell");
         let u = window::<CELL>(fields.u, center);
-        let mut c = [[0.0f32; CELL]; 6];
-        let mut diagonal = [1.0f32; CELL];
+        let mut terms = [[0.0f32; CELL]; SCHEME_LAYERS];
+        terms[6] = *u;
         for q in 0..6 {
             let (axis, side) = (q / 2, q % 2);
             let open = &mask.open[axis][side];
@@ -256,24 +251,13 @@ impl Row<'_> {
                 let on = f32::from(solved[x]) * beyond * step;
                 let attraction = v.theta * (d_q[q][x] - d[x]) + pull[q][x];
                 let curvature = 0.25 * v.delta * mean[x] * s[q][x];
-                c[q][x] = on * (attraction.max(0.0) + curvature);
-                diagonal[x] += c[q][x];
+                terms[q][x] = on * (attraction.max(0.0) + curvature);
             }
         }
         for x in 0..CELL {
             sums[x] += f32::from(solved[x]) * mean[x];
-            diagonal[x] = 1.0 / diagonal[x];
         }
-        for (layer, c) in c.iter().enumerate() {
-            let weights = &mut scheme[layer * CELL_LEN + at..][..CELL];
-            for x in 0..CELL {
-                weights[x] = c[x] * diagonal[x];
-            }
-        }
-        let right = &mut scheme[6 * CELL_LEN + at..][..CELL];
-        for x in 0..CELL {
-            right[x] = u[x] * diagonal[x];
-        }
+        write_row(scheme, y, z, &mut terms);
     }
 
     /// `M_p` along the row: the mean over the tetrahedra of the six faces, regularised.

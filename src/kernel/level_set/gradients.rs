@@ -8,7 +8,7 @@
 //!
 //! Everything runs along flat planes with the grown cell's row pitch: at the row ends a few values are computed that
 //! nobody reads, and in return no row has a remainder that would not fill a vector. In: one grown cell of f32.
-//! Cost per face: 8 square roots, one division.
+//! Cost per face: 4 square roots and 4 inverse ones.
 
 use super::{CELL, GROWN, PLANE};
 
@@ -73,11 +73,22 @@ fn face_sums(step: f32, mean: f32, v: [f32; 4], inverse: [f32; 2], epsilon_squar
         tetrahedron(square, v10, v11, mean, inverse[1], inverse[0]),
     ];
     let norm = (g[0].sqrt() + g[1].sqrt()) + (g[2].sqrt() + g[3].sqrt());
-    let r = g.map(|square| (epsilon_squared + square).sqrt());
-    // 1/a + 1/b + 1/c + 1/d over one common denominator: one division in place of four.
-    let (ab, cd) = (r[0] * r[1], r[2] * r[3]);
-    let sum = ((r[0] + r[1]) * cd + (r[2] + r[3]) * ab) / (ab * cd);
-    (sum, norm)
+    let r = g.map(|square| inverse_root(epsilon_squared + square));
+    ((r[0] + r[1]) + (r[2] + r[3]), norm)
+}
+
+/// `1 / sqrt(x)` for normal positive x, to 7e-7 of its value.
+///
+/// A guess from the bits of x and two Newton steps, each scaled to spread its one-sided error to both sides. Unlike the
+/// processors' own estimates it has the same bits everywhere, and it runs beside the unit for square roots, which is
+/// busy with the norms.
+#[inline(always)]
+fn inverse_root(x: f32) -> f32 {
+    const FIRST: f32 = 1.0 + 8.75e-4;
+    const SECOND: f32 = 1.0 + 5.8e-7;
+    let guess = f32::from_bits(0x5f37_5a86 - (x.to_bits() >> 1));
+    let better = guess * (1.5 * FIRST - (0.5 * FIRST * x) * (guess * guess));
+    better * (1.5 * SECOND - (0.5 * SECOND * x) * (better * better))
 }
 
 /// The squared gradient norm on the tetrahedron of the edge from `z1` to `z2`.

@@ -7,6 +7,7 @@ pub mod basins;
 pub mod covolume;
 pub mod flood;
 pub mod gradients;
+pub mod scheme;
 pub mod sor;
 
 /// Voxels along the edge of a cell.
@@ -17,3 +18,5 @@ pub const CELL_LEN: usize = CELL * CELL * CELL;
 pub(crate) const GROWN: usize = CELL + 2;
 /// Voxels of one plane of the grown cell.
 pub(crate) const PLANE: usize = GROWN * GROWN;
+/// Voxels of the grown cell.
+pub(crate) const GROWN_LEN: usize = GROWN * PLANE;

@@ -6,7 +6,8 @@
 //! over-relaxed iterates there on their way.
 
 use super::covolume::CellMask;
-use super::{CELL, CELL_LEN, GROWN, PLANE};
+use super::scheme::{HALF, HALF_LEN, half_start};
+use super::{CELL, GROWN, PLANE};
 
 /// Sums over the solved voxels of a cell after it was relaxed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,54 +22,152 @@ pub struct CellSums {
     pub largest: f32,
 }
 
-/// Relaxes a cell `iterations` times. `u` is the grown cell, ghosts current; returns the squares of first corrections.
-pub fn relax(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, iterations: usize) -> f64 {
-    vectorised!({ u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, iterations: usize }
-        => relax_cell -> f64)
+/// Squares of the corrections in a cell, summed over its solved voxels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Corrections {
+    /// In the first iteration: how far from solved the cell was when it was taken up.
+    pub first: f64,
+    /// In the last: how far it still is, if its ghosts stay.
+    pub last: f64,
 }
 
-#[inline(always)]
-fn relax_cell(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, iterations: usize) -> f64 {
-    let mut first = [0.0f32; CELL];
-    half_sweep(u, scheme, mask, omega, 0, &mut first);
-    half_sweep(u, scheme, mask, omega, 1, &mut first);
-    let mut rest = [0.0f32; CELL];
-    for _ in 1..iterations {
-        half_sweep(u, scheme, mask, omega, 0, &mut rest);
-        half_sweep(u, scheme, mask, omega, 1, &mut rest);
-    }
-    first.iter().map(|&s| f64::from(s)).sum()
+/// Relaxes a cell `iterations` times. `u` is the grown cell, ghosts current.
+pub fn relax(
+    u: &mut [f32],
+    halves: &mut Halves,
+    scheme: &[f32],
+    mask: &CellMask,
+    omega: f32,
+    iterations: usize,
+) -> Corrections {
+    vectorised!({ u: &mut [f32], halves: &mut Halves, scheme: &[f32], mask: &CellMask, omega: f32, iterations: usize }
+        => relax_cell -> Corrections)
 }
 
-/// Corrects the voxels of one colour, those with `x + y + z` of parity `colour`.
+/// Half-sweeps of both colours follow each other through the planes, each one plane behind the last: every value is
+/// the same as if they ran one after the other, and a plane's weights are read from memory once for all of them.
 #[inline(always)]
-fn half_sweep(u: &mut [f32], scheme: &[f32], mask: &CellMask, omega: f32, colour: usize, squares: &mut [f32; CELL]) {
-    // Omega on the voxels of the colour, 0 between and beyond the domain, for rows that start with either colour.
-    let turns: [[f32; CELL]; 2] = std::array::from_fn(|start| {
-        std::array::from_fn(|x| if (x + start) % 2 == 0 { omega * mask.columns[x] } else { 0.0 })
-    });
-    let inverse_square = 1.0 / (omega * omega);
-    for z in mask.planes[0]..mask.planes[1] {
-        for y in mask.rows[z][0]..mask.rows[z][1] {
-            let at = (z * CELL + y) * CELL;
-            let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
-            let turn = &turns[(colour + y + z) % 2];
-            let mut sum = *row(scheme, 6 * CELL_LEN + at);
-            let places = [center - 1, center + 1, center - GROWN, center + GROWN, center - PLANE, center + PLANE];
-            for (layer, place) in places.into_iter().enumerate() {
-                let (weights, neighbour) = (row(scheme, layer * CELL_LEN + at), row(u, place));
-                for x in 0..CELL {
-                    sum[x] += weights[x] * neighbour[x];
-                }
+fn relax_cell(
+    u: &mut [f32],
+    halves: &mut Halves,
+    scheme: &[f32],
+    mask: &CellMask,
+    omega: f32,
+    iterations: usize,
+) -> Corrections {
+    halves.split(u);
+    // Of the first iteration, of those between, of the last.
+    let mut squares = [[0.0f32; HALF]; 3];
+    let turns = std::array::from_fn(|parity| std::array::from_fn(|i| omega * mask.columns[2 * i + parity]));
+    let [first, end] = mask.planes;
+    let sweeps = 2 * iterations;
+    for front in first..end + sweeps {
+        for sweep in front.saturating_sub(end - 1)..sweeps.min(front + 1 - first) {
+            let z = front - sweep;
+            let part = usize::from(sweep >= 2) + usize::from(sweep >= 2 && sweep + 2 >= sweeps);
+            let mut lanes = squares[part];
+            for y in mask.rows[z][0]..mask.rows[z][1] {
+                let weights = &scheme[half_start(sweep % 2, y, z)..][..HALF_LEN];
+                halves.relax((sweep + y + z) % 2, [y, z], weights, &turns, &mut lanes);
             }
-            let here: &mut [f32; CELL] = u[center..center + CELL].first_chunk_mut().expect("a row of the cell");
-            for x in 0..CELL {
-                let correction = turn[x] * (sum[x] - here[x]);
-                squares[x] += correction * correction * inverse_square;
-                here[x] = (here[x] + correction).clamp(0.0, 1.0);
-            }
+            squares[part] = lanes;
         }
     }
+    halves.join(u);
+    let sum = |lanes: [f32; HALF]| lanes.iter().map(|&s| f64::from(s)).sum::<f64>() / f64::from(omega * omega);
+    let first = sum(squares[0]);
+    Corrections { first, last: if iterations > 1 { sum(squares[2]) } else { first } }
+}
+
+/// Voxels of one parity in a row of the grown cell, and in all of it.
+const HALF_PITCH: usize = GROWN / 2;
+const HALVES_LEN: usize = GROWN * PLANE / 2;
+
+/// Room for a grown cell as two halves of each row: voxels with even x, and those with odd x, which start with the
+/// ghost at -1.
+#[derive(Clone, Debug)]
+pub struct Halves([Box<[f32; HALVES_LEN]>; 2]);
+
+impl Halves {
+    /// Room for one cell.
+    ///
+    /// # Panics
+    /// Never: the boxes have the length that they are made with.
+    #[must_use]
+    pub fn new() -> Self {
+        let half = || vec![0.0; HALVES_LEN].try_into().expect("made with this length");
+        Self([half(), half()])
+    }
+
+    #[inline(always)]
+    fn split(&mut self, u: &[f32]) {
+        let [even, odd] = &mut self.0;
+        for (n, pair) in u.as_chunks::<2>().0.iter().enumerate().take(HALVES_LEN) {
+            (odd[n], even[n]) = (pair[0], pair[1]);
+        }
+    }
+
+    #[inline(always)]
+    fn join(&self, u: &mut [f32]) {
+        let [even, odd] = &self.0;
+        for (n, pair) in u.as_chunks_mut::<2>().0.iter_mut().enumerate().take(HALVES_LEN) {
+            *pair = [odd[n], even[n]];
+        }
+    }
+
+    /// Corrects the voxels of one parity in a row.
+    #[inline(always)]
+    fn relax(
+        &mut self,
+        parity: usize,
+        [y, z]: [usize; 2],
+        weights: &[f32],
+        turns: &[[f32; HALF]; 2],
+        squares: &mut [f32; HALF],
+    ) {
+        let [even, odd] = &mut self.0;
+        let (own, other) = if parity == 0 { (even, odd) } else { (odd, even) };
+        // In the odd half the ghost comes first.
+        let start = (z + 1) * PLANE / 2 + (y + 1) * HALF_PITCH;
+        let at = start + parity;
+        let neighbours = [
+            half(&**other, start),
+            half(&**other, start + 1),
+            half(&**own, at - HALF_PITCH),
+            half(&**own, at + HALF_PITCH),
+            half(&**own, at - PLANE / 2),
+            half(&**own, at + PLANE / 2),
+        ];
+        let mut sum = *half(weights, 6 * HALF);
+        for (layer, neighbour) in neighbours.into_iter().enumerate() {
+            let weights = half(weights, layer * HALF);
+            for i in 0..HALF {
+                sum[i] += weights[i] * neighbour[i];
+            }
+        }
+        let mut here = *half(&**own, at);
+        for i in 0..HALF {
+            sum[i] = turns[parity][i] * (sum[i] - here[i]);
+        }
+        for i in 0..HALF {
+            squares[i] += sum[i] * sum[i];
+        }
+        for i in 0..HALF {
+            here[i] = (here[i] + sum[i]).clamp(0.0, 1.0);
+        }
+        own[at..at + HALF].copy_from_slice(&here);
+    }
+}
+
+impl Default for Halves {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[inline(always)]
+fn half(values: &[f32], start: usize) -> &[f32; HALF] {
+    values[start..start + HALF].first_chunk().expect("half a row of the cell")
 }
 
 #[inline(always)]
