@@ -86,22 +86,21 @@ const HALVES_LEN: usize = GROWN * PLANE / 2;
 /// Room for a grown cell as two halves of each row: voxels with even x, and those with odd x, which start with the
 /// ghost at -1.
 #[derive(Clone, Debug)]
-pub struct Halves([Box<[f32; HALVES_LEN]>; 2]);
+pub struct Halves(Box<[[f32; HALVES_LEN]; 2]>);
 
 impl Halves {
     /// Room for one cell.
     ///
     /// # Panics
-    /// Never: the boxes have the length that they are made with.
+    /// Never: the box has the length that it is made with.
     #[must_use]
     pub fn new() -> Self {
-        let half = || vec![0.0; HALVES_LEN].try_into().expect("made with this length");
-        Self([half(), half()])
+        Self(vec![[0.0; HALVES_LEN]; 2].try_into().expect("made with this length"))
     }
 
     #[inline(always)]
     fn split(&mut self, u: &[f32]) {
-        let [even, odd] = &mut self.0;
+        let [even, odd] = &mut *self.0;
         for (n, pair) in u.as_chunks::<2>().0.iter().enumerate().take(HALVES_LEN) {
             (odd[n], even[n]) = (pair[0], pair[1]);
         }
@@ -109,7 +108,7 @@ impl Halves {
 
     #[inline(always)]
     fn join(&self, u: &mut [f32]) {
-        let [even, odd] = &self.0;
+        let [even, odd] = &*self.0;
         for (n, pair) in u.as_chunks_mut::<2>().0.iter_mut().enumerate().take(HALVES_LEN) {
             *pair = [odd[n], even[n]];
         }
@@ -125,18 +124,18 @@ impl Halves {
         turns: &[[f32; HALF]; 2],
         squares: &mut [f32; HALF],
     ) {
-        let [even, odd] = &mut self.0;
-        let (own, other) = if parity == 0 { (even, odd) } else { (odd, even) };
+        let [even, odd] = &mut *self.0;
+        let (own, other) = if parity == 0 { (even, &*odd) } else { (odd, &*even) };
         // In the odd half the ghost comes first.
         let start = (z + 1) * PLANE / 2 + (y + 1) * HALF_PITCH;
         let at = start + parity;
         let neighbours = [
-            half(&**other, start),
-            half(&**other, start + 1),
-            half(&**own, at - HALF_PITCH),
-            half(&**own, at + HALF_PITCH),
-            half(&**own, at - PLANE / 2),
-            half(&**own, at + PLANE / 2),
+            half(other, start),
+            half(other, start + 1),
+            half(own, at - HALF_PITCH),
+            half(own, at + HALF_PITCH),
+            half(own, at - PLANE / 2),
+            half(own, at + PLANE / 2),
         ];
         let mut sum = *half(weights, 6 * HALF);
         for (layer, neighbour) in neighbours.into_iter().enumerate() {
@@ -145,7 +144,7 @@ impl Halves {
                 sum[i] += weights[i] * neighbour[i];
             }
         }
-        let mut here = *half(&**own, at);
+        let mut here = *half(own, at);
         for i in 0..HALF {
             sum[i] = turns[parity][i] * (sum[i] - here[i]);
         }
