@@ -21,8 +21,9 @@ fn level_set(c: &mut Criterion) {
     group.bench_function("assemble", |b| {
         b.iter(|| assemble(fields, &mask, [1.0; 3], &velocity, &mut work, &mut scheme));
     });
+    let by = sor::Relaxation { scheme: &scheme, mask: &mask, omega: 1.2, iterations: 4 };
     let (mut v, mut halves) = (u.clone(), sor::Halves::new());
-    group.bench_function("relax4", |b| b.iter(|| sor::relax(&mut v, &mut halves, &scheme, &mask, 1.2, 4)));
+    group.bench_function("relax4", |b| b.iter(|| sor::relax(&mut v, &mut halves, by)));
     group.finish();
 }
 

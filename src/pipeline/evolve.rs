@@ -9,7 +9,7 @@ use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboar
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
 use crate::kernel::level_set::scheme::{SCHEME_LAYERS, SCHEME_LEN};
-use crate::kernel::level_set::sor::{CellSums, Corrections, Halves, motion, relax};
+use crate::kernel::level_set::sor::{CellSums, Corrections, Halves, Relaxation, motion, relax};
 use crate::kernel::level_set::{CELL, CELL_LEN, GROWN_LEN};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -59,12 +59,13 @@ const MAX_VISITS: usize = 30;
 
 struct Worker {
     u: HaloTile<f32>,
-    d: HaloTile<f32>,
-    g: HaloTile<f32>,
+    /// For what is copied on at once.
+    fixed: HaloTile<f32>,
     mask: CellMask,
     planes: Planes,
     halves: Halves,
-    scheme: Vec<f32>,
+    /// Room for what is made again at each visit when there is no room to keep it.
+    passing: Vec<f32>,
 }
 
 impl Worker {
@@ -72,12 +73,11 @@ impl Worker {
         let tile = || HaloTile::new(CELL);
         Self {
             u: tile(),
-            d: tile(),
-            g: tile(),
+            fixed: tile(),
             mask: CellMask::new(),
             planes: Planes::new(),
             halves: Halves::new(),
-            scheme: Vec::new(),
+            passing: Vec::new(),
         }
     }
 }
@@ -93,6 +93,14 @@ struct Visit {
     left: f64,
     /// The wave in which it was taken up.
     wave: usize,
+}
+
+/// Which cell is taken up when.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    slot: Slot,
+    round: usize,
+    colour: usize,
 }
 
 /// The order of the cells, made once.
@@ -172,7 +180,7 @@ pub fn evolve(
 }
 
 /// What is kept of a cell: its scheme of the step, then its distance and its edges with their halos, which never change.
-const KEPT_LAYERS: usize = SCHEME_LAYERS + (2 * GROWN_LEN).div_ceil(CELL_LEN);
+pub(super) const KEPT_LAYERS: usize = SCHEME_LAYERS + (2 * GROWN_LEN).div_ceil(CELL_LEN);
 
 /// Bricks to keep all cells' schemes and fixed fields in, if they and the band fit the window together: streaming them
 /// through the disk would cost more than making them again, which gives the same bits.
@@ -261,36 +269,19 @@ impl Solver<'_> {
         if w.mask.count == 0 {
             return Visit::default();
         }
+        let turn = Turn { slot, round, colour };
         let (gradient, corrections) = match self.kept {
             Some(kept) if round > 0 => {
                 self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
                 (last.gradient, kept.read(slot, |kept| self.relax(w, &kept[..SCHEME_LEN])))
             }
-            Some(kept) => kept.write(slot, |kept| {
-                let (scheme, fixed) = kept.split_at_mut(SCHEME_LEN);
-                let (d, g) = fixed.split_at_mut(GROWN_LEN);
-                if self.first {
-                    self.gather_fixed(w, slot);
-                    d.copy_from_slice(w.d.data());
-                    g[..GROWN_LEN].copy_from_slice(w.g.data());
-                }
-                self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
-                let fields = Fields { u: w.u.data(), d, g: &g[..GROWN_LEN] };
-                let gradient = self.assemble(fields, &w.mask, &mut w.planes, scheme);
-                self.take_new_values(w, slot, round, colour);
-                (gradient, self.relax(w, scheme))
-            }),
+            Some(kept) => kept.write(slot, |kept| self.assemble_and_relax(w, turn, self.first, kept)),
             None => {
-                self.gather_fixed(w, slot);
-                self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
-                let mut scheme = std::mem::take(&mut w.scheme);
-                scheme.resize(SCHEME_LEN, 0.0);
-                let fields = Fields { u: w.u.data(), d: w.d.data(), g: w.g.data() };
-                let gradient = self.assemble(fields, &w.mask, &mut w.planes, &mut scheme);
-                self.take_new_values(w, slot, round, colour);
-                let corrections = self.relax(w, &scheme);
-                w.scheme = scheme;
-                (gradient, corrections)
+                let mut passing = std::mem::take(&mut w.passing);
+                passing.resize(KEPT_LAYERS * CELL_LEN, 0.0);
+                let done = self.assemble_and_relax(w, turn, true, &mut passing);
+                w.passing = passing;
+                done
             }
         };
         self.faces.scatter(&w.u, new, slot);
@@ -303,30 +294,40 @@ impl Solver<'_> {
         }
     }
 
-    /// Reads what the forces are made of, with the halo across the faces.
-    fn gather_fixed(&self, w: &mut Worker, slot: Slot) {
-        self.faces.gather(&self.band.distance, slot, Boundary::Mirror, &mut w.d);
-        if let Some(edges) = self.edges {
-            self.faces.gather(edges, slot, Boundary::Mirror, &mut w.g);
+    /// Makes a cell's scheme in `room`, which holds what is kept of it, and relaxes the cell; `fresh` says that its fixed
+    /// part is still to be read. Returns the sum of gradient norms and the corrections.
+    fn assemble_and_relax(&self, w: &mut Worker, turn: Turn, fresh: bool, room: &mut [f32]) -> (f64, Corrections) {
+        let Turn { slot, round, colour } = turn;
+        let [old, new] = &self.band.u;
+        let (scheme, fixed) = room.split_at_mut(SCHEME_LEN);
+        let (d, g) = fixed[..2 * GROWN_LEN].split_at_mut(GROWN_LEN);
+        if fresh {
+            self.gather_fixed(&mut w.fixed, slot, [&mut *d, &mut *g]);
         }
-    }
-
-    /// Turns the tile from old values to where the solution stands. When a cell is first taken up that is its old
-    /// values; the second colour's neighbours are new already.
-    fn take_new_values(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) {
-        let new = &self.band.u[1];
+        self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
+        let fields = Fields { u: w.u.data(), d, g };
+        let gradient = assemble(fields, &w.mask, self.spacing, &self.settings.velocity, &mut w.planes, scheme);
+        // The solution starts from the old values; neighbours of the second colour are new already.
         if round > 0 {
             self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
         } else if colour == 1 {
             self.faces.gather_halo(new, slot, Boundary::Mirror, &mut w.u);
         }
+        (gradient, self.relax(w, scheme))
+    }
+
+    /// Reads distance and edges with the halo across the faces: what the forces are made of.
+    fn gather_fixed(&self, tile: &mut HaloTile<f32>, slot: Slot, [d, g]: [&mut [f32]; 2]) {
+        self.faces.gather(&self.band.distance, slot, Boundary::Mirror, tile);
+        d.copy_from_slice(tile.data());
+        if let Some(edges) = self.edges {
+            self.faces.gather(edges, slot, Boundary::Mirror, tile);
+            g.copy_from_slice(tile.data());
+        }
     }
 
     fn relax(&self, w: &mut Worker, scheme: &[f32]) -> Corrections {
-        relax(w.u.data_mut(), &mut w.halves, scheme, &w.mask, self.settings.omega, LOCAL_ITERATIONS)
-    }
-
-    fn assemble(&self, fields: Fields<'_>, mask: &CellMask, planes: &mut Planes, scheme: &mut [f32]) -> f64 {
-        assemble(fields, mask, self.spacing, &self.settings.velocity, planes, scheme)
+        let (omega, iterations) = (self.settings.omega, LOCAL_ITERATIONS);
+        relax(w.u.data_mut(), &mut w.halves, Relaxation { scheme, mask: &w.mask, omega, iterations })
     }
 }

@@ -9,7 +9,7 @@ use crate::grid::{BrickSet, Slot};
 use crate::kernel::image::{edge_detector::edge_detector, heat};
 use crate::kernel::level_set::covolume::{CellMask, Planes};
 use crate::kernel::level_set::scheme::SCHEME_LEN;
-use crate::kernel::level_set::sor::{Halves, relax};
+use crate::kernel::level_set::sor::{Halves, Relaxation, relax};
 use crate::kernel::level_set::{CELL, CELL_LEN};
 use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
@@ -116,7 +116,7 @@ fn relax_heat(
     let workers = Workers::new(|| (HaloTile::new(CELL), Halves::new(), CellMask::new(), vec![0.0; SCHEME_LEN]));
     let waves = checkerboard(set, |_| true);
     let voxels = (set.len() * CELL_LEN) as f64;
-    for round in 1..=HEAT_ROUNDS {
+    for _ in 0..HEAT_ROUNDS {
         let mut squares = vec![0.0; set.len()];
         for wave in &waves {
             let corrections = stage.run(wave, &workers, |(tile, halves, mask, scheme), &slot| {
@@ -124,14 +124,15 @@ fn relax_heat(
                 close_to_absent(set, slot, mask);
                 initial.read(slot, |values| heat::scheme(values, mask, spacing, sigma, scheme));
                 plan.gather(smoothed, slot, Boundary::Mirror, tile);
-                let correction = relax(tile.data_mut(), halves, scheme, mask, HEAT_OMEGA, HEAT_ITERATIONS);
+                let by = Relaxation { scheme, mask, omega: HEAT_OMEGA, iterations: HEAT_ITERATIONS };
+                let correction = relax(tile.data_mut(), halves, by);
                 plan.scatter(tile, smoothed, slot);
                 Ok(correction.first)
             })?;
             wave.iter().zip(corrections).for_each(|(&slot, c)| squares[slot as usize] = c);
         }
         let residual = (squares.iter().sum::<f64>() / voxels).sqrt();
-        stage.iterated((HEAT_ITERATIONS * usize::from(round > 0)) as u64, residual);
+        stage.iterated(HEAT_ITERATIONS as u64, residual);
         if residual < HEAT_TOLERANCE {
             break;
         }

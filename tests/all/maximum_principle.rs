@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
 use strandline::kernel::level_set::scheme::SCHEME_LEN;
-use strandline::kernel::level_set::sor::{Halves, relax};
+use strandline::kernel::level_set::sor::{Halves, Relaxation, relax};
 use strandline::kernel::level_set::{CELL, CELL_LEN};
 use strandline::pipeline::evolve::{Evolution, Stop, TimeLoop, evolve};
 
@@ -176,8 +176,9 @@ proptest! {
         let fields = Fields { u: &u, d: &d, g: &g };
         assemble(fields, &mask, problem.spacing, &problem.single(), &mut Planes::new(), &mut scheme);
         let (mut halves, mut corrections) = (Halves::new(), f64::INFINITY);
+        let by = Relaxation { scheme: &scheme, mask: &mask, omega: 1.2, iterations: 4 };
         for _ in 0..4000 {
-            corrections = relax(&mut u, &mut halves, &scheme, &mask, 1.2, 4).first;
+            corrections = relax(&mut u, &mut halves, by).first;
             if corrections < CELL_LEN as f64 * 1e-14 {
                 break;
             }

@@ -16,10 +16,6 @@ pub struct CellSums {
     pub moved: f64,
     /// `(u - u_old)^2`.
     pub moved_squared: f64,
-    /// `u - u_old`.
-    pub grown: f64,
-    /// The largest `|u - u_old|`.
-    pub largest: f32,
 }
 
 /// Squares of the corrections in a cell, summed over its solved voxels.
@@ -31,37 +27,39 @@ pub struct Corrections {
     pub last: f64,
 }
 
-/// Relaxes a cell `iterations` times. `u` is the grown cell, ghosts current.
-pub fn relax(
-    u: &mut [f32],
-    halves: &mut Halves,
-    scheme: &[f32],
-    mask: &CellMask,
-    omega: f32,
-    iterations: usize,
-) -> Corrections {
-    vectorised!({ u: &mut [f32], halves: &mut Halves, scheme: &[f32], mask: &CellMask, omega: f32, iterations: usize }
-        => relax_cell -> Corrections)
+/// What a cell is relaxed by.
+#[derive(Clone, Copy, Debug)]
+pub struct Relaxation<'a> {
+    /// The linear system, as `scheme` lays it out.
+    pub scheme: &'a [f32],
+    /// Which voxels are solved.
+    pub mask: &'a CellMask,
+    /// Over-relaxation.
+    pub omega: f32,
+    /// How often; at least once.
+    pub iterations: usize,
+}
+
+/// Relaxes a cell. `u` is the grown cell, ghosts current.
+pub fn relax(u: &mut [f32], halves: &mut Halves, by: Relaxation<'_>) -> Corrections {
+    if by.mask.count == 0 {
+        return Corrections::default();
+    }
+    vectorised!({ u: &mut [f32], halves: &mut Halves, by: Relaxation<'_> } => relax_cell -> Corrections)
 }
 
 /// Half-sweeps of both colours follow each other through the planes, each one plane behind the last: every value is
 /// the same as if they ran one after the other, and a plane's weights are read from memory once for all of them.
 #[inline(always)]
-fn relax_cell(
-    u: &mut [f32],
-    halves: &mut Halves,
-    scheme: &[f32],
-    mask: &CellMask,
-    omega: f32,
-    iterations: usize,
-) -> Corrections {
+fn relax_cell(u: &mut [f32], halves: &mut Halves, by: Relaxation<'_>) -> Corrections {
+    let Relaxation { scheme, mask, omega, iterations } = by;
     halves.split(u);
     // Of the first iteration, of those between, of the last.
     let mut squares = [[0.0f32; HALF]; 3];
     let turns = std::array::from_fn(|parity| std::array::from_fn(|i| omega * mask.columns[2 * i + parity]));
     let [first, end] = mask.planes;
     let sweeps = 2 * iterations;
-    for front in first..end + sweeps {
+    for front in first..end + sweeps - 1 {
         for sweep in front.saturating_sub(end - 1)..sweeps.min(front + 1 - first) {
             let z = front - sweep;
             let part = usize::from(sweep >= 2) + usize::from(sweep >= 2 && sweep + 2 >= sweeps);
@@ -184,8 +182,6 @@ pub fn motion(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
 fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
     let mut moved = [0.0f32; CELL];
     let mut squared = [0.0f32; CELL];
-    let mut grown = [0.0f32; CELL];
-    let mut largest = [0.0f32; CELL];
     for z in mask.planes[0]..mask.planes[1] {
         for y in mask.rows[z][0]..mask.rows[z][1] {
             let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
@@ -194,16 +190,82 @@ fn motion_cell(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
                 let step = mask.columns[x] * (u[x] - old[x]);
                 moved[x] += step.abs();
                 squared[x] += step * step;
-                grown[x] += step;
-                largest[x] = largest[x].max(step.abs());
             }
         }
     }
     let sum = |lanes: [f32; CELL]| lanes.iter().map(|&s| f64::from(s)).sum();
-    CellSums {
-        moved: sum(moved),
-        moved_squared: sum(squared),
-        grown: sum(grown),
-        largest: largest.iter().copied().fold(0.0, f32::max),
+    CellSums { moved: sum(moved), moved_squared: sum(squared) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::level_set::scheme::{SCHEME_LEN, scheme_place};
+    use crate::kernel::level_set::{CELL_LEN, GROWN_LEN};
+
+    /// Numbers in [0, 1) that look random.
+    fn noise(seed: u32, len: usize) -> Vec<f32> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        (0..len).map(|_| next()).collect()
+    }
+
+    /// Kósa 2015, sec. 3.5: one voxel after the other, all of one colour, then all of the other.
+    fn textbook(u: &mut [f32], weights: &dyn Fn(usize, [usize; 3]) -> f32, solved: &[u8], omega: f32, colour: usize) {
+        for at in (0..CELL_LEN).filter(|&at| solved[at] == 1) {
+            let p = [at % CELL, at / CELL % CELL, at / (CELL * CELL)];
+            if p.iter().sum::<usize>() % 2 != colour {
+                continue;
+            }
+            let here = (p[2] + 1) * PLANE + (p[1] + 1) * GROWN + p[0] + 1;
+            let around = [here - 1, here + 1, here - GROWN, here + GROWN, here - PLANE, here + PLANE];
+            let start = weights(6, p);
+            let solution = (0..6).fold(start, |sum, q| sum + weights(q, p) * u[around[q]]);
+            u[here] = (u[here] + omega * (solution - u[here])).clamp(0.0, 1.0);
+        }
+    }
+
+    #[test]
+    fn overlapping_half_sweeps_give_the_textbooks_bits() {
+        for (iterations, share) in [(1, 1.0), (2, 0.3), (3, 0.02), (5, 1.0), (12, 0.001)] {
+            let solved: Vec<u8> = noise(7, CELL_LEN).iter().map(|&v| u8::from(v < share)).collect();
+            let value = |layer: usize, at: usize| noise((layer * CELL_LEN + at) as u32, 1)[0] / 6.0;
+            let weights = |layer: usize, [x, y, z]: [usize; 3]| {
+                let at = (z * CELL + y) * CELL + x;
+                if solved[at] == 1 { value(layer, at) } else { 0.0 }
+            };
+            let mut u = noise(3, GROWN_LEN);
+            let mut scheme = vec![0.0; SCHEME_LEN];
+            for at in 0..CELL_LEN {
+                let p = [at % CELL, at / CELL % CELL, at / (CELL * CELL)];
+                let held = u[(p[2] + 1) * PLANE + (p[1] + 1) * GROWN + p[0] + 1];
+                for layer in 0..7 {
+                    scheme[scheme_place(layer, p)] = weights(layer, p);
+                }
+                if solved[at] == 0 {
+                    scheme[scheme_place(6, p)] = held;
+                }
+            }
+            let mut mask = CellMask::new();
+            mask.set(&solved, [CELL; 3], [[false; 2]; 3]);
+            let mut plain = u.clone();
+            for sweep in 0..2 * iterations {
+                textbook(&mut plain, &weights, &solved, 1.3, sweep % 2);
+            }
+            relax(&mut u, &mut Halves::new(), Relaxation { scheme: &scheme, mask: &mask, omega: 1.3, iterations });
+            assert!(u.iter().zip(&plain).all(|(a, b)| a.to_bits() == b.to_bits()), "{iterations} times, {share}");
+        }
+    }
+
+    #[test]
+    fn a_cell_without_solved_voxels_stays() {
+        let (mut u, scheme) = (noise(5, GROWN_LEN), vec![0.5; SCHEME_LEN]);
+        let before = u.clone();
+        let by = Relaxation { scheme: &scheme, mask: &CellMask::new(), omega: 1.3, iterations: 20 };
+        assert_eq!(relax(&mut u, &mut Halves::new(), by), Corrections::default());
+        assert_eq!(u, before);
     }
 }

@@ -7,6 +7,7 @@ use super::object::first_cells;
 use super::settings::{Guides, SegmentSettings};
 use crate::grid::{Box3, BrickGrid};
 use crate::kernel::level_set::CELL_LEN;
+use crate::pipeline::evolve::KEPT_LAYERS;
 use crate::pipeline::marks::split;
 use crate::store::PlaneSource;
 
@@ -28,8 +29,8 @@ pub struct Estimate {
 }
 
 /// Scratch a voxel near the marks takes while its object is solved: two time levels, distance and edges, f32 with faces
-/// (3/8 more), flags, and the scheme's seven coefficients. Presmoothing before that takes less, though it reaches farther.
-const SOLVE_BYTES: u64 = 52;
+/// (3/8 more), flags, and what the time loop keeps of it. Presmoothing before that takes less, though it reaches farther.
+const SOLVE_BYTES: u64 = 24 + 4 * KEPT_LAYERS as u64;
 /// Scratch a voxel near the marks takes for the distance alone: state and result, with faces.
 const DISTANCE_BYTES: u64 = 11;
 /// What stays of it when the object is solved.
