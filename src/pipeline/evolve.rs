@@ -1,15 +1,17 @@
 //! The time loop of the level set over the cells of the band (algorithms: section 5, "Time loop"; section 10).
 //!
-//! A step assembles the scheme of each cell from the old values and relaxes it; cells of even and odd parity take
-//! turns, and those that needed corrections are taken up again until the corrections are small.
+//! A step assembles the scheme of each cell from the old values and relaxes it, from where the last two steps point to;
+//! cells of even and odd parity take turns, and those that needed corrections, or stand beside one that did, are taken up
+//! again until the corrections are small. A scheme is made again at each visit: most cells are visited once a step, and
+//! writing it to memory and reading it back would cost as much.
 
 use super::band::{Band, read_mask};
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
-use crate::kernel::level_set::scheme::{SCHEME_LAYERS, SCHEME_LEN};
-use crate::kernel::level_set::sor::{CellSums, Corrections, Halves, Relaxation, motion, relax};
+use crate::kernel::level_set::scheme::SCHEME_LEN;
+use crate::kernel::level_set::sor::{CellSums, Corrections, Halves, Relaxation, extrapolate, motion, relax};
 use crate::kernel::level_set::{CELL, CELL_LEN, GROWN_LEN};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -57,14 +59,18 @@ const LOCAL_ITERATIONS: usize = 3;
 /// Visits of a cell in one step at most; the tolerance is reached long before.
 const MAX_VISITS: usize = 30;
 
+/// Corrections of a cell, in tolerances, from which on those beside it are taken up again. A ghost enters one voxel with a
+/// weight below 1/2, and one voxel of 16 has one there: less than 1/8 of the root mean square is passed on.
+const PASSED_ON: f64 = 4.0;
+
 struct Worker {
     u: HaloTile<f32>,
-    /// For what is copied on at once.
-    fixed: HaloTile<f32>,
+    older: HaloTile<f32>,
     mask: CellMask,
     planes: Planes,
     halves: Halves,
-    /// Room for what is made again at each visit when there is no room to keep it.
+    scheme: Vec<f32>,
+    /// Distance and edges, where there is no room to keep them.
     passing: Vec<f32>,
 }
 
@@ -73,11 +79,12 @@ impl Worker {
         let tile = || HaloTile::new(CELL);
         Self {
             u: tile(),
-            fixed: tile(),
+            older: tile(),
             mask: CellMask::new(),
             planes: Planes::new(),
             halves: Halves::new(),
-            passing: Vec::new(),
+            scheme: vec![0.0; SCHEME_LEN],
+            passing: vec![0.0; FIXED_LEN],
         }
     }
 }
@@ -179,8 +186,9 @@ pub fn evolve(
     Ok(done)
 }
 
-/// What is kept of a cell: its scheme of the step, then its distance and its edges with their halos, which never change.
-pub(super) const KEPT_LAYERS: usize = SCHEME_LAYERS + (2 * GROWN_LEN).div_ceil(CELL_LEN);
+/// What is kept of a cell: its distance and its edges with their halos, which never change.
+const FIXED_LEN: usize = 2 * GROWN_LEN;
+pub(super) const KEPT_LAYERS: usize = FIXED_LEN.div_ceil(CELL_LEN);
 
 /// Bricks to keep all cells' schemes and fixed fields in, if they and the band fit the window together: streaming them
 /// through the disk would cost more than making them again, which gives the same bits.
@@ -228,9 +236,8 @@ impl Solver<'_> {
             for (colour, cells) in self.cells.colours.iter().enumerate() {
                 let due = |slot: &Slot| round == 0 || self.due(&visits, *slot);
                 let wave: Vec<Slot> = cells.iter().copied().filter(due).collect();
-                let results = self.stage.run(&wave, self.workers, |worker, &slot| {
-                    Ok(self.visit(worker, slot, round, colour, visits[slot as usize]))
-                })?;
+                let results =
+                    self.stage.run(&wave, self.workers, |worker, &slot| Ok(self.visit(worker, slot, round, colour)))?;
                 self.engine.comm().publish_faces(&wave)?;
                 wave.iter().zip(results).for_each(|(&slot, visit)| visits[slot as usize] = visit);
                 visited += wave.len() as u64;
@@ -251,8 +258,9 @@ impl Solver<'_> {
     /// True when a cell was left unsolved, or beside it one that was taken up since needed corrections.
     fn due(&self, visits: &[Visit], slot: Slot) -> bool {
         let (tolerance, here) = (self.settings.solver_tolerance, visits[slot as usize]);
-        let stirred =
-            |q: &Slot| visits.get(*q as usize).is_some_and(|visit| visit.wave > here.wave && visit.stirred > tolerance);
+        let stirred = |q: &Slot| {
+            visits.get(*q as usize).is_some_and(|there| there.wave > here.wave && there.stirred > PASSED_ON * tolerance)
+        };
         here.left > tolerance || self.cells.beside[slot as usize].iter().any(stirred)
     }
 
@@ -263,23 +271,24 @@ impl Solver<'_> {
     }
 
     /// Takes up a cell: assembles its scheme unless it was kept, relaxes it, writes it back.
-    fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize, last: Visit) -> Visit {
+    fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) -> Visit {
         let [old, new] = &self.band.u;
         read_mask(&self.band.solved, slot, &mut w.mask);
+        let wave = 2 * round + colour;
         if w.mask.count == 0 {
-            return Visit::default();
+            return Visit { wave, ..Visit::default() };
         }
         let turn = Turn { slot, round, colour };
         let (gradient, corrections) = match self.kept {
-            Some(kept) if round > 0 => {
-                self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
-                (last.gradient, kept.read(slot, |kept| self.relax(w, &kept[..SCHEME_LEN])))
-            }
-            Some(kept) => kept.write(slot, |kept| self.assemble_and_relax(w, turn, self.first, kept)),
+            Some(kept) if self.first && round == 0 => kept.write(slot, |fixed| {
+                self.gather_fixed(&mut w.older, slot, fixed);
+                self.solve(w, turn, fixed)
+            }),
+            Some(kept) => kept.read(slot, |fixed| self.solve(w, turn, fixed)),
             None => {
                 let mut passing = std::mem::take(&mut w.passing);
-                passing.resize(KEPT_LAYERS * CELL_LEN, 0.0);
-                let done = self.assemble_and_relax(w, turn, true, &mut passing);
+                self.gather_fixed(&mut w.older, slot, &mut passing);
+                let done = self.solve(w, turn, &passing);
                 w.passing = passing;
                 done
             }
@@ -290,44 +299,41 @@ impl Solver<'_> {
             gradient,
             stirred: (corrections.first / f64::from(w.mask.count)).sqrt(),
             left: (corrections.last / f64::from(w.mask.count)).sqrt(),
-            wave: 2 * round + colour,
+            wave,
         }
     }
 
-    /// Makes a cell's scheme in `room`, which holds what is kept of it, and relaxes the cell; `fresh` says that its fixed
-    /// part is still to be read. Returns the sum of gradient norms and the corrections.
-    fn assemble_and_relax(&self, w: &mut Worker, turn: Turn, fresh: bool, room: &mut [f32]) -> (f64, Corrections) {
+    /// Makes a cell's scheme and relaxes the cell. Returns the sum of gradient norms and the corrections.
+    fn solve(&self, w: &mut Worker, turn: Turn, fixed: &[f32]) -> (f64, Corrections) {
         let Turn { slot, round, colour } = turn;
         let [old, new] = &self.band.u;
-        let (scheme, fixed) = room.split_at_mut(SCHEME_LEN);
-        let (d, g) = fixed[..2 * GROWN_LEN].split_at_mut(GROWN_LEN);
-        if fresh {
-            self.gather_fixed(&mut w.fixed, slot, [&mut *d, &mut *g]);
-        }
+        let (d, g) = fixed[..FIXED_LEN].split_at(GROWN_LEN);
         self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
         let fields = Fields { u: w.u.data(), d, g };
-        let gradient = assemble(fields, &w.mask, self.spacing, &self.settings.velocity, &mut w.planes, scheme);
-        // The solution starts from the old values; neighbours of the second colour are new already.
+        let gradient = assemble(fields, &w.mask, self.spacing, &self.settings.velocity, &mut w.planes, &mut w.scheme);
         if round > 0 {
             self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
-        } else if colour == 1 {
-            self.faces.gather_halo(new, slot, Boundary::Mirror, &mut w.u);
+        } else {
+            // The new field still holds the values before the old ones, save where the first colour is done.
+            self.faces.gather(new, slot, Boundary::Mirror, &mut w.older);
+            extrapolate(w.u.data_mut(), w.older.data());
+            if colour == 1 {
+                self.faces.gather_halo(new, slot, Boundary::Mirror, &mut w.u);
+            }
         }
-        (gradient, self.relax(w, scheme))
+        let (omega, iterations) = (self.settings.omega, LOCAL_ITERATIONS);
+        let by = Relaxation { scheme: &w.scheme, mask: &w.mask, omega, iterations };
+        (gradient, relax(w.u.data_mut(), &mut w.halves, by))
     }
 
     /// Reads distance and edges with the halo across the faces: what the forces are made of.
-    fn gather_fixed(&self, tile: &mut HaloTile<f32>, slot: Slot, [d, g]: [&mut [f32]; 2]) {
+    fn gather_fixed(&self, tile: &mut HaloTile<f32>, slot: Slot, fixed: &mut [f32]) {
+        let (d, g) = fixed[..FIXED_LEN].split_at_mut(GROWN_LEN);
         self.faces.gather(&self.band.distance, slot, Boundary::Mirror, tile);
         d.copy_from_slice(tile.data());
         if let Some(edges) = self.edges {
             self.faces.gather(edges, slot, Boundary::Mirror, tile);
             g.copy_from_slice(tile.data());
         }
-    }
-
-    fn relax(&self, w: &mut Worker, scheme: &[f32]) -> Corrections {
-        let (omega, iterations) = (self.settings.omega, LOCAL_ITERATIONS);
-        relax(w.u.data_mut(), &mut w.halves, Relaxation { scheme, mask: &w.mask, omega, iterations })
     }
 }

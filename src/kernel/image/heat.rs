@@ -5,7 +5,7 @@
 //! relaxation solves it.
 
 use crate::kernel::level_set::covolume::CellMask;
-use crate::kernel::level_set::scheme::{SCHEME_LAYERS, write_row};
+use crate::kernel::level_set::scheme::{LANES, SCHEME_LAYERS, write_part};
 use crate::kernel::level_set::{CELL, CELL_LEN};
 
 /// Fills the scheme of one cell; `initial` is `I_0` dense over the cell, `mask` says which faces are open.
@@ -20,19 +20,19 @@ pub fn scheme(initial: &[f32], mask: &CellMask, spacing: [f64; 3], sigma: f64, o
 
 #[inline(always)]
 fn scheme_rows(initial: &[f32], mask: &CellMask, step: [f32; 3], out: &mut [f32]) {
-    let (rows, _) = initial.as_chunks::<CELL>();
-    let (solved, _) = mask.solved.as_chunks::<CELL>();
-    for (row, (initial, solved)) in rows.iter().zip(solved).enumerate() {
-        let (y, z) = (row % CELL, row / CELL);
-        let mut terms = [[0.0f32; CELL]; SCHEME_LAYERS];
+    let (parts, _) = initial.as_chunks::<LANES>();
+    let (solved, _) = mask.solved.as_chunks::<LANES>();
+    for (n, (initial, solved)) in parts.iter().zip(solved).enumerate() {
+        let [start, y, z] = [n * LANES % CELL, n * LANES / CELL % CELL, n * LANES / (CELL * CELL)];
+        let mut terms = [[0.0f32; LANES]; SCHEME_LAYERS];
         for (q, c) in terms[..6].iter_mut().enumerate() {
             let open = &mask.open[q / 2][q % 2];
-            let beyond = [*open, [open[y]; CELL], [open[z]; CELL]];
-            for x in 0..CELL {
-                c[x] = f32::from(solved[x]) * step[q / 2] * beyond[q / 2][x];
+            for x in 0..LANES {
+                let beyond = [open[start + x], open[y], open[z]][q / 2];
+                c[x] = f32::from(solved[x]) * step[q / 2] * beyond;
             }
         }
         terms[6] = *initial;
-        write_row(out, y, z, &mut terms);
+        write_part(out, [start, y, z], &mut terms);
     }
 }

@@ -16,7 +16,7 @@
 //! a few planes. Cost: 12 tetrahedra norms and about 60 operations per voxel.
 
 use super::gradients::{FaceNorms, Metric, vertex_plane, x_faces, y_faces, z_faces};
-use super::scheme::{SCHEME_LAYERS, write_row};
+use super::scheme::{LANES, SCHEME_LAYERS, write_part};
 use super::{CELL, CELL_LEN, GROWN, PLANE};
 
 /// What moves the surface.
@@ -225,46 +225,110 @@ fn window<const N: usize>(values: &[f32], start: usize) -> &[f32; N] {
     values[start..start + N].first_chunk().expect("the slice has N values")
 }
 
+/// Values of a grown cell from the lower z-neighbour of a part of a row to the upper one.
+const AROUND: usize = 2 * PLANE + LANES;
+
+/// What the coefficients of a part of a row are made of.
+struct Part<'a> {
+    d: &'a [f32; AROUND],
+    g: &'a [f32; AROUND],
+    /// `r_p`.
+    pull: [f32; LANES],
+    /// `M_p`.
+    mean: [f32; LANES],
+    solved: [f32; LANES],
+    /// The part's first column.
+    start: usize,
+}
+
+/// How much more neighbour Q has than the voxel.
+#[inline(always)]
+fn differences<const Q: usize>(values: &[f32; AROUND]) -> [f32; LANES] {
+    let place = [PLANE - 1, PLANE + 1, PLANE - GROWN, PLANE + GROWN, 0, 2 * PLANE][Q];
+    let (mut there, here) = (*window::<LANES>(values, place), window::<LANES>(values, PLANE));
+    for x in 0..LANES {
+        there[x] -= here[x];
+    }
+    there
+}
+
 impl Row<'_> {
+    /// Assembles the row in two parts, each of which fills a vector; one without solved voxels stays as it is.
     #[inline(always)]
     fn assemble<const EDGES: bool>(&self, fields: Fields<'_>, scheme: &mut [f32], sums: &mut [f32; CELL]) {
-        let (y, z, mask, v) = (self.y, self.z, self.mask, self.velocity);
-        let center = (z + 1) * PLANE + (y + 1) * GROWN + 1;
-        let flat = y * GROWN;
-        let places = [center - 1, center + 1, center - GROWN, center + GROWN, center - PLANE, center + PLANE];
-        let d = window::<CELL>(fields.d, center);
-        let d_q: [&[f32; CELL]; 6] = places.map(|p| window(fields.d, p));
-        let mean = self.mean_norms(flat);
-        let s: [&[f32; CELL]; 6] = self.face_inverses(flat);
-        let pull = if EDGES { self.edge_pull(fields.g, center, &places) } else { [[0.0; CELL]; 6] };
-        let at = (z * CELL + y) * CELL;
-        let solved: &[u8; CELL] = mask.solved[at..at + CELL].first_chunk().expect("a row of the cell");
-        let u = window::<CELL>(fields.u, center);
-        let mut terms = [[0.0f32; CELL]; SCHEME_LAYERS];
-        terms[6] = *u;
-        for q in 0..6 {
-            let (axis, side) = (q / 2, q % 2);
-            let open = &mask.open[axis][side];
-            let step = self.step[axis];
-            for x in 0..CELL {
-                let beyond = [open[x], open[y], open[z]][axis];
-                let on = f32::from(solved[x]) * beyond * step;
-                let attraction = v.theta * (d_q[q][x] - d[x]) + pull[q][x];
-                let curvature = 0.25 * v.delta * mean[x] * s[q][x];
-                terms[q][x] = on * (attraction.max(0.0) + curvature);
+        let at = (self.z * CELL + self.y) * CELL;
+        for start in [0, LANES] {
+            let solved = *self.mask.solved[at + start..].first_chunk::<LANES>().expect("half a row");
+            let mut terms = [[0.0f32; LANES]; SCHEME_LAYERS];
+            if u64::from_ne_bytes(solved) == 0 {
+                terms[6] = *window(fields.u, self.center() + start);
+            } else {
+                let mean = self.terms::<EDGES>(fields, start, solved, &mut terms);
+                for x in 0..LANES {
+                    sums[start + x] += f32::from(solved[x]) * mean[x];
+                }
             }
+            write_part(scheme, [start, self.y, self.z], &mut terms);
         }
-        for x in 0..CELL {
-            sums[x] += f32::from(solved[x]) * mean[x];
+    }
+
+    /// Place of the row's first voxel in a grown cell.
+    #[inline(always)]
+    fn center(&self) -> usize {
+        (self.z + 1) * PLANE + (self.y + 1) * GROWN + 1
+    }
+
+    /// The coefficients and the old values from voxel `start` on. Returns `M_p`.
+    #[inline(always)]
+    fn terms<const EDGES: bool>(
+        &self,
+        fields: Fields<'_>,
+        start: usize,
+        solved: [u8; LANES],
+        terms: &mut [[f32; LANES]; SCHEME_LAYERS],
+    ) -> [f32; LANES] {
+        let center = self.center() + start;
+        let d = window(fields.d, center - PLANE);
+        let g = if EDGES { window(fields.g, center - PLANE) } else { &[0.0; AROUND] };
+        let mean = self.mean_norms(self.y * GROWN + start);
+        let pull = if EDGES { self.edge_pull(g) } else { [0.0; LANES] };
+        let part = Part { d, g, pull, mean, solved: solved.map(f32::from), start };
+        // Written out: a loop over the six would look up everything that is known here.
+        terms[0] = self.coefficients::<0>(&part);
+        terms[1] = self.coefficients::<1>(&part);
+        terms[2] = self.coefficients::<2>(&part);
+        terms[3] = self.coefficients::<3>(&part);
+        terms[4] = self.coefficients::<4>(&part);
+        terms[5] = self.coefficients::<5>(&part);
+        terms[6] = *window(fields.u, center);
+        mean
+    }
+
+    /// The coefficients towards neighbour Q.
+    #[inline(always)]
+    fn coefficients<const Q: usize>(&self, part: &Part<'_>) -> [f32; LANES] {
+        let (v, step, open) = (self.velocity, self.step[Q / 2], &self.mask.open[Q / 2][Q % 2]);
+        let open: [f32; LANES] = match Q / 2 {
+            0 => *window(open, part.start),
+            1 => [open[self.y]; LANES],
+            _ => [open[self.z]; LANES],
+        };
+        let (d, g, s) = (differences::<Q>(part.d), differences::<Q>(part.g), self.face_inverses::<Q>(part.start));
+        let mut c = [0.0; LANES];
+        for x in 0..LANES {
+            let on = part.solved[x] * open[x] * step;
+            let attraction = v.theta * d[x] + part.pull[x] * g[x];
+            let curvature = 0.25 * v.delta * part.mean[x] * s[x];
+            c[x] = on * (attraction.max(0.0) + curvature);
         }
-        write_row(scheme, y, z, &mut terms);
+        c
     }
 
     /// `M_p` along the row: the mean over the tetrahedra of the six faces, regularised.
     #[inline(always)]
-    fn mean_norms(&self, flat: usize) -> [f32; CELL] {
+    fn mean_norms<const N: usize>(&self, flat: usize) -> [f32; N] {
         let work = self.work;
-        let faces: [&[f32; CELL]; 6] = [
+        let faces: [&[f32; N]; 6] = [
             window(&work.x.norm, flat),
             window(&work.x.norm, flat + 1),
             window(&work.y.norm, flat),
@@ -272,8 +336,8 @@ impl Row<'_> {
             window(&work.z_low.norm, flat),
             window(&work.z_high.norm, flat),
         ];
-        let mut mean = [0.0f32; CELL];
-        for x in 0..CELL {
+        let mut mean = [0.0f32; N];
+        for x in 0..N {
             let sum = (faces[0][x] + faces[1][x]) + (faces[2][x] + faces[3][x]) + (faces[4][x] + faces[5][x]);
             let m = sum * (1.0 / 24.0);
             mean[x] = (self.metric.epsilon_squared + m * m).sqrt();
@@ -281,44 +345,48 @@ impl Row<'_> {
         mean
     }
 
+    /// `S_pq` towards neighbour Q.
     #[inline(always)]
-    fn face_inverses(&self, flat: usize) -> [&[f32; CELL]; 6] {
-        let work = self.work;
-        [
-            window(&work.x.inverse, flat),
-            window(&work.x.inverse, flat + 1),
-            window(&work.y.inverse, flat),
-            window(&work.y.inverse, flat + GROWN),
-            window(&work.z_low.inverse, flat),
-            window(&work.z_high.inverse, flat),
-        ]
+    fn face_inverses<const Q: usize>(&self, start: usize) -> &[f32; LANES] {
+        let (work, flat) = (self.work, self.y * GROWN + start);
+        match Q {
+            0 => window(&work.x.inverse, flat),
+            1 => window(&work.x.inverse, flat + 1),
+            2 => window(&work.y.inverse, flat),
+            3 => window(&work.y.inverse, flat + GROWN),
+            4 => window(&work.z_low.inverse, flat),
+            _ => window(&work.z_high.inverse, flat),
+        }
     }
 
-    /// `r_p (g_q - g_p)` towards the six neighbours.
+    /// `r_p`, which weighs the differences of g.
     #[inline(always)]
-    fn edge_pull(&self, g: &[f32], center: usize, places: &[usize; 6]) -> [[f32; CELL]; 6] {
-        let here = window::<CELL>(g, center);
-        let mut pull: [[f32; CELL]; 6] = places.map(|p| *window(g, p));
-        let mut square = [0.0f32; CELL];
-        for (q, pull) in pull.iter_mut().enumerate() {
+    fn edge_pull(&self, g: &[f32; AROUND]) -> [f32; LANES] {
+        let slopes = [
+            differences::<0>(g),
+            differences::<1>(g),
+            differences::<2>(g),
+            differences::<3>(g),
+            differences::<4>(g),
+            differences::<5>(g),
+        ];
+        let mut square = [0.0f32; LANES];
+        for (q, slope) in slopes.iter().enumerate() {
             let inverse = self.metric.inverse_spacing[q / 2];
-            for x in 0..CELL {
-                pull[x] -= here[x];
-                let slope = pull[x] * inverse;
-                square[x] += slope * slope;
+            for x in 0..LANES {
+                square[x] += (slope[x] * inverse) * (slope[x] * inverse);
             }
         }
-        for x in 0..CELL {
-            let norm =
-                if self.velocity.normalised { (self.metric.epsilon_squared + 0.5 * square[x]).sqrt() } else { 1.0 };
-            square[x] = self.velocity.rho / norm;
-        }
-        for pull in &mut pull {
-            for x in 0..CELL {
-                pull[x] *= square[x];
+        let mut norm = [1.0f32; LANES];
+        if self.velocity.normalised {
+            for x in 0..LANES {
+                norm[x] = (self.metric.epsilon_squared + 0.5 * square[x]).sqrt();
             }
         }
-        pull
+        for norm in &mut norm {
+            *norm = self.velocity.rho / *norm;
+        }
+        norm
     }
 }
 
@@ -345,7 +413,7 @@ fn mean_gradient_cell(u: &[f32], spacing: [f64; 3], work: &mut Planes, out: &mut
         z_faces(u, z + 1, rows, &work.high, &metric, &mut work.z_high);
         for y in 0..CELL {
             let row = Row { y, z, work, mask: &mask, metric: &metric, step: [0.0; 3], velocity: &velocity };
-            out[(z * CELL + y) * CELL..][..CELL].copy_from_slice(&row.mean_norms(y * GROWN));
+            out[(z * CELL + y) * CELL..][..CELL].copy_from_slice(&row.mean_norms::<CELL>(y * GROWN));
         }
         std::mem::swap(&mut work.low, &mut work.high);
         std::mem::swap(&mut work.z_low, &mut work.z_high);

@@ -31,35 +31,37 @@ pub(crate) fn half_start(colour: usize, y: usize, z: usize) -> usize {
     ((z * 2 + colour) * CELL + y) * HALF_LEN
 }
 
-/// Writes a row. `terms` are the coefficients c towards the six neighbours and the old values; each is divided by the
-/// diagonal, `1 + sum c`.
+/// Voxels that are assembled at a time.
+pub(crate) const LANES: usize = 8;
+
+/// Writes the voxels from `[x, y, z]` on, x a multiple of their number. `terms` are the coefficients c towards the six
+/// neighbours and the old values; each is divided by the diagonal, `1 + sum c`.
 #[inline(always)]
-pub(crate) fn write_row(scheme: &mut [f32], y: usize, z: usize, terms: &mut [[f32; CELL]; SCHEME_LAYERS]) {
-    let mut diagonal = [1.0f32; CELL];
+pub(crate) fn write_part(scheme: &mut [f32], at: [usize; 3], terms: &mut [[f32; LANES]; SCHEME_LAYERS]) {
+    let mut diagonal = [1.0f32; LANES];
     for c in &terms[..6] {
-        for x in 0..CELL {
+        for x in 0..LANES {
             diagonal[x] += c[x];
         }
     }
     let inverse = diagonal.map(|d| 1.0 / d);
     for term in terms.iter_mut() {
-        for x in 0..CELL {
+        for x in 0..LANES {
             term[x] *= inverse[x];
         }
     }
-    let halves = [(y + z) % 2, (y + z + 1) % 2].map(|colour| half_start(colour, y, z));
-    part(terms, scheme, halves);
+    split(terms, scheme, at);
 }
 
-/// Writes the even and the odd voxels of a row where their halves start.
+/// Writes even and odd voxels where their halves of the row lie.
 ///
 /// Kept apart: inlined, the shuffles turn all arithmetic before them into scalar code.
 #[inline(never)]
-fn part(row: &[[f32; CELL]; SCHEME_LAYERS], scheme: &mut [f32], halves: [usize; 2]) {
-    for (parity, start) in halves.into_iter().enumerate() {
-        let half = &mut scheme[start..start + HALF_LEN];
-        for (half, row) in half.as_chunks_mut::<HALF>().0.iter_mut().zip(row) {
-            *half = std::array::from_fn(|i| row[2 * i + parity]);
-        }
+fn split(terms: &[[f32; LANES]; SCHEME_LAYERS], scheme: &mut [f32], [x, y, z]: [usize; 3]) {
+    const EACH: usize = LANES / 2;
+    let (even, odd) = (half_start((y + z) % 2, y, z) + x / 2, half_start((y + z + 1) % 2, y, z) + x / 2);
+    for (layer, [e0, o0, e1, o1, e2, o2, e3, o3]) in terms.iter().enumerate() {
+        scheme[even + layer * HALF..][..EACH].copy_from_slice(&[*e0, *e1, *e2, *e3]);
+        scheme[odd + layer * HALF..][..EACH].copy_from_slice(&[*o0, *o1, *o2, *o3]);
     }
 }

@@ -172,6 +172,14 @@ fn row(values: &[f32], start: usize) -> &[f32; CELL] {
     values[start..start + CELL].first_chunk().expect("a row of the cell")
 }
 
+/// Moves the values on as far as they have come since `older`: fewer iterations are left to do from there. They stay in
+/// [0, 1].
+pub fn extrapolate(u: &mut [f32], older: &[f32]) {
+    for (u, older) in u.iter_mut().zip(older) {
+        *u = (2.0 * *u - older).clamp(0.0, 1.0);
+    }
+}
+
 /// Compares a relaxed cell, grown, with the old one, dense over the cell.
 #[must_use]
 pub fn motion(u: &[f32], old: &[f32], mask: &CellMask) -> CellSums {
