@@ -9,9 +9,10 @@ use super::band::{Band, read_mask};
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard};
 use crate::grid::{BrickSet, FACES, Slot};
+use crate::kernel::level_set::border::Border;
 use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
 use crate::kernel::level_set::scheme::SCHEME_LEN;
-use crate::kernel::level_set::sor::{CellSums, Corrections, Halves, Relaxation, extrapolate, motion, relax};
+use crate::kernel::level_set::sor::{CellSums, Halves, Relaxation, extrapolate, motion, relax};
 use crate::kernel::level_set::{CELL, CELL_LEN, GROWN_LEN};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -36,8 +37,8 @@ pub struct TimeLoop {
     pub max_steps: u32,
     /// Over-relaxation.
     pub omega: f32,
-    /// A step is solved when no cell was left with corrections above this (root mean square), and none beside it needed
-    /// such corrections later.
+    /// A step is solved when no cell was left with corrections above this (root mean square), what those beside it passed
+    /// on since counted in.
     pub solver_tolerance: f64,
 }
 
@@ -56,16 +57,17 @@ pub struct Evolution {
 
 /// Relaxations of a cell each time it is taken up: enough to shrink its corrections about tenfold.
 const LOCAL_ITERATIONS: usize = 3;
-/// Visits of a cell in one step at most; the tolerance is reached long before.
-const MAX_VISITS: usize = 30;
+/// Visits of a cell in one step at most; only steps far longer than a spacing need more than a few.
+const MAX_VISITS: usize = 1000;
 
-/// Corrections of a cell, in tolerances, from which on those beside it are taken up again. A ghost enters one voxel with a
-/// weight below 1/2, and one voxel of 16 has one there: less than 1/8 of the root mean square is passed on.
-const PASSED_ON: f64 = 4.0;
+/// The weight with which a ghost enters the voxel beside it: its coefficient over the diagonal, for steps of up to a
+/// spacing.
+const GHOST_WEIGHT: f64 = 0.5;
 
 struct Worker {
     u: HaloTile<f32>,
     older: HaloTile<f32>,
+    border: Border,
     mask: CellMask,
     planes: Planes,
     halves: Halves,
@@ -80,6 +82,7 @@ impl Worker {
         Self {
             u: tile(),
             older: tile(),
+            border: Border::new(),
             mask: CellMask::new(),
             planes: Planes::new(),
             halves: Halves::new(),
@@ -94,12 +97,12 @@ impl Worker {
 struct Visit {
     sums: CellSums,
     gradient: f64,
-    /// Root mean square of the first corrections: how far from solved the cell was when it was taken up.
-    stirred: f64,
-    /// Root mean square of the last corrections.
+    /// Solved voxels.
+    count: u32,
+    /// Sum of squares of the last corrections.
     left: f64,
-    /// The wave in which it was taken up.
-    wave: usize,
+    /// Roots of the sums of squared changes beside the six faces.
+    border: [f64; 6],
 }
 
 /// Which cell is taken up when.
@@ -230,16 +233,22 @@ impl Solver<'_> {
     fn step(&self) -> Result<(Step, u64)> {
         let set = self.band.solved.set();
         let mut visits = vec![Visit::default(); set.len()];
+        let mut unknown = vec![0.0; set.len()];
         let mut visited = 0;
         for round in 0..MAX_VISITS {
             let mut resting = true;
             for (colour, cells) in self.cells.colours.iter().enumerate() {
-                let due = |slot: &Slot| round == 0 || self.due(&visits, *slot);
+                let due = |slot: &Slot| round == 0 || self.is_due(&visits, &unknown, *slot);
                 let wave: Vec<Slot> = cells.iter().copied().filter(due).collect();
                 let results =
                     self.stage.run(&wave, self.workers, |worker, &slot| Ok(self.visit(worker, slot, round, colour)))?;
                 self.engine.comm().publish_faces(&wave)?;
-                wave.iter().zip(results).for_each(|(&slot, visit)| visits[slot as usize] = visit);
+                for (&slot, visit) in wave.iter().zip(results) {
+                    visits[slot as usize] = visit;
+                    unknown[slot as usize] = 0.0;
+                    let beside = self.cells.beside[slot as usize].iter().zip(visit.border);
+                    beside.filter(|(q, _)| **q != Slot::MAX).for_each(|(&q, moved)| unknown[q as usize] += moved);
+                }
                 visited += wave.len() as u64;
                 resting &= wave.is_empty();
             }
@@ -255,13 +264,12 @@ impl Solver<'_> {
         Ok((Step { speed, l2 }, visited))
     }
 
-    /// True when a cell was left unsolved, or beside it one that was taken up since needed corrections.
-    fn due(&self, visits: &[Visit], slot: Slot) -> bool {
-        let (tolerance, here) = (self.settings.solver_tolerance, visits[slot as usize]);
-        let stirred = |q: &Slot| {
-            visits.get(*q as usize).is_some_and(|there| there.wave > here.wave && there.stirred > PASSED_ON * tolerance)
-        };
-        here.left > tolerance || self.cells.beside[slot as usize].iter().any(stirred)
+    /// True when the corrections that a cell was left with, and those for what moved beside it since, which is unknown to
+    /// it, may exceed the tolerance (root mean square).
+    fn is_due(&self, visits: &[Visit], unknown: &[f64], slot: Slot) -> bool {
+        let here = &visits[slot as usize];
+        let corrections = here.left.sqrt() + GHOST_WEIGHT * unknown[slot as usize];
+        corrections > self.settings.solver_tolerance * f64::from(here.count).sqrt()
     }
 
     /// Sums over cells in grid order.
@@ -274,12 +282,11 @@ impl Solver<'_> {
     fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) -> Visit {
         let [old, new] = &self.band.u;
         read_mask(&self.band.solved, slot, &mut w.mask);
-        let wave = 2 * round + colour;
         if w.mask.count == 0 {
-            return Visit { wave, ..Visit::default() };
+            return Visit::default();
         }
         let turn = Turn { slot, round, colour };
-        let (gradient, corrections) = match self.kept {
+        let (gradient, left) = match self.kept {
             Some(kept) if self.first && round == 0 => kept.write(slot, |fixed| {
                 self.gather_fixed(&mut w.older, slot, fixed);
                 self.solve(w, turn, fixed)
@@ -297,14 +304,15 @@ impl Solver<'_> {
         Visit {
             sums: old.read(slot, |old| motion(w.u.data(), old, &w.mask)),
             gradient,
-            stirred: (corrections.first / f64::from(w.mask.count)).sqrt(),
-            left: (corrections.last / f64::from(w.mask.count)).sqrt(),
-            wave,
+            count: w.mask.count,
+            left,
+            border: w.border.moved(w.u.data()),
         }
     }
 
-    /// Makes a cell's scheme and relaxes the cell. Returns the sum of gradient norms and the corrections.
-    fn solve(&self, w: &mut Worker, turn: Turn, fixed: &[f32]) -> (f64, Corrections) {
+    /// Makes a cell's scheme and relaxes the cell. Returns the sum of gradient norms and of the squares of the
+    /// last corrections.
+    fn solve(&self, w: &mut Worker, turn: Turn, fixed: &[f32]) -> (f64, f64) {
         let Turn { slot, round, colour } = turn;
         let [old, new] = &self.band.u;
         let (d, g) = fixed[..FIXED_LEN].split_at(GROWN_LEN);
@@ -323,7 +331,8 @@ impl Solver<'_> {
         }
         let (omega, iterations) = (self.settings.omega, LOCAL_ITERATIONS);
         let by = Relaxation { scheme: &w.scheme, mask: &w.mask, omega, iterations };
-        (gradient, relax(w.u.data_mut(), &mut w.halves, by))
+        w.border.keep(w.u.data());
+        (gradient, relax(w.u.data_mut(), &mut w.halves, by).last)
     }
 
     /// Reads distance and edges with the halo across the faces: what the forces are made of.

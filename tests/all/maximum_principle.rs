@@ -103,7 +103,7 @@ fn assert_within(new: &[f32], [low, high]: [f32; 2]) {
 const SPACINGS: [[f64; 3]; 3] = [[0.05; 3], [1.0; 3], [0.3, 0.45, 1.1]];
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(ProptestConfig::with_cases(150))]
 
     #[test]
     fn a_time_step_stays_within_the_values_before_it(
@@ -133,7 +133,7 @@ proptest! {
     ) {
         let problem = Problem::random(shape, spacing, part * spacing[0], 0.05 / spacing[0], seed);
         let (new, done) = problem.step(threads, tolerance);
-        prop_assert!(done.sor_iterations < 40, "{done:?}");
+        prop_assert!(done.sor_iterations < 60, "{done:?}");
         let residual = problem.residual(&new);
         prop_assert!(residual < tolerance + 5e-7, "{residual} for {tolerance}, {done:?}");
         let squares: f64 = new.iter().zip(&problem.u).map(|(n, o)| f64::from(n - o).powi(2)).sum();

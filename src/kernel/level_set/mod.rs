@@ -4,6 +4,7 @@
 //! same whatever the brick size. Source: Kósa 2015, chapter 3; Kósa PhD, chapter 3 (algorithms: section 5).
 
 pub mod basins;
+pub mod border;
 pub mod covolume;
 pub mod flood;
 pub mod gradients;
