@@ -213,7 +213,7 @@ mod tests {
              --max-steps 10 --method fsm --edge plain --percentiles 1,99 --no-caps --overlap last --brick 32",
         );
         let expected = SegmentSettings {
-            method: crate::pipeline::distance::Method::Fsm,
+            method: crate::pipeline::distance::Method::FSM,
             theta: 2.0,
             rho: 3.0,
             delta: Some(1.0),

@@ -8,7 +8,6 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::exec::StageReport;
 use crate::grid::Geometry;
-use crate::pipeline::distance::{Method, SOLVERS};
 use crate::pipeline::evolve::Stop;
 use crate::pipeline::segment::{ObjectReport, Outcome, Overlap, SegmentSettings};
 
@@ -157,7 +156,7 @@ impl Solver {
             Stop::L2(tol) => ("l2", tol),
         };
         Self {
-            method: method_name(settings.method),
+            method: settings.method.name(),
             theta: settings.theta,
             rho: settings.rho,
             delta: settings.delta_on(geometry),
@@ -182,10 +181,6 @@ impl Solver {
             brick: settings.brick,
         }
     }
-}
-
-fn method_name(method: Method) -> &'static str {
-    SOLVERS.iter().find(|solver| solver.method == method).map_or("", |solver| solver.name)
 }
 
 impl From<StageReport> for Stage {

@@ -61,7 +61,10 @@ impl HaloPlan {
         let id = array.set().id(slot);
         let shape = self.grid.brick_box(id).shape().map(|n| n as usize);
         tile.set_valid(shape);
-        array.read(slot, |brick| copy_brick(brick, shape, tile));
+        match array.unwritten(slot) {
+            Some(value) => tile.data_mut().fill(value),
+            None => array.read(slot, |brick| copy_brick(brick, shape, tile)),
+        }
         self.gather_halo(array, slot, boundary, tile);
     }
 
@@ -78,9 +81,10 @@ impl HaloPlan {
         for link in &self.links {
             let Some(neighbour) = self.grid.neighbour(id, link.offset) else { continue };
             let ghosts = ghost_box(shape, link.offset);
-            match array.set().slot(neighbour) {
+            match array.set().slot(neighbour).map(|at| (at, array.unwritten(at))) {
                 None => fill(tile, &ghosts, array.absent(neighbour)),
-                Some(at) => array.read_face(at, link.face, |face| self.copy_face(face, link, &ghosts, tile)),
+                Some((_, Some(value))) => fill(tile, &ghosts, value),
+                Some((at, None)) => array.read_face(at, link.face, |face| self.copy_face(face, link, &ghosts, tile)),
             }
         }
         self.fill_beyond_domain(id, boundary, tile);

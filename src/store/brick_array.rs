@@ -8,10 +8,12 @@
 //! faces of one brick | -x [z][y] | +x [z][y] | -y [z][x] | +y [z][x] | -z [y][x] | +z [y][x] |    edge^2 each
 //! ```
 //!
-//! Bricks outside of the set are not stored: each has one constant value for all its voxels.
+//! Bricks outside of the set are not stored: each has one constant value for all its voxels. So have, where an array is
+//! made for it, bricks that nothing was written to yet.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use super::slot_file::SlotFile;
 use super::window::{Traffic, Window};
@@ -70,6 +72,13 @@ pub struct BrickArray<T: Element> {
     bricks: SlotFile<T>,
     faces: Option<SlotFile<T>>,
     absent: Vec<T>,
+    blank: Option<Blank<T>>,
+}
+
+/// What bricks hold that were not written yet, and which these are.
+struct Blank<T> {
+    value: T,
+    written: Box<[AtomicBool]>,
 }
 
 impl<T: Element> BrickArray<T> {
@@ -90,7 +99,7 @@ impl<T: Element> BrickArray<T> {
         let brick_len = layers * set.grid().brick_len();
         let bricks = SlotFile::create(&scratch.dir, &scratch.window, brick_len, set.len())?;
         let absent = vec![T::default(); set.grid().len() as usize];
-        Ok(Self { set: set.clone(), brick_len, bricks, faces: None, absent })
+        Ok(Self { set: set.clone(), brick_len, bricks, faces: None, absent, blank: None })
     }
 
     /// A field of zeros with faces: for what kernels read with a halo.
@@ -102,6 +111,24 @@ impl<T: Element> BrickArray<T> {
         let edge = set.grid().edge() as usize;
         array.faces = Some(SlotFile::create(&scratch.dir, &scratch.window, 6 * edge * edge, set.len())?);
         Ok(array)
+    }
+
+    /// A field with faces whose bricks are `value` throughout until they are written, and cost nothing until then.
+    ///
+    /// # Errors
+    /// When the scratch folder cannot hold it.
+    pub fn blank(scratch: &Scratch, set: &Arc<BrickSet>, value: T) -> Result<Self> {
+        let mut array = Self::with_faces(scratch, set)?;
+        array.absent.fill(value);
+        array.blank = Some(Blank { value, written: set.ids().iter().map(|_| AtomicBool::new(false)).collect() });
+        Ok(array)
+    }
+
+    /// The value of all voxels of a stored brick that was not written yet, in an array made [`BrickArray::blank`].
+    #[must_use]
+    pub fn unwritten(&self, slot: Slot) -> Option<T> {
+        let blank = self.blank.as_ref()?;
+        (!blank.written[slot as usize].load(Relaxed)).then_some(blank.value)
     }
 
     /// The bricks that are stored.
@@ -128,6 +155,9 @@ impl<T: Element> BrickArray<T> {
 
     /// Lends out a brick's voxels for writing. The faces follow with [`BrickArray::write_faces`].
     pub fn write<R>(&self, slot: Slot, f: impl FnOnce(&mut [T]) -> R) -> R {
+        if let Some(blank) = &self.blank {
+            blank.written[slot as usize].store(true, Relaxed);
+        }
         self.bricks.write(slot as usize, f)
     }
 
@@ -153,6 +183,14 @@ impl<T: Element> BrickArray<T> {
     #[must_use]
     pub fn has_faces(&self) -> bool {
         self.faces.is_some()
+    }
+
+    /// The one value of a brick that is not stored or not written yet; else its slot.
+    fn constant(&self, id: BrickId) -> std::result::Result<T, Slot> {
+        match self.set.slot(id) {
+            None => Ok(self.absent(id)),
+            Some(slot) => self.unwritten(slot).ok_or(slot),
+        }
     }
 
     /// Copies a brick's outermost layers into the face arena.
@@ -189,11 +227,11 @@ impl<T: Element> BoxSource<T> for BrickArray<T> {
             let shared = grid.brick_box(id).intersect(part);
             let width = shared.shape()[0] as usize;
             let rows = RowsOf { brick_lo: grid.coords(id).map(|c| c * grid.edge()), edge: grid.edge() };
-            match self.set.slot(id) {
-                None => shared.rows().for_each(|(y, z)| {
-                    out[part.offset_of([shared.lo[0], y, z])..][..width].fill(self.absent(id));
+            match self.constant(id) {
+                Ok(value) => shared.rows().for_each(|(y, z)| {
+                    out[part.offset_of([shared.lo[0], y, z])..][..width].fill(value);
                 }),
-                Some(slot) => self.read(slot, |brick| {
+                Err(slot) => self.read(slot, |brick| {
                     for (y, z) in shared.rows() {
                         let from = rows.offset([shared.lo[0], y, z]);
                         out[part.offset_of([shared.lo[0], y, z])..][..width].copy_from_slice(&brick[from..][..width]);
@@ -206,8 +244,8 @@ impl<T: Element> BoxSource<T> for BrickArray<T> {
 
     fn constant_in(&self, part: &Box3) -> Option<T> {
         let mut ids = self.set.grid().bricks_in(part);
-        let first = ids.next().filter(|&id| self.set.slot(id).is_none()).map(|id| self.absent(id))?;
-        ids.all(|id| self.set.slot(id).is_none() && self.absent(id) == first).then_some(first)
+        let first = ids.next().and_then(|id| self.constant(id).ok())?;
+        ids.all(|id| self.constant(id) == Ok(first)).then_some(first)
     }
 }
 

@@ -163,7 +163,7 @@ fn grid(shape: [i64; 3], spacing: [f64; 3]) -> Geometry {
 }
 
 fn check_both(labs: &[Lab], geometry: &Geometry, cloud: &[[f64; 3]], edges: &[i64]) {
-    let expected = [(Method::Fsm, textbook_fsm(geometry, cloud)), (Method::Vdt, textbook_vdt(geometry, cloud))];
+    let expected = [(Method::FSM, textbook_fsm(geometry, cloud)), (Method::VDT, textbook_vdt(geometry, cloud))];
     for (method, expected) in &expected {
         for lab in labs {
             for &edge in edges {
@@ -199,7 +199,7 @@ fn without_a_point_in_the_grid_nothing_is_reached() {
     let lab = Lab::new(2);
     let geometry = grid([20, 9, 7], [1.0; 3]);
     for cloud in [vec![], vec![[1e3, 0.0, -5.0]]] {
-        for method in [Method::Fsm, Method::Vdt] {
+        for method in [Method::FSM, Method::VDT] {
             let (found, _) = ours(&lab, &geometry, &cloud, 8, method, None);
             assert!(found.iter().all(|d| *d == f32::INFINITY));
         }
@@ -230,7 +230,7 @@ fn vector_distance_is_nearly_everywhere_exact() {
         let geometry = grid([60, 57, 40], spacing);
         let plain = PlainGrid { shape: geometry.shape };
         let cloud = scattered(&geometry, 120, seed as u64);
-        let (found, _) = ours(&lab, &geometry, &cloud, 16, Method::Vdt, None);
+        let (found, _) = ours(&lab, &geometry, &cloud, 16, Method::VDT, None);
         let mut wrong = 0;
         for v in plain.voxels() {
             let here = position(&geometry, v);
@@ -250,7 +250,7 @@ fn fast_sweeping_converges_to_the_distance() {
     let errors = [0.1, 0.05, 0.025].map(|h| {
         let cloud = sphere([0.0; 3], 0.8, 20_000, |_| true);
         let geometry = grid_around(&cloud, h);
-        let (found, _) = ours(&lab, &geometry, &cloud, 16, Method::Fsm, None);
+        let (found, _) = ours(&lab, &geometry, &cloud, 16, Method::FSM, None);
         let voxels = PlainGrid { shape: geometry.shape }.voxels();
         let error = |v| ((squared(position(&geometry, v), [0.0; 3]).sqrt() - 0.8).abs(), v);
         let errors: Vec<f64> = voxels.map(error).zip(&found).map(|((exact, _), d)| f64::from(*d) - exact).collect();
@@ -289,7 +289,7 @@ proptest! {
         let geometry = grid(shape, spacing);
         let cloud = random_cloud(&geometry, count, seed);
         let lab = Lab::new(2);
-        for method in [Method::Fsm, Method::Vdt] {
+        for method in [Method::FSM, Method::VDT] {
             let (everywhere, bricks) = ours(&lab, &geometry, &cloud, edge, method, None);
             let (found, stored) = ours(&lab, &geometry, &cloud, edge, method, Some(farthest));
             prop_assert!(stored <= bricks);

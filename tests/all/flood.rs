@@ -137,7 +137,7 @@ fn flood_of_cloud(lab: &Lab, geometry: &Geometry, cloud: &[[f64; 3]], farthest: 
     let sources = Sources { geometry, positions: cloud, bins: &bins };
     let stage = lab.engine.stage("start", 0);
     let farthest = farthest.unwrap_or(f32::INFINITY);
-    let distance = cloud_distance(&stage, &lab.engine, &sources, &set, Method::Fsm, farthest).expect("room in scratch");
+    let distance = cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, farthest).expect("room in scratch");
     let tagging = tag(&stage, &lab.engine, &sources, &distance).expect("room in scratch");
     (whole(&distance), tagging)
 }

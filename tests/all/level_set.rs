@@ -61,7 +61,7 @@ fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
     let sources = Sources { geometry: &geometry, positions: &cloud, bins: &bins };
     let stage = lab.engine.stage("sponge", 0);
     let distance =
-        cloud_distance(&stage, &lab.engine, &sources, &set, Method::Fsm, f32::INFINITY).expect("room in scratch");
+        cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, f32::INFINITY).expect("room in scratch");
     let tagging = tag(&stage, &lab.engine, &sources, &distance).expect("room in scratch");
     let reaches = Reaches { beta: 0.25, inner: 0.5, outer: 0.5 };
     let mut band = make_band(&stage, &lab.engine, &distance, &tagging.level, &reaches).expect("room in scratch");

@@ -1,7 +1,11 @@
 //! Distance to point sources on one tile: where sources fix voxels, and how sweeps carry them outward.
 
+mod diagonals;
+mod directions;
 pub mod fast_sweeping;
 pub mod initialise;
+pub mod method;
+pub mod precision;
 pub mod vector_distance;
 
 /// The eight sweep orders: for each axis, whether it runs from low to high; x changes fastest.
@@ -14,8 +18,3 @@ pub const SWEEPS: [[bool; 3]; 8] = {
     }
     orders
 };
-
-/// The local indices of one axis in sweep order.
-pub(crate) fn ordered(count: usize, upward: bool) -> impl Iterator<Item = isize> {
-    (0..count as isize).map(move |i| if upward { i } else { count as isize - 1 - i })
-}

@@ -49,7 +49,7 @@ pub struct SegmentSettings {
 impl Default for SegmentSettings {
     fn default() -> Self {
         Self {
-            method: Method::Vdt,
+            method: Method::VDT,
             theta: 1.0,
             rho: 0.3,
             delta: None,

@@ -1,0 +1,47 @@
+//! What a distance method is to a schedule: a state for each voxel, and two ways to relax a tile of them.
+//!
+//! A new method is one file that implements [`DistanceMethod`] and one row in `pipeline::distance`'s table.
+
+use crate::grid::Box3;
+use crate::store::Element;
+use crate::tile::HaloTile;
+
+/// A way to carry distance from fixed voxels outward. Values only ever fall; fixed voxels never change.
+pub trait DistanceMethod: Send + Sync {
+    /// What a brick keeps of each voxel.
+    type State: Element;
+    /// Buffers of one thread.
+    type Work: Send + 'static;
+    /// The state of a voxel of which nothing is known.
+    const UNKNOWN: Self::State;
+
+    /// The state of a voxel that `source` fixes at the given squared distance.
+    fn fixed(squared: f64, source: u32) -> Self::State;
+
+    /// Whether a source fixed the voxel.
+    fn is_fixed(state: Self::State) -> bool;
+
+    /// Buffers for tiles of `edge`^3 voxels.
+    fn work(edge: usize) -> Self::Work;
+
+    /// Relaxes a tile, whose lowest voxel lies at `part.lo`, until no voxel of it can fall. Halo 1, faces.
+    /// Returns whether any voxel changed.
+    fn settle(&self, tile: &mut HaloTile<Self::State>, work: &mut Self::Work, part: &Box3) -> bool;
+
+    /// Whether a voxel at `voxel`, whose state is `state`, may fall beside one in state `beside`; the value that would
+    /// enter it: what the front schedule orders bricks by.
+    fn entering(&self, beside: Self::State, state: Self::State, voxel: [i64; 3]) -> Option<f64>;
+
+    /// The distance of a voxel, physical units; infinite where nothing is known.
+    fn distance(&self, state: Self::State, voxel: [i64; 3]) -> f64;
+
+    /// The voxel's source, where the method keeps it and one is known.
+    fn source(state: Self::State) -> Option<u32>;
+}
+
+/// A method of ordered sweeps over the whole domain.
+pub trait OrderedSweeps: DistanceMethod {
+    /// One ordered pass over a tile. Tiles taken in sweep order give bit for bit what the triple loop over the domain
+    /// gives. Returns whether any voxel changed.
+    fn sweep(&self, tile: &mut HaloTile<Self::State>, work: &mut Self::Work, part: &Box3, upward: [bool; 3]) -> bool;
+}

@@ -1,0 +1,42 @@
+//! The start of a distance: the voxels that sources fix. Only bricks that hold such voxels are written; all others
+//! stay unknown and cost nothing until a front reaches them.
+
+use super::Sources;
+use crate::error::Result;
+use crate::exec::{Stage, Workers};
+use crate::grid::Slot;
+use crate::kernel::distance::initialise::{NO_SOURCE, fix_voxels};
+use crate::kernel::distance::method::DistanceMethod;
+use crate::store::BrickArray;
+
+/// Fixes voxels; returns the bricks that hold any, in order of their slots, and the number of fixed voxels.
+pub(super) fn initialise<M: DistanceMethod>(
+    stage: &Stage<'_>,
+    sources: &Sources<'_>,
+    array: &BrickArray<M::State>,
+) -> Result<(Vec<Slot>, u64)> {
+    let set = array.set();
+    let (grid, len) = (*set.grid(), set.grid().brick_len());
+    let near: Vec<Slot> =
+        (0..set.len() as Slot).filter(|&slot| sources.bins.beside(set.id(slot)).next().is_some()).collect();
+    let workers = Workers::new(move || (vec![0.0; len], vec![0; len]));
+    let fixed = stage.run(&near, &workers, |(squared, source), &slot| {
+        let id = set.id(slot);
+        squared.fill(f64::INFINITY);
+        source.fill(NO_SOURCE);
+        let points = sources.bins.beside(id).map(|p| (p, sources.positions[p as usize]));
+        fix_voxels(sources.geometry, &grid.brick_box(id), grid.edge() as usize, points, squared, source);
+        let count = source.iter().filter(|&&s| s != NO_SOURCE).count() as u64;
+        if count > 0 {
+            array.write(slot, |out| {
+                for (out, (&squared, &source)) in out.iter_mut().zip(squared.iter().zip(source.iter())) {
+                    *out = if source == NO_SOURCE { M::UNKNOWN } else { M::fixed(squared, source) };
+                }
+            });
+            array.refresh_faces(slot);
+        }
+        Ok(count)
+    })?;
+    let start = near.into_iter().zip(&fixed).filter(|(_, count)| **count > 0).map(|(slot, _)| slot).collect();
+    Ok((start, fixed.iter().sum()))
+}

@@ -1,0 +1,81 @@
+//! Distance to a point cloud over a set of bricks (algorithms: sections 2 and 3): which voxels sources fix, how distance
+//! is carried outward from them, and the fields that come of it.
+//!
+//! The set need not cover the domain: a value within the set's reach of the cloud is reached only through smaller
+//! values, so leaving far bricks out changes none of the near ones.
+
+mod field;
+mod front;
+mod initialise;
+mod solvers;
+mod sweep;
+
+use std::sync::Arc;
+
+pub use field::{Measured, Solved};
+pub use solvers::{Method, SOLVERS, Solver, solvers};
+
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers, one_wave};
+use crate::grid::{BrickSet, Geometry, PointBins};
+use crate::store::BrickArray;
+
+/// A cloud on a grid: what every distance method starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct Sources<'a> {
+    /// The grid that the cloud lies on.
+    pub geometry: &'a Geometry,
+    /// World positions of the points.
+    pub positions: &'a [[f64; 3]],
+    /// The points by brick.
+    pub bins: &'a PointBins,
+}
+
+/// In which order bricks are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Schedule {
+    /// Bricks in the order in which distance reaches them, until nothing changes.
+    Front,
+    /// Ordered passes over all bricks, bit for bit the textbook's loops.
+    Sweep {
+        /// Of eight passes each; fewer when one changes nothing.
+        iterations: u32,
+    },
+}
+
+/// Distance to the nearest point in f32, physical units, on the bricks of `set`, no value above `farthest`; by one
+/// iteration of ordered sweeps, so that no bit depends on bricks or threads.
+///
+/// # Errors
+/// When scratch runs out or the run is interrupted.
+pub fn cloud_distance(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'_>,
+    set: &Arc<BrickSet>,
+    method: Method,
+    farthest: f32,
+) -> Result<BrickArray<f32>> {
+    let schedule = Schedule::Sweep { iterations: 1 };
+    let solved = (method.solver::<f32>().solve)(stage, engine, sources, set, schedule, f64::from(farthest))?;
+    let mut distance = BrickArray::with_faces(engine.scratch(), set)?;
+    let (edge, len) = (set.grid().edge(), set.grid().brick_len());
+    let workers = Workers::new(move || vec![0.0; len]);
+    stage.run(&one_wave(set), &workers, |values, &slot| {
+        let part = set.grid().brick_box(set.id(slot));
+        solved.values.read_box(&part, &mut values[..part.len()])?;
+        distance.write(slot, |brick| {
+            let width = part.shape()[0] as usize;
+            for (row, (y, z)) in part.rows().enumerate() {
+                let to = (((z - part.lo[2]) * edge + y - part.lo[1]) * edge) as usize;
+                brick[to..][..width].copy_from_slice(&values[row * width..][..width]);
+            }
+        });
+        distance.refresh_faces(slot);
+        Ok(())
+    })?;
+    for id in 0..set.grid().len() {
+        distance.set_absent(id, farthest);
+    }
+    Ok(distance)
+}
