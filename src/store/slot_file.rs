@@ -1,11 +1,12 @@
-//! `SlotFile`: equal slots of plain numbers in a memory-mapped scratch file. Where the crate maps files.
+//! `SlotFile`: equal slots of plain numbers in a memory-mapped scratch file, or in plain memory where the window has
+//! ample room: a volume that fits must not pay for the disk. Where the crate maps memory.
 //!
 //! ```text
 //! file   | slot 0 | slot 1 | slot 2 | ...      slot = slot_len elements, native byte order, no padding
 //!        |---- segment 0 ----|---- segment 1   2 MiB each: what the window drops together
 //! ```
 //!
-//! The file has no name (it was unlinked when made), so it goes with the process whatever ends it, and nobody else
+//! A file has no name (it was unlinked when made), so it goes with the process whatever ends it, and nobody else
 //! can shorten it. Its blocks are allocated before it is mapped: a full disk is an error here, not a bus error later.
 //! Each slot has a lock of its own; uncontended in every schedule, it makes the safe interface sound for any caller.
 #![allow(unsafe_code)]
@@ -17,7 +18,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use memmap2::{MmapRaw, UncheckedAdvice};
+use memmap2::{MmapMut, MmapRaw, UncheckedAdvice};
 
 use super::Element;
 use super::window::{Droppable, Segments, Window};
@@ -35,15 +36,17 @@ pub(super) struct SlotFile<T> {
 
 struct Mapping {
     raw: MmapRaw,
-    file: File,
+    /// None for plain memory.
+    file: Option<File>,
 }
 
 struct Pages(Arc<Mapping>);
 
 impl Droppable for Pages {
     fn drop_pages(&self, start: usize, len: usize, write_back: bool) {
+        let Some(file) = &self.0.file else { return };
         if write_back {
-            start_write_back(&self.0.file, start, len);
+            start_write_back(file, start, len);
         }
         // SAFETY: the mapping is shared and backed by a file, so dropped pages keep their contents in the page cache
         // and the next access maps them again; no reference into the map can see a change.
@@ -53,9 +56,8 @@ impl Droppable for Pages {
     }
 }
 
-impl<T: Element> SlotFile<T> {
-    pub(super) fn create(dir: &Path, window: &Arc<Window>, slot_len: usize, count: usize) -> Result<Self> {
-        let bytes = slot_len * count * size_of::<T>();
+impl Mapping {
+    fn file(dir: &Path, bytes: usize) -> Result<Self> {
         let file = tempfile::tempfile_in(dir).map_err(|e| {
             Error::from_io("cannot make a scratch file; choose another folder with --scratch", &e).at(dir)
         })?;
@@ -66,8 +68,27 @@ impl<T: Element> SlotFile<T> {
             Error::from_io(&what, &e).at(dir)
         })?;
         let raw = MmapRaw::map_raw(&file).map_err(|e| Error::from_io("cannot map a scratch file", &e).at(dir))?;
-        let map = Arc::new(Mapping { raw, file });
-        let segments = Segments::new(bytes, Box::new(Pages(map.clone())), window.clone());
+        Ok(Self { raw, file: Some(file) })
+    }
+
+    fn memory(bytes: usize) -> Result<Self> {
+        let map = MmapMut::map_anon(bytes.max(1)).map_err(|e| {
+            let need = bytes.div_ceil(1 << 20);
+            Error::from_io(&format!("no room for {need} MiB of memory; give a smaller --memory"), &e)
+        })?;
+        #[cfg(target_os = "linux")]
+        // A refused hint costs time, never correctness.
+        drop(map.advise(memmap2::Advice::HugePage));
+        Ok(Self { raw: map.into(), file: None })
+    }
+}
+
+impl<T: Element> SlotFile<T> {
+    pub(super) fn create(dir: &Path, window: &Arc<Window>, slot_len: usize, count: usize) -> Result<Self> {
+        let bytes = slot_len * count * size_of::<T>();
+        let pinned = window.pins(bytes as u64);
+        let map = Arc::new(if pinned { Mapping::memory(bytes)? } else { Mapping::file(dir, bytes)? });
+        let segments = Segments::new(bytes, Box::new(Pages(map.clone())), window.clone(), pinned);
         let locks = (0..count).map(|_| RwLock::new(())).collect();
         Ok(Self { segments, map, locks, slot_len, window: window.clone(), element: PhantomData })
     }

@@ -29,13 +29,21 @@ pub(super) struct Segments {
     bytes: usize,
     pages: Box<dyn Droppable>,
     window: Arc<Window>,
+    pinned: bool,
 }
 
 impl Segments {
-    pub(super) fn new(bytes: usize, pages: Box<dyn Droppable>, window: Arc<Window>) -> Arc<Self> {
+    /// `pinned` ones are resident from the start and stay so: they are in no file.
+    pub(super) fn new(bytes: usize, pages: Box<dyn Droppable>, window: Arc<Window>, pinned: bool) -> Arc<Self> {
         window.allocated.fetch_add(bytes as u64, Relaxed);
-        let states = (0..bytes.div_ceil(SEGMENT_BYTES)).map(|_| AtomicU8::new(DROPPED)).collect();
-        Arc::new(Self { states, bytes, pages, window })
+        if pinned {
+            window.resident.fetch_add(bytes as u64, Relaxed);
+        }
+        let start = if pinned { REFERENCED } else { DROPPED };
+        let states = (0..bytes.div_ceil(SEGMENT_BYTES)).map(|_| AtomicU8::new(start)).collect();
+        let segments = Arc::new(Self { states, bytes, pages, window, pinned });
+        segments.window.shrink();
+        segments
     }
 
     /// Marks a range as in use; what was not resident is counted as loaded.
@@ -74,6 +82,9 @@ impl Segments {
             .map(|s| self.segment_len(s) as u64)
             .sum();
         self.window.resident.fetch_sub(resident, Relaxed);
+        if self.pinned {
+            self.window.pinned.fetch_sub(self.bytes as u64, Relaxed);
+        }
         self.window.allocated.fetch_sub(self.bytes as u64, Relaxed);
     }
 }
@@ -88,6 +99,8 @@ impl Drop for Segments {
 pub struct Window {
     limit: AtomicU64,
     resident: AtomicU64,
+    /// Bytes in plain memory, which count as resident.
+    pinned: AtomicU64,
     /// Bytes of all scratch files.
     allocated: AtomicU64,
     /// Bytes of scratch that the system can be expected to hold in its page cache.
@@ -131,6 +144,7 @@ impl Window {
         Arc::new(Self {
             limit: AtomicU64::new(limit),
             resident: AtomicU64::new(0),
+            pinned: AtomicU64::new(0),
             allocated: AtomicU64::new(0),
             page_cache: AtomicU64::new(0),
             queue: Mutex::default(),
@@ -150,6 +164,14 @@ impl Window {
     /// at once, so that they are clean when memory runs short; below it, writing them would only cost time.
     pub fn set_page_cache(&self, bytes: u64) {
         self.page_cache.store(bytes, Relaxed);
+    }
+
+    /// Whether so many more bytes may be in plain memory instead of a file; takes them into account if so. At most half
+    /// of the window is, so that files always find room.
+    pub(super) fn pins(&self, bytes: u64) -> bool {
+        let half = self.limit() / 2;
+        let taken = |pinned: u64| Some(pinned + bytes).filter(|&sum| sum <= half);
+        self.pinned.fetch_update(Relaxed, Relaxed, taken).is_ok()
     }
 
     fn writes_behind(&self) -> bool {

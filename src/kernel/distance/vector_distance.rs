@@ -56,59 +56,83 @@ pub struct Work<A> {
     at: [Vec<A>; 3],
 }
 
-/// The lanes of one vector.
-struct Lanes<'a, A> {
-    source: &'a mut [u32; LANES],
-    point: [&'a mut [A; LANES]; 3],
-    beside_source: [&'a [u32; LANES]; 6],
-    beside_point: [[&'a [A; LANES]; 6]; 3],
-    x: &'a [A; LANES],
-    y: &'a [A; LANES],
-    z: A,
+/// The nearest source so far of one voxel, and the side that it came through.
+#[derive(Clone, Copy)]
+struct Nearest<A> {
+    squared: A,
+    source: u32,
+    point: [A; 3],
+    side: u32,
 }
 
-/// Takes the nearest of the kept source and the six beside; returns the sides it came through.
 #[inline(always)]
-fn nearest<A: Real>(lanes: Lanes<'_, A>, turned: bool) -> Sides {
-    let Lanes { source, point, beside_source, beside_point, x, y, z } = lanes;
-    let squared = |p: [A; 3], i: usize| {
-        let (dx, dy, dz) = (x[i] - p[0], y[i] - p[1], z - p[2]);
-        dx * dx + dy * dy + dz * dz
-    };
-    let mut best = [A::default(); LANES];
-    let mut kept = *source;
-    let [mut px, mut py, mut pz] = [*point[0], *point[1], *point[2]];
-    let mut from = [0_u32; LANES];
-    for i in 0..LANES {
-        best[i] = squared([px[i], py[i], pz[i]], i);
-    }
-    // Turned round, the neighbour at y - 1 stands where y + 1 does.
-    let sides: [usize; 6] = if turned { [0, 1, 3, 2, 4, 5] } else { [0, 1, 2, 3, 4, 5] };
-    for (bit, side) in sides.into_iter().enumerate() {
-        let (s, [qx, qy, qz]) = (beside_source[side], beside_point.map(|sides| sides[side]));
-        for i in 0..LANES {
-            let d = squared([qx[i], qy[i], qz[i]], i);
-            // The sign bit of a fixed voxel's source.
-            let nearer = d < best[i] && (source[i] as i32) >= 0;
-            best[i] = if nearer { d } else { best[i] };
-            kept[i] = if nearer { s[i] & !FIXED } else { kept[i] };
-            px[i] = if nearer { qx[i] } else { px[i] };
-            py[i] = if nearer { qy[i] } else { py[i] };
-            pz[i] = if nearer { qz[i] } else { pz[i] };
-            from[i] = if nearer { 1 << bit } else { from[i] };
+fn squared<A: Real>(here: [A; 3], point: [A; 3]) -> A {
+    let (dx, dy, dz) = (here[0] - point[0], here[1] - point[1], here[2] - point[2]);
+    dx * dx + dy * dy + dz * dz
+}
+
+impl<A: Real> Nearest<A> {
+    /// Looks at the source beside the voxel on the side `SIDE`; without branches, so that lanes stay together.
+    #[inline(always)]
+    fn look<const SIDE: u32>(self, here: [A; 3], free: bool, source: u32, point: [A; 3]) -> Self {
+        let squared = squared(here, point);
+        let nearer = (squared < self.squared) & free;
+        let pick = |a: A, b: A| if nearer { a } else { b };
+        Self {
+            squared: pick(squared, self.squared),
+            source: if nearer { source & !FIXED } else { self.source },
+            point: [pick(point[0], self.point[0]), pick(point[1], self.point[1]), pick(point[2], self.point[2])],
+            side: if nearer { 1 << SIDE } else { self.side },
         }
     }
-    let sides = from.iter().fold(0, |any, f| any | f);
+}
+
+/// Eight values of a run from its place `at` on, and those beside them; y sides as the layout has them.
+struct Beside<'a, T>([&'a [T; LANES]; 6]);
+
+#[inline(always)]
+fn beside<'a, T>(sides: [&'a [T]; 6], at: usize) -> Beside<'a, T> {
+    let [xl, xu, yl, yu, zl, zu] = sides;
+    Beside([chunk(xl, at), chunk(xu, at), chunk(yl, at), chunk(yu, at), chunk(zl, at), chunk(zu, at)])
+}
+
+/// Takes the nearest of the kept source and the six beside for each voxel of a vector; returns the sides they came
+/// through. Where y is turned round (`TURNED`), the neighbour at y - 1 stands where y + 1 does.
+#[inline(always)]
+fn nearest<A: Real, const TURNED: bool>(
+    (source, sources): (&mut [u32; LANES], Beside<'_, u32>),
+    [(px, pxs), (py, pys), (pz, pzs)]: [(&mut [A; LANES], Beside<'_, A>); 3],
+    (x, y, z): (&[A; LANES], &[A; LANES], A),
+) -> Sides {
+    let (yl, yu) = if TURNED { (3, 2) } else { (2, 3) };
+    let mut kept = [0_u32; LANES];
+    let mut points = [[A::default(); LANES]; 3];
+    let mut came = [0_u32; LANES];
+    for i in 0..LANES {
+        let here = [x[i], y[i], z];
+        let point = [px[i], py[i], pz[i]];
+        let free = (source[i] as i32) >= 0;
+        let at = |side: usize| (sources.0[side][i], [pxs.0[side][i], pys.0[side][i], pzs.0[side][i]]);
+        let start = Nearest { squared: squared(here, point), source: source[i], point, side: 0 };
+        let [(s0, p0), (s1, p1), (s2, p2)] = [at(0), at(1), at(yl)];
+        let [(s3, p3), (s4, p4), (s5, p5)] = [at(yu), at(4), at(5)];
+        let found = start.look::<0>(here, free, s0, p0).look::<1>(here, free, s1, p1);
+        let found = found.look::<2>(here, free, s2, p2).look::<3>(here, free, s3, p3);
+        let found = found.look::<4>(here, free, s4, p4).look::<5>(here, free, s5, p5);
+        (kept[i], came[i]) = (found.source, found.side);
+        (points[0][i], points[1][i], points[2][i]) = (found.point[0], found.point[1], found.point[2]);
+    }
+    let sides = came.iter().fold(0, |any, side| any | side);
     if sides != 0 {
         *source = kept;
-        (*point[0], *point[1], *point[2]) = (px, py, pz);
+        (*px, *py, *pz) = (points[0], points[1], points[2]);
     }
     sides
 }
 
 /// One ordered pass; returns the sides through which nearer sources came.
 #[inline(always)]
-fn pass<A: Real>(work: &mut Work<A>, upward: [bool; 2]) -> Sides {
+fn pass<A: Real, const TURNED: bool>(work: &mut Work<A>, upward: [bool; 2]) -> Sides {
     let Work { layout, source, point: [px, py, pz], at: [at_x, at_y, at_z] } = work;
     let (depth, last_x) = (layout.valid[2], at_x.len() - 1 - LANES);
     let mut sides = 0;
@@ -119,19 +143,19 @@ fn pass<A: Real>(work: &mut Work<A>, upward: [bool; 2]) -> Sides {
             let place = z * layout.plane + start;
             let (s, y) = (start / layout.row, start % layout.row);
             let run = layout.run(source, place, count);
-            let [rx, ry, rz] = [&mut *px, &mut *py, &mut *pz].map(|data| layout.run(data, place, count));
+            let (rx, ry, rz) =
+                (layout.run(px, place, count), layout.run(py, place, count), layout.run(pz, place, count));
             let (x, y) = (&at_x[last_x + y - s..][..count], &at_y[y..][..count]);
             for at in (0..count).step_by(LANES) {
-                let lanes = Lanes {
-                    beside_source: run.beside.map(|side| chunk(side, at)),
-                    beside_point: [rx.beside, ry.beside, rz.beside].map(|beside| beside.map(|side| chunk(side, at))),
-                    source: chunk_mut(run.here, at),
-                    point: [chunk_mut(rx.here, at), chunk_mut(ry.here, at), chunk_mut(rz.here, at)],
-                    x: chunk(x, at),
-                    y: chunk(y, at),
-                    z: at_z[z],
-                };
-                sides |= nearest(lanes, layout.turned);
+                sides |= nearest::<A, TURNED>(
+                    (chunk_mut(run.here, at), beside(run.beside, at)),
+                    [
+                        (chunk_mut(rx.here, at), beside(rx.beside, at)),
+                        (chunk_mut(ry.here, at), beside(ry.beside, at)),
+                        (chunk_mut(rz.here, at), beside(rz.beside, at)),
+                    ],
+                    (chunk(x, at), chunk(y, at), at_z[z]),
+                );
             }
         }
     }
@@ -159,7 +183,11 @@ impl<A: Real> pulp::NullaryFnOnce for Pass<'_, A> {
 
     #[inline(always)]
     fn call(self) -> Sides {
-        pass(self.work, self.upward)
+        if self.work.layout.turned {
+            pass::<A, true>(self.work, self.upward)
+        } else {
+            pass::<A, false>(self.work, self.upward)
+        }
     }
 }
 

@@ -8,7 +8,7 @@
 
 use crate::error::Result;
 use crate::exec::{Boundary, HaloPlan, Reach, Stage, Workers};
-use crate::grid::{Box3, FACES, Slot};
+use crate::grid::{Box3, FACES, Face, Slot};
 use crate::kernel::distance::method::DistanceMethod;
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -33,11 +33,11 @@ pub(super) fn advance_front<M: DistanceMethod>(
     let width = ROUND_WIDTH * edge as f64 * spacing.iter().copied().fold(f64::INFINITY, f64::min);
     let parity = |slot: Slot| grid.coords(set.id(slot)).iter().sum::<i64>() & 1;
     let mut entering = vec![f64::INFINITY; set.len()];
-    // Sources are all at distance 0; beside them stand bricks that hold none.
+    // Nobody was told of the fixed voxels on these bricks' faces yet.
+    let mut untold = vec![false; set.len()];
     for &slot in start {
         entering[slot as usize] = 0.0;
-        let beside = FACES.iter().filter_map(|face| set.neighbour(slot, face.offset()));
-        beside.for_each(|n| entering[n as usize] = 0.0);
+        untold[slot as usize] = true;
     }
     let mut rounds = 0;
     loop {
@@ -51,14 +51,24 @@ pub(super) fn advance_front<M: DistanceMethod>(
             let left = stage.run(&wave, &workers, |(tile, work), &slot| {
                 plan.gather(array, slot, Boundary::Constant(M::UNKNOWN), tile);
                 let part = grid.brick_box(set.id(slot));
-                if !method.settle(tile, work, &part) {
+                let changed = method.settle(tile, work, &part);
+                if !changed && !untold[slot as usize] {
                     return Ok([None; 6]);
                 }
-                let leaving = leaving(method, tile, array, slot, &part);
-                plan.scatter(tile, array, slot);
+                let leaving = match untold[slot as usize] || array.unwritten(slot).is_some() {
+                    true => FACES.map(|face| leaving(method, tile, &part, face, None)),
+                    false => FACES
+                        .map(|face| array.read_face(slot, face, |told| leaving(method, tile, &part, face, Some(told)))),
+                };
+                if changed {
+                    plan.scatter(tile, array, slot);
+                }
                 Ok(leaving)
             })?;
-            wave.iter().for_each(|&slot| entering[slot as usize] = f64::INFINITY);
+            for &slot in &wave {
+                entering[slot as usize] = f64::INFINITY;
+                untold[slot as usize] = false;
+            }
             for (&slot, leaving) in wave.iter().zip(&left) {
                 for (face, value) in FACES.iter().zip(leaving) {
                     if let (Some(n), Some(value)) = (set.neighbour(slot, face.offset()), value) {
@@ -73,43 +83,38 @@ pub(super) fn advance_front<M: DistanceMethod>(
     Ok(())
 }
 
-/// For each face the smallest value by which a voxel beside it may fall, among those that changed since the brick's
-/// faces were last handed on.
+/// The smallest value that enters the brick across `face`, among voxels that changed since it was `told` of them.
 fn leaving<M: DistanceMethod>(
     method: &M,
     tile: &HaloTile<M::State>,
-    array: &BrickArray<M::State>,
-    slot: Slot,
     part: &Box3,
-) -> [Option<f64>; 6] {
-    let valid = tile.valid().map(|n| n as isize);
-    FACES.map(|face| {
-        let (inner, outer) = if face.upper { (valid[face.axis] - 1, valid[face.axis]) } else { (0, -1) };
-        let [u, v] = [[1, 2], [0, 2], [0, 1]][face.axis];
-        let mut least: Option<f64> = None;
-        let mut look = |known: Option<&[M::State]>| {
-            for j in 0..valid[v] {
-                for i in 0..valid[u] {
-                    let mut at = [inner; 3];
-                    (at[u], at[v]) = (i, j);
-                    let here = tile.data()[tile.at(at[0], at[1], at[2])];
-                    let before = known.map_or(M::UNKNOWN, |face| face[j as usize * tile.edge() + i as usize]);
-                    if here == before {
-                        continue;
-                    }
-                    at[face.axis] = outer;
-                    let beside = tile.data()[tile.at(at[0], at[1], at[2])];
-                    let voxel = std::array::from_fn(|a| part.lo[a] + at[a] as i64);
-                    if let Some(value) = method.entering(here, beside, voxel) {
-                        least = Some(least.map_or(value, |kept| kept.min(value)));
-                    }
-                }
+    face: Face,
+    told: Option<&[M::State]>,
+) -> Option<f64> {
+    let valid = tile.valid();
+    let [u, v] = [[1, 2], [0, 2], [0, 1]][face.axis];
+    let strides = [1, tile.pitch(), tile.pitch() * tile.pitch()];
+    let layer = if face.upper { valid[face.axis] - 1 } else { 0 };
+    let across = if face.upper { strides[face.axis] as isize } else { -(strides[face.axis] as isize) };
+    let mut least = f64::INFINITY;
+    for j in 0..valid[v] {
+        let mut at = [0; 3];
+        (at[face.axis], at[v]) = (layer, j);
+        let line = tile.at(at[0] as isize, at[1] as isize, at[2] as isize);
+        for i in 0..valid[u] {
+            let place = line + i * strides[u];
+            let here = tile.data()[place];
+            if here == told.map_or(M::UNKNOWN, |told| told[j * tile.edge() + i]) {
+                continue;
             }
-        };
-        match array.unwritten(slot) {
-            Some(_) => look(None),
-            None => array.read_face(slot, face, |known| look(Some(known))),
+            at[u] = i;
+            let mut voxel: [i64; 3] = std::array::from_fn(|a| part.lo[a] + at[a] as i64);
+            voxel[face.axis] += if face.upper { 1 } else { -1 };
+            let beside = tile.data()[place.wrapping_add_signed(across)];
+            if let Some(value) = method.entering(here, beside, voxel) {
+                least = least.min(value);
+            }
         }
-        least
-    })
+    }
+    least.is_finite().then_some(least)
 }

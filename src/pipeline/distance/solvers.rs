@@ -18,7 +18,7 @@ use crate::kernel::distance::vector_distance::VectorDistance;
 use crate::store::BrickArray;
 
 /// Solves on the bricks of a set, by a schedule, as far as a distance.
-pub type Solve<P> =
+pub(super) type Solve<P> =
     for<'a> fn(&Stage<'_>, &Engine, &Sources<'a>, &Arc<BrickSet>, Schedule, f64) -> Result<Solved<'a, P>>;
 
 /// One row of the table, for fields stored as `P`.
@@ -158,19 +158,5 @@ impl<'a> Job<'_, 'a> {
     ) -> Solved<'a, P> {
         let values = Arc::new(Values { method, state, farthest: self.farthest });
         Solved { sources: values.clone(), values, fixed_voxels }
-    }
-}
-
-/// Refuses what a method cannot do.
-///
-/// # Errors
-/// When `schedule` asks for sweeps of a method that has none.
-pub fn check_schedule(method: Method, schedule: Schedule) -> Result<()> {
-    let row = method.solver::<f32>();
-    match schedule {
-        Schedule::Sweep { .. } if !row.sweeps => {
-            Err(Error::usage(format!("--method {} has no ordered sweeps; leave --schedule out", row.name)))
-        }
-        _ => Ok(()),
     }
 }

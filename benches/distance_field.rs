@@ -1,0 +1,83 @@
+//! Whole distance fields, the Cube experiment (Kósa & Mikula 2023, Table 2): nanoseconds per voxel from the cloud in
+//! memory to the finished field, and visits per brick.
+//!
+//! ```sh
+//! cargo bench --bench distance_field                     # 289^3, all methods, bricks of 32 and 64, 2 threads
+//! cargo bench --bench distance_field -- 577 fsm 64 2
+//! ```
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use strandline::exec::{Budget, Cancel, Engine, Silent};
+use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
+use strandline::pipeline::distance::{Method, Schedule, Sources};
+use strandline::store::Scratch;
+
+/// The grid points on the surface of the unit cube.
+fn cube(geometry: &Geometry) -> Vec<[f64; 3]> {
+    let h = geometry.spacing[0];
+    let (low, high) = ((0.4 / h).round() as i64, (1.4 / h).round() as i64);
+    let inside = |n: &i64| (low..=high).contains(n);
+    let on = |n: i64| n == low || n == high;
+    let n = geometry.shape[0];
+    let mut points = Vec::new();
+    for z in (0..n).filter(inside) {
+        for y in (0..n).filter(inside) {
+            for x in (0..n).filter(inside) {
+                if on(x) || on(y) || on(z) {
+                    points.push(geometry.position([x, y, z]));
+                }
+            }
+        }
+    }
+    points
+}
+
+fn run(n: i64, method: Method, edge: i64, threads: usize) {
+    let h = 1.8 / (n - 1) as f64;
+    let geometry = Geometry { shape: [n; 3], spacing: [h; 3], origin: [-0.4; 3], unit: None };
+    let cloud = cube(&geometry);
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let budget = Budget { total: 8 << 30 };
+    let scratch = Scratch::new(dir.path(), budget.total);
+    let engine = Engine::new(threads, scratch, budget, Cancel::default(), Arc::new(Silent)).expect("threads");
+    for _ in 0..2 {
+        let started = Instant::now();
+        let set = Arc::new(BrickSet::dense(BrickGrid::new(geometry.shape, edge)));
+        let bins = PointBins::new(*set.grid(), &geometry, &cloud);
+        let sources = Sources { geometry: &geometry, positions: &cloud, bins: &bins };
+        let stage = engine.stage("distance", 0);
+        let solve = method.solver::<f32>().solve;
+        let solved = solve(&stage, &engine, &sources, &set, Schedule::Front, f64::INFINITY).expect("room");
+        let report = stage.finish();
+        let solve = started.elapsed().as_secs_f64();
+        let stage = engine.stage("measure", 0);
+        let measured = solved.measure(&stage, &set).expect("room");
+        stage.finish();
+        let voxels = (n * n * n) as f64;
+        println!(
+            "{:>4} {n}^3 bricks of {edge}, {threads} threads: {:.2} ns per voxel to solve, {:.2} with its measures; \
+             {:.2} visits per brick, {} rounds; largest {}",
+            method.name(),
+            1e9 * solve / voxels,
+            1e9 * started.elapsed().as_secs_f64() / voxels,
+            report.bricks as f64 / set.len() as f64,
+            report.iterations,
+            measured.max
+        );
+    }
+}
+
+fn main() {
+    let mut words = std::env::args().skip(1).filter(|word| !word.starts_with("--"));
+    let n = words.next().map_or(289, |n| n.parse().expect("voxels along an edge"));
+    let method = words.next().map(|name| Method::named(&name).expect("a method"));
+    let edges = words.next().map_or(vec![32, 64], |edge| vec![edge.parse().expect("a brick edge")]);
+    let threads = words.next().map_or(2, |n| n.parse().expect("a number of threads"));
+    for method in method.map_or(Method::all().collect::<Vec<_>>(), |method| vec![method]) {
+        for &edge in &edges {
+            run(n, method, edge, threads);
+        }
+    }
+}
