@@ -46,14 +46,14 @@ fn run(n: i64, method: Method, edge: i64, threads: usize) {
         let started = Instant::now();
         let set = Arc::new(BrickSet::dense(BrickGrid::new(geometry.shape, edge)));
         let bins = PointBins::new(*set.grid(), &geometry, &cloud);
-        let sources = Sources { geometry: &geometry, positions: &cloud, bins: &bins };
+        let sources = Sources::cloud(&geometry, &cloud, &bins);
         let stage = engine.stage("distance", 0);
         let solve = method.solver::<f32>().solve;
         let solved = solve(&stage, &engine, &sources, &set, Schedule::Front, f64::INFINITY).expect("room");
         let report = stage.finish();
         let solve = started.elapsed().as_secs_f64();
         let stage = engine.stage("measure", 0);
-        let measured = solved.measure(&stage, &set).expect("room");
+        let (measured, _) = solved.measure(&stage, &set, None).expect("room");
         stage.finish();
         let voxels = (n * n * n) as f64;
         println!(

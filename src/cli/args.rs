@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::distance_args::DistanceJobArgs;
 use super::values::{Crop, Output, parse_crop, parse_method, parse_pair, parse_size, parse_triple, solvers_help};
 use crate::pipeline::distance::Method;
 
@@ -20,6 +21,9 @@ pub(super) enum Command {
     /// Find objects in a 3-D image, guided by border points
     #[command(after_help = HELP_ON_SEGMENT)]
     Segment(Box<SegmentArgs>),
+    /// Compute the distance to point clouds and triangle meshes
+    #[command(after_help = HELP_ON_DISTANCE)]
+    Distance(Box<DistanceJobArgs>),
     /// Segment the built-in stack of a plant embryo
     Demo(DemoArgs),
     /// Tell what an input or output is: shape, axes, spacing, unit, type
@@ -28,6 +32,10 @@ pub(super) enum Command {
 
 const HELP_ON_SEGMENT: &str = "\
 Lengths are physical, in the unit of the image; triples are x,y,z; the centre of the first voxel is 0,0,0.
+Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 130 interrupted, 143 terminated.";
+
+const HELP_ON_DISTANCE: &str = "\
+Lengths are those of the files; triples are x,y,z.
 Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 130 interrupted, 143 terminated.";
 
 /// Find objects in a 3-D image, guided by border points that were marked on it.

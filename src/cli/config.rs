@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
-use super::args::{DistanceArgs, Edge, ImageArgs, LevelSetArgs, OutputArgs, OverlapArg, ResourceArgs, StopArg};
+use super::args::{DistanceArgs, Edge, ImageArgs, LevelSetArgs, OverlapArg, ResourceArgs, StopArg};
 use super::values::Output;
 use crate::error::{Error, Result};
 use crate::exec::machine_memory;
@@ -93,7 +93,8 @@ fn percentiles([low, high]: [f64; 2]) -> Result<[f64; 2]> {
     )))
 }
 
-fn brick(edge: i64) -> Result<i64> {
+/// The edge of bricks that was asked for.
+pub(super) fn brick(edge: i64) -> Result<i64> {
     if BRICKS.contains(&edge) && edge % 16 == 0 {
         return Ok(edge);
     }
@@ -132,13 +133,9 @@ pub(super) fn folder_of(path: &Path) -> &Path {
 }
 
 /// Refuses what would be found out only when the work is done: outputs that are there, folders that are not.
-pub(super) fn check_outputs(output: &OutputArgs) -> Result<()> {
-    let store = match &output.output {
-        Output::Store(path) => Some(path),
-        Output::None => None,
-    };
-    let extras = [&output.report, &output.mesh, &output.picture].into_iter().flatten();
-    let mut seen: Vec<&Path> = store.iter().map(|path| path.as_path()).collect();
+pub(super) fn check_outputs(store: &Output, extras: &[&Option<PathBuf>], overwrite: bool) -> Result<()> {
+    let extras = extras.iter().copied().flatten();
+    let mut seen: Vec<&Path> = store.path().into_iter().collect();
     for path in extras {
         if seen.contains(&path.as_path()) {
             return Err(Error::usage("is named for two outputs; give each a name of its own").at(path));
@@ -148,7 +145,7 @@ pub(super) fn check_outputs(output: &OutputArgs) -> Result<()> {
         if path.exists() && !path.is_file() {
             return Err(Error::usage("is no regular file; give another name").at(path));
         }
-        if path.exists() && !output.overwrite {
+        if path.exists() && !overwrite {
             let what = "exists already; choose another name, or give --overwrite to replace it";
             return Err(Error::usage(what).at(path));
         }

@@ -7,7 +7,10 @@ mod args;
 mod config;
 mod console;
 mod demo;
+mod distance;
+mod distance_args;
 mod files;
+mod grid;
 mod info;
 mod input;
 mod picture;
@@ -56,6 +59,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 fn execute(cli: Cli, typed: &[String]) -> Result<()> {
     match cli.command {
         Command::Segment(args) => segment::run(&args, typed),
+        Command::Distance(args) => distance::run(&args, typed),
         Command::Demo(args) => demo::run(&args, typed),
         Command::Info(args) => info::run(&args),
     }

@@ -13,12 +13,12 @@ use crate::pipeline::segment::{ObjectReport, Outcome, Overlap, SegmentSettings};
 
 /// The whole report.
 #[derive(Debug, Serialize)]
-pub(super) struct Report {
+pub(super) struct Report<S, R> {
     pub(super) version: &'static str,
     pub(super) command: &'static str,
     /// The command line as typed.
     pub(super) arguments: Vec<String>,
-    pub(super) settings: Settings,
+    pub(super) settings: S,
     pub(super) grid: Grid,
     pub(super) threads: usize,
     pub(super) ranks: usize,
@@ -27,7 +27,7 @@ pub(super) struct Report {
     pub(super) seconds: f64,
     pub(super) notes: Vec<String>,
     pub(super) stages: Vec<Stage>,
-    pub(super) result: Found,
+    pub(super) result: R,
 }
 
 /// Every setting, also those that nobody gave; lengths physical.
@@ -238,7 +238,7 @@ pub(super) fn crop_xyz(part: &crate::grid::Box3) -> [[i64; 2]; 3] {
     std::array::from_fn(|a| [part.lo[a], part.hi[a]])
 }
 
-impl Report {
+impl<S: Serialize, R: Serialize> Report<S, R> {
     /// Writes the report; nothing stands under the name before it is whole.
     pub(super) fn write(&self, path: &Path) -> Result<()> {
         let fault = |error: std::io::Error| Error::from_io("the report cannot be written", &error).at(path);

@@ -11,7 +11,6 @@ use super::files::copy_whole;
 use super::input::{Marks, crop_box, open_stack, read_marks};
 use super::report::{Found, Grid, Report, Settings, Solver, crop_xyz};
 use super::text::{bytes, duration, grouped, number, triple};
-use super::values::Output;
 use super::{picture, print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
@@ -67,7 +66,11 @@ impl Job {
         let cancel = signals::cancel_on_signals()?;
         let settings = config::settings(&args.picture, &args.level_set, &args.distance, &args.resources)?;
         let spacing = config::spacing(args.picture.image_spacing)?;
-        config::check_outputs(&args.output)?;
+        config::check_outputs(
+            &args.output.output,
+            &[&args.output.report, &args.output.mesh, &args.output.picture],
+            args.output.overwrite,
+        )?;
         let resources = config::resources(&args.resources, args.output.store())?;
         let voice = match (args.output.quiet, args.output.verbose) {
             (true, _) => Voice::Quiet,
@@ -237,7 +240,7 @@ impl Job {
         std::array::from_fn(|a| 0.5 * (low[a] + high[a]))
     }
 
-    fn report(&self, engine: &Engine, outcome: &Outcome) -> Report {
+    fn report(&self, engine: &Engine, outcome: &Outcome) -> Report<Settings, Found> {
         let (picture, output) = (&self.args.picture, &self.args.output);
         let settings = Settings {
             image: self.names.image.clone(),
@@ -323,10 +326,7 @@ fn numbered(path: &Path, label: u32) -> PathBuf {
 impl super::args::OutputArgs {
     /// The store's path, where there is to be one.
     pub(super) fn store(&self) -> Option<&Path> {
-        match &self.output {
-            Output::Store(path) => Some(path),
-            Output::None => None,
-        }
+        self.output.path()
     }
 }
 

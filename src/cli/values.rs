@@ -1,6 +1,6 @@
 //! Values with a spelling of their own: sizes, crops, triples, methods, outputs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use crate::pipeline::distance::{Method, SOLVERS};
@@ -16,6 +16,16 @@ pub(super) enum Output {
     Store(PathBuf),
     /// Nowhere.
     None,
+}
+
+impl Output {
+    /// The store's path, where there is to be one.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Store(path) => Some(path),
+            Self::None => None,
+        }
+    }
 }
 
 impl FromStr for Output {
@@ -50,6 +60,18 @@ pub(super) fn parse_crop(text: &str) -> Result<Crop, String> {
 /// `x,y,z`.
 pub(super) fn parse_triple(text: &str) -> Result<[f64; 3], String> {
     numbers(text)
+}
+
+/// One number for all axes, or `x,y,z`.
+pub(super) fn parse_spacing(text: &str) -> Result<[f64; 3], String> {
+    if text.contains(',') { numbers(text) } else { numbers::<1>(text).map(|[h]| [h; 3]) }
+}
+
+/// `x,y,z`, whole numbers.
+pub(super) fn parse_whole_triple(text: &str) -> Result<[i64; 3], String> {
+    let number = |part: &str| part.trim().parse::<i64>().map_err(|_| format!("'{}' is no whole number", part.trim()));
+    let values = text.split(',').map(number).collect::<Result<Vec<i64>, String>>()?;
+    values.try_into().map_err(|_| "give 3 whole numbers with commas between them".into())
 }
 
 /// `low,high`.

@@ -1,6 +1,6 @@
 //! `PointBins`: the points of a cloud sorted by the brick they lie in.
 
-use super::{Box3, BrickGrid, BrickId, BrickSet, Geometry, NEIGHBOURS_26};
+use super::{Box3, BrickGrid, BrickId, BrickSet, Geometry};
 
 /// For each brick of a grid, the points whose lower grid point lies in it, in order of their index.
 #[derive(Clone, Debug)]
@@ -38,17 +38,16 @@ impl PointBins {
         Self { grid, starts, order }
     }
 
+    /// The grid whose bricks the points are sorted by.
+    #[must_use]
+    pub fn grid(&self) -> &BrickGrid {
+        &self.grid
+    }
+
     /// The points of one brick.
     #[must_use]
     pub fn of(&self, brick: BrickId) -> &[u32] {
         &self.order[self.starts[brick as usize] as usize..self.starts[brick as usize + 1] as usize]
-    }
-
-    /// The points that may fix voxels of a brick: its own and those whose cell reaches in from below.
-    pub fn beside(&self, brick: BrickId) -> impl Iterator<Item = u32> + '_ {
-        let below = NEIGHBOURS_26.iter().filter(|o| o.iter().all(|&s| s <= 0));
-        let bricks = below.filter_map(move |&offset| self.grid.neighbour(brick, offset));
-        std::iter::once(brick).chain(bricks).flat_map(|id| self.of(id).iter().copied())
     }
 
     /// The bricks that hold a voxel within `reach` voxels (along each axis) of the box around some brick's points.

@@ -1,4 +1,9 @@
-//! Sources of a distance: points in the world, with the object and the contour they were marked on.
+//! Sources of a distance: points in the world, with the object and the contour they were marked on, and triangles; the
+//! data sets that they belong to.
+
+use std::ops::Range;
+
+use super::TriangleMesh;
 
 /// A point cloud in physical coordinates. A point's index is the source number that distance fields carry.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -31,5 +36,97 @@ impl PointCloud {
         Some(self.positions.iter().fold((first, first), |(lo, hi), p| {
             (std::array::from_fn(|a| lo[a].min(p[a])), std::array::from_fn(|a| hi[a].max(p[a])))
         }))
+    }
+}
+
+/// The sources of a run, points and triangles, numbered through: first all points, then all triangles. The n-th data
+/// set that was added has label n, counted from 1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DataSets {
+    /// World positions of all points.
+    pub positions: Vec<[f64; 3]>,
+    /// All triangles.
+    pub mesh: TriangleMesh,
+    /// The places of each data set's points, and of its triangles; one of the two is empty.
+    sets: Vec<[Range<u32>; 2]>,
+}
+
+impl DataSets {
+    /// Adds a cloud.
+    pub fn add_cloud(&mut self, positions: &[[f64; 3]]) {
+        let (points, triangles) = (self.positions.len() as u32, self.mesh.triangles.len() as u32);
+        self.positions.extend_from_slice(positions);
+        self.sets.push([points..self.positions.len() as u32, triangles..triangles]);
+    }
+
+    /// Adds a mesh.
+    pub fn add_mesh(&mut self, mesh: &TriangleMesh) {
+        let (points, triangles) = (self.positions.len() as u32, self.mesh.triangles.len() as u32);
+        let before = self.mesh.vertices.len() as u32;
+        self.mesh.vertices.extend_from_slice(&mesh.vertices);
+        self.mesh.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + before)));
+        self.sets.push([points..points, triangles..self.mesh.triangles.len() as u32]);
+    }
+
+    /// Number of data sets.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.sets.len()
+    }
+
+    /// Number of sources.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.positions.len() + self.mesh.len()
+    }
+
+    /// True when there is no source.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The points of each data set; empty for a mesh.
+    pub fn clouds(&self) -> impl Iterator<Item = Range<u32>> + '_ {
+        self.sets.iter().map(|set| set[0].clone())
+    }
+
+    /// The label of a source: that of its data set; 0 for a number that is no source.
+    #[must_use]
+    pub fn label(&self, source: u32) -> u32 {
+        let points = self.positions.len() as u32;
+        let (kind, at) = if source < points { (0, source) } else { (1, source - points) };
+        // Sets are added in order, so that the first one that ends beyond a source holds it.
+        let set = self.sets.partition_point(|set| set[kind].end <= at);
+        if set < self.sets.len() { set as u32 + 1 } else { 0 }
+    }
+
+    /// The smallest box that holds all sources, `(lowest, highest)`.
+    #[must_use]
+    pub fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
+        let points = self.positions.iter().map(|&p| (p, p));
+        points.chain(self.mesh.bounds()).reduce(|(lo, hi), (p, q)| {
+            (std::array::from_fn(|a| lo[a].min(p[a])), std::array::from_fn(|a| hi[a].max(q[a])))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sources_have_the_label_of_their_set() {
+        let triangle =
+            TriangleMesh { vertices: vec![[0.0; 3], [1.0; 3], [5.0, 0.0, 1.0]], triangles: vec![[0, 1, 2]; 2] };
+        let mut sets = DataSets::default();
+        sets.add_cloud(&[[0.0; 3], [2.0; 3]]);
+        sets.add_mesh(&triangle);
+        sets.add_cloud(&[[-1.0; 3]]);
+        sets.add_mesh(&triangle);
+        let labels: Vec<u32> = (0..8).map(|source| sets.label(source)).collect();
+        assert_eq!(labels, [1, 1, 3, 2, 2, 4, 4, 0]);
+        assert_eq!(sets.mesh.triangles[2], [3, 4, 5]);
+        assert_eq!(sets.bounds(), Some(([-1.0; 3], [5.0, 2.0, 2.0])));
     }
 }

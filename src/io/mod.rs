@@ -1,7 +1,12 @@
 //! Which bytes mean what: one file format a file.
 
+mod input;
+mod mesh;
 pub mod mesh_ply;
 pub mod ome_zarr;
+mod ply;
 pub mod png;
 pub mod points;
+pub mod sources;
+mod text;
 pub mod tiff_stack;

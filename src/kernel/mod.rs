@@ -35,3 +35,5 @@ pub mod distance;
 pub mod image;
 pub mod level_set;
 pub mod surface;
+pub mod triangle;
+mod vector;

@@ -166,18 +166,21 @@ fn outputs_that_cannot_be_written_end_with_code_1() {
     let bench = Bench::new(&Ball::small());
     let complaint = bench.fail("segment image.tif --points marks.csv -o /proc/x.zarr", 1);
     assert!(complaint.contains("/proc/x.zarr"), "{complaint}");
-    // Files may not grow beyond 64 KiB: scratch is refused at once, with its folder named.
-    let limited = format!(
-        "ulimit -f 64; exec {} segment image.tif --points marks.csv -o out/x.zarr",
-        env!("CARGO_BIN_EXE_strandline")
-    );
-    let mut command = std::process::Command::new("bash");
-    let output = command.args(["-c", &limited]).current_dir(bench.path("")).env("TMPDIR", bench.path("scratch"));
-    let output = output.output().unwrap();
-    let complaint = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{complaint}");
-    assert!(complaint.contains("--scratch") && complaint.contains("scratch:"), "{complaint}");
-    assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty());
+    // No file may grow beyond 8 KiB: the store cannot be written, nor what does not fit memory.
+    let larger = Bench::new(&Ball::large());
+    for (bench, arguments, reasons) in
+        [(&bench, "-o out/x.zarr", ["out/", ".zarr"]), (&larger, "-o none --memory 128MiB", ["--scratch", "scratch:"])]
+    {
+        let program = env!("CARGO_BIN_EXE_strandline");
+        let limited = format!("ulimit -f 8; exec {program} segment image.tif --points marks.csv {arguments}");
+        let mut command = std::process::Command::new("bash");
+        let output = command.args(["-c", &limited]).current_dir(bench.path("")).env("TMPDIR", bench.path("scratch"));
+        let output = output.output().unwrap();
+        let complaint = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{complaint}");
+        assert!(reasons.iter().all(|reason| complaint.contains(reason)), "{complaint}");
+        assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty());
+    }
 }
 
 #[test]

@@ -127,7 +127,7 @@ fn ours(
         let reach = geometry.spacing.map(|h| (f64::from(farthest) / h).ceil() as i64);
         set = Arc::new(bins.bricks_within(geometry, cloud, reach));
     }
-    let sources = Sources { geometry, positions: cloud, bins: &bins };
+    let sources = Sources::cloud(geometry, cloud, &bins);
     let stage = lab.engine.stage("distance", 0);
     let farthest = farthest.unwrap_or(f32::INFINITY);
     let distance = cloud_distance(&stage, &lab.engine, &sources, &set, method, farthest).expect("room for a distance");

@@ -95,7 +95,7 @@ fn flood(lab: &Lab, set: &Arc<BrickSet>, d: &[f32], farthest: f32) -> Tagging {
     let shape = set.grid().shape();
     let geometry = Geometry { shape, spacing: [1.0; 3], origin: [0.0; 3], unit: None };
     let bins = PointBins::new(*set.grid(), &geometry, &[]);
-    let sources = Sources { geometry: &geometry, positions: &[], bins: &bins };
+    let sources = Sources::cloud(&geometry, &[], &bins);
     let mut distance = lab.field(set, d);
     (0..set.grid().len()).for_each(|id| distance.set_absent(id, farthest));
     tag(&lab.engine.stage("tagging", 0), &lab.engine, &sources, &distance).expect("room in scratch")
@@ -134,7 +134,7 @@ fn flood_of_cloud(lab: &Lab, geometry: &Geometry, cloud: &[[f64; 3]], farthest: 
             Arc::new(bins.bricks_within(geometry, cloud, reach))
         }
     };
-    let sources = Sources { geometry, positions: cloud, bins: &bins };
+    let sources = Sources::cloud(geometry, cloud, &bins);
     let stage = lab.engine.stage("start", 0);
     let farthest = farthest.unwrap_or(f32::INFINITY);
     let distance = cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, farthest).expect("room in scratch");

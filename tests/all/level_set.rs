@@ -58,7 +58,7 @@ fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
     let grid = BrickGrid::new(geometry.shape, CELL as i64);
     let bins = PointBins::new(grid, &geometry, &cloud);
     let set = dense(geometry.shape, CELL as i64);
-    let sources = Sources { geometry: &geometry, positions: &cloud, bins: &bins };
+    let sources = Sources::cloud(&geometry, &cloud, &bins);
     let stage = lab.engine.stage("sponge", 0);
     let distance =
         cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, f32::INFINITY).expect("room in scratch");

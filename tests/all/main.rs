@@ -10,8 +10,10 @@ mod heat;
 mod level_set;
 mod maximum_principle;
 mod mesh_ply;
+mod mesh_sources;
 mod points;
 mod surfaces;
+mod triangle_distance;
 
 mod cli;
 mod layering;

@@ -30,6 +30,14 @@ impl Ball {
         Self { geometry, centre: [10.0, 9.0, 9.5], radius: 6.0 }
     }
 
+    /// The same ball on a grid five times finer.
+    pub(crate) fn large() -> Self {
+        let mut ball = Self::small();
+        ball.geometry.shape = ball.geometry.shape.map(|n| 5 * n);
+        ball.geometry.spacing = ball.geometry.spacing.map(|h| h / 5.0);
+        ball
+    }
+
     pub(crate) fn holds(&self, voxel: [i64; 3]) -> bool {
         let p = self.geometry.position(voxel);
         (0..3).map(|a| (p[a] - self.centre[a]).powi(2)).sum::<f64>() <= self.radius * self.radius

@@ -3,6 +3,7 @@
 pub(crate) mod ball;
 pub(crate) mod clouds;
 pub(crate) mod lab;
+pub(crate) mod meshes;
 pub(crate) mod npy;
 pub(crate) mod plain_scheme;
 pub(crate) mod random;

@@ -1,8 +1,8 @@
 //! Which columns of a table hold what, and the points gathered from its lines.
 
-use super::quoted;
 use crate::error::{Error, Result};
 use crate::grid::PointCloud;
+use crate::io::text::quoted;
 
 /// The places of the columns that matter, counted from 0.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,17 +7,16 @@ use std::borrow::Cow;
 use std::io::BufRead;
 
 use super::columns::{Columns, Rows};
-use super::layout::refuse_bare_returns;
-use super::{LONGEST_LINE, next_line, quoted};
 use crate::error::{Error, Result};
 use crate::grid::PointCloud;
+use crate::io::text::{next_line, quoted, refuse_bare_returns};
 
 /// Reads the points after the header, which stands in `header_line`, counted from 1.
 pub(super) fn read(text: &mut impl BufRead, separator: char, columns: Columns, header_line: u64) -> Result<PointCloud> {
     let mut rows = Rows::new(columns);
     let mut bytes = Vec::new();
     let mut number = 1;
-    while next_line(text, &mut bytes, LONGEST_LINE, number)? {
+    while next_line(text, &mut bytes, number)? {
         let line = String::from_utf8_lossy(&bytes);
         refuse_bare_returns(&line, number)?;
         let line = line.trim_end_matches(['\r', '\n']);

@@ -1,8 +1,9 @@
 //! What kind of table a text holds: told from its first line that is no comment.
 
 use super::columns::Columns;
-use super::{csv, quoted};
+use super::csv;
 use crate::error::{Error, Result};
+use crate::io::text::refuse_bare_returns;
 
 /// What stands between the fields of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,17 +91,6 @@ fn named(names: &[&str], line: u64) -> Result<Columns> {
 /// A line up to its comment, which starts at `#` or, at the start of a line, at `//`.
 pub(super) fn uncommented(line: &str) -> &str {
     if line.trim_start().starts_with("//") { "" } else { line.split('#').next().unwrap_or_default() }
-}
-
-/// Refuses a carriage return inside a line: the line ends of old Macs, which would make one line of all.
-pub(super) fn refuse_bare_returns(line: &str, number: u64) -> Result<()> {
-    if line.trim_end().contains('\r') {
-        return Err(Error::input(format!(
-            "line {number} ends in a carriage return alone, near {}; convert the line ends to LF",
-            quoted(line)
-        )));
-    }
-    Ok(())
 }
 
 fn starts_with_number(line: &str) -> bool {

@@ -3,10 +3,10 @@
 use std::io::BufRead;
 
 use super::columns::{Columns, Rows};
-use super::layout::{Separator, refuse_bare_returns, uncommented};
-use super::{LONGEST_LINE, next_line};
+use super::layout::{Separator, uncommented};
 use crate::error::Result;
 use crate::grid::PointCloud;
+use crate::io::text::{next_line, refuse_bare_returns};
 
 /// Reads the points from `first_line` on, counted from 1.
 pub(super) fn read(
@@ -18,7 +18,7 @@ pub(super) fn read(
     let mut rows = Rows::new(columns);
     let mut bytes = Vec::new();
     let mut number = 1;
-    while next_line(text, &mut bytes, LONGEST_LINE, number)? {
+    while next_line(text, &mut bytes, number)? {
         let line = String::from_utf8_lossy(&bytes);
         refuse_bare_returns(&line, number)?;
         let line = uncommented(&line).trim();

@@ -1,7 +1,7 @@
-//! Initialisation from a point cloud (Kósa & Mikula 2023, Alg. 1; algorithms: section 2).
+//! Initialisation from a point cloud (Kósa & Mikula 2023, Alg. 1 and section 4.0.1; algorithms: section 2).
 //!
-//! Each point fixes the eight grid points of the cell that holds it at their exact Euclidean distance; a grid point
-//! keeps the smallest one and that source; of equal distances the lower source index wins, whatever the order in
+//! Each point fixes the eight grid points of the cell that holds it, or of a larger cube around that cell, at their
+//! exact Euclidean distance; a point that lies on a grid point may fix that one alone. A grid point keeps the smallest one and that source; of equal distances the lower source index wins, whatever the order in
 //! which points arrive.
 
 use crate::grid::{Box3, Geometry};
@@ -9,7 +9,34 @@ use crate::grid::{Box3, Geometry};
 /// A voxel that no source fixes.
 pub const NO_SOURCE: u32 = u32::MAX >> 1;
 
-/// Fixes the voxels of `part` beside the given points.
+/// Which voxels a point fixes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cube {
+    /// Voxels by which the cube is larger than the point's cell, on every side, along each axis.
+    pub margin: [i64; 3],
+    /// Whether a point within 1e-9 voxels of a grid point fixes that one alone.
+    pub snaps: bool,
+}
+
+impl Cube {
+    /// The corners of the point's cell (Alg. 1).
+    pub const CELL: Self = Self { margin: [0; 3], snaps: false };
+
+    /// The voxels that a point at `at`, in voxel units, fixes.
+    fn voxels(self, at: [f64; 3]) -> Box3 {
+        let nearest = at.map(f64::round);
+        if self.snaps && (0..3).all(|a| (at[a] - nearest[a]).abs() <= 1e-9) {
+            return Box3::new(nearest.map(|v| v as i64), nearest.map(|v| v as i64 + 1));
+        }
+        let base = at.map(|v| v.floor() as i64);
+        Box3 {
+            lo: std::array::from_fn(|a| base[a] - self.margin[a]),
+            hi: std::array::from_fn(|a| base[a] + 2 + self.margin[a]),
+        }
+    }
+}
+
+/// Fixes the voxels of `part` that the given points fix, each with its index and the cube around it.
 ///
 /// `squared` holds squared distances (start: infinity), `source` the index of the fixing point (start:
 /// [`NO_SOURCE`]); both dense `[z][y][x]` with room for `edge`^3 voxels from `part.lo` on. Positions are physical.
@@ -17,25 +44,22 @@ pub fn fix_voxels(
     geometry: &Geometry,
     part: &Box3,
     edge: usize,
-    points: impl Iterator<Item = (u32, [f64; 3])>,
+    points: impl Iterator<Item = (u32, [f64; 3], Cube)>,
     squared: &mut [f64],
     source: &mut [u32],
 ) {
-    for (index, position) in points {
-        let at = geometry.to_voxels(position);
-        let base = at.map(|v| v.floor() as i64);
-        for corner in 0..8 {
-            let voxel = [base[0] + (corner & 1), base[1] + (corner >> 1 & 1), base[2] + (corner >> 2)];
-            if !part.contains(voxel) {
-                continue;
-            }
-            let local: [usize; 3] = std::array::from_fn(|a| (voxel[a] - part.lo[a]) as usize);
-            let place = (local[2] * edge + local[1]) * edge + local[0];
-            let distance = squared_distance(geometry.position(voxel), position);
-            let nearer = distance < squared[place] || (distance == squared[place] && index < source[place]);
-            if nearer {
-                squared[place] = distance;
-                source[place] = index;
+    for (index, position, cube) in points {
+        let voxels = cube.voxels(geometry.to_voxels(position)).intersect(part);
+        for (y, z) in voxels.rows() {
+            let row = ((z - part.lo[2]) as usize * edge + (y - part.lo[1]) as usize) * edge;
+            for x in voxels.lo[0]..voxels.hi[0] {
+                let place = row + (x - part.lo[0]) as usize;
+                let distance = squared_distance(geometry.position([x, y, z]), position);
+                let nearer = distance < squared[place] || (distance == squared[place] && index < source[place]);
+                if nearer {
+                    squared[place] = distance;
+                    source[place] = index;
+                }
             }
         }
     }

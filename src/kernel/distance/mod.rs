@@ -6,7 +6,10 @@ pub mod fast_sweeping;
 pub mod initialise;
 pub mod method;
 pub mod precision;
+pub mod shape_distance;
+pub mod triangles;
 pub mod vector_distance;
+pub mod winding_number;
 
 /// The eight sweep orders: for each axis, whether it runs from low to high; x changes fastest.
 pub const SWEEPS: [[bool; 3]; 8] = {

@@ -34,19 +34,24 @@ pub trait Real:
     /// The value as f64.
     fn f64(self) -> f64;
     /// The square root.
+    #[must_use]
     fn root(self) -> Self;
     /// The magnitude.
+    #[must_use]
     fn magnitude(self) -> Self;
     /// The value with the sign bit set.
+    #[must_use]
     fn marked(self) -> Self;
     /// Whether the sign bit is set.
     fn is_marked(self) -> bool;
     /// The smaller of two values that are numbers.
+    #[must_use]
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
         if other < self { other } else { self }
     }
     /// The larger of two values that are numbers.
+    #[must_use]
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         if other > self { other } else { self }
@@ -101,6 +106,8 @@ pub trait Precision: Element {
     type Fast: Real;
     /// The largest value that can be stored.
     const MAX: f64;
+    /// The smallest value with all its digits.
+    const LEAST: f64;
     /// Where nothing is known.
     const UNKNOWN: Self;
 
@@ -116,6 +123,7 @@ impl Precision for f64 {
     type Lane = Self;
     type Fast = Self;
     const MAX: f64 = Self::MAX;
+    const LEAST: f64 = Self::MIN_POSITIVE;
     const UNKNOWN: Self = Self::INFINITY;
 
     #[inline(always)]
@@ -136,6 +144,7 @@ impl Precision for f32 {
     type Lane = Self;
     type Fast = Self;
     const MAX: f64 = Self::MAX as f64;
+    const LEAST: f64 = Self::MIN_POSITIVE as f64;
     const UNKNOWN: Self = Self::INFINITY;
 
     #[inline(always)]
@@ -156,6 +165,7 @@ impl Precision for f16 {
     type Lane = f32;
     type Fast = f32;
     const MAX: f64 = 65504.0;
+    const LEAST: f64 = 6.103_515_625e-5;
     const UNKNOWN: Self = Self::INFINITY;
 
     #[inline(always)]

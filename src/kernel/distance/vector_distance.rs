@@ -91,7 +91,7 @@ impl<A: Real> Nearest<A> {
 struct Beside<'a, T>([&'a [T; LANES]; 6]);
 
 #[inline(always)]
-fn beside<'a, T>(sides: [&'a [T]; 6], at: usize) -> Beside<'a, T> {
+fn beside<T>(sides: [&[T]; 6], at: usize) -> Beside<'_, T> {
     let [xl, xu, yl, yu, zl, zu] = sides;
     Beside([chunk(xl, at), chunk(xu, at), chunk(yl, at), chunk(yu, at), chunk(zl, at), chunk(zu, at)])
 }
@@ -223,7 +223,7 @@ impl<A: Real> VectorDistance<'_, A> {
         for n in 0..=last {
             let index = |axis: usize, n: usize| self.coordinate(axis, part.lo[axis] + n as i64 - 1);
             at[0][last - n] = index(0, n);
-            at[1][n] = if !layout.turned { index(1, n) } else { index(1, (valid[1] + 1).saturating_sub(n)) };
+            at[1][n] = index(1, if layout.turned { (valid[1] + 1).saturating_sub(n) } else { n });
             at[2][n] = index(2, n);
         }
     }

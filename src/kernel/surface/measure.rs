@@ -1,6 +1,7 @@
 //! `SurfaceMeasure`: volume, area, closedness and pieces of a mesh, summed while its triangles pass.
 
 use super::{Components, EdgeTally};
+use crate::kernel::vector::{cross, dot, sub};
 
 /// Running sums over triangles, in f64 and in the order the triangles come.
 #[derive(Clone, Debug)]
@@ -79,18 +80,6 @@ impl SurfaceMeasure {
             vertices: self.components.vertices(),
         }
     }
-}
-
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

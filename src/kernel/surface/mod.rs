@@ -10,7 +10,6 @@ mod marching_cubes;
 mod measure;
 mod nearest;
 mod tables;
-mod triangle;
 mod weld;
 
 pub use components::Components;
@@ -19,5 +18,6 @@ pub use edge_tally::EdgeTally;
 pub use marching_cubes::{MarchingCubes, Patch, cells_of_brick};
 pub use measure::{Measures, SurfaceMeasure};
 pub use nearest::{Hausdorff, Nearest, PatchIndex};
-pub use triangle::Triangle;
 pub use weld::Welder;
+
+pub use crate::kernel::triangle::Triangle;

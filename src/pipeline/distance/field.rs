@@ -1,11 +1,12 @@
 //! What a solved distance can be read as: distances and the indices of nearest sources, both made out of the state of
 //! the method as they are read, so that no second field is stored.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::error::Result;
 use crate::exec::{Stage, Workers, one_wave};
-use crate::grid::{Box3, BrickSet};
+use crate::grid::{Box3, BrickSet, DataSets};
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::method::DistanceMethod;
 use crate::kernel::distance::precision::Precision;
@@ -17,6 +18,8 @@ pub struct Solved<'a, P> {
     pub values: Arc<dyn BoxSource<P> + Send + 'a>,
     /// For each voxel the index of its nearest known source, or [`NO_SOURCE`].
     pub sources: Arc<dyn BoxSource<u32> + Send + 'a>,
+    /// 1 where a source fixed the voxel, else 0.
+    pub fixed: Arc<dyn BoxSource<u8> + Send + 'a>,
     /// Voxels that sources fixed.
     pub fixed_voxels: u64,
 }
@@ -31,26 +34,45 @@ pub struct Measured {
 }
 
 impl<P: Precision> Solved<'_, P> {
-    /// Looks at every voxel.
+    /// Looks at every voxel; counts those of each label where `labels` says which data set a source belongs to.
     ///
     /// # Errors
     /// When the run is interrupted.
-    pub fn measure(&self, stage: &Stage<'_>, set: &BrickSet) -> Result<Measured> {
+    pub fn measure(
+        &self,
+        stage: &Stage<'_>,
+        set: &BrickSet,
+        labels: Option<&DataSets>,
+    ) -> Result<(Measured, BTreeMap<u32, u64>)> {
         let len = set.grid().brick_len();
-        let workers = Workers::new(move || vec![P::default(); len]);
-        let parts = stage.run(&one_wave(set), &workers, |values, &slot| {
+        let workers = Workers::new(move || (vec![P::default(); len], Vec::new()));
+        let parts = stage.run(&one_wave(set), &workers, |(values, sources), &slot| {
             let part = set.grid().brick_box(set.id(slot));
             let values = &mut values[..part.len()];
             self.values.read_box(&part, values)?;
             let known = |v: &f64| v.is_finite();
             let max = values.iter().map(|v| v.to_f64()).filter(known).fold(0.0, f64::max);
             let unknown = values.iter().filter(|v| !v.to_f64().is_finite()).count();
-            Ok(Measured { max, unlabelled_voxels: unknown as u64 })
+            let mut counts = BTreeMap::<u32, u64>::new();
+            if let Some(sets) = labels {
+                sources.resize(part.len(), NO_SOURCE);
+                self.sources.read_box(&part, sources)?;
+                for same in sources.chunk_by(|a, b| a == b) {
+                    *counts.entry(sets.label(same[0])).or_default() += same.len() as u64;
+                }
+            }
+            Ok((Measured { max, unlabelled_voxels: unknown as u64 }, counts))
         })?;
-        Ok(parts.iter().fold(Measured::default(), |all, part| Measured {
-            max: all.max.max(part.max),
-            unlabelled_voxels: all.unlabelled_voxels + part.unlabelled_voxels,
-        }))
+        let mut all = (Measured::default(), BTreeMap::<u32, u64>::new());
+        for (measured, counts) in parts {
+            all.0.max = all.0.max.max(measured.max);
+            all.0.unlabelled_voxels += measured.unlabelled_voxels;
+            for (label, n) in counts {
+                *all.1.entry(label).or_default() += n;
+            }
+        }
+        all.1.remove(&0);
+        Ok(all)
     }
 }
 
@@ -87,6 +109,16 @@ impl<M: DistanceMethod, P: Precision> BoxSource<P> for Values<M> {
             let distance = self.method.distance(state, voxel).min(self.farthest);
             out[at] = P::from_f64(distance);
         })
+    }
+}
+
+impl<M: DistanceMethod> BoxSource<u8> for Values<M> {
+    fn shape(&self) -> [i64; 3] {
+        self.state.set().grid().shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [u8]) -> Result<()> {
+        self.each(part, |at, state, _| out[at] = u8::from(M::is_fixed(state)))
     }
 }
 

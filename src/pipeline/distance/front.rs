@@ -55,10 +55,10 @@ pub(super) fn advance_front<M: DistanceMethod>(
                 if !changed && !untold[slot as usize] {
                     return Ok([None; 6]);
                 }
-                let leaving = match untold[slot as usize] || array.unwritten(slot).is_some() {
-                    true => FACES.map(|face| leaving(method, tile, &part, face, None)),
-                    false => FACES
-                        .map(|face| array.read_face(slot, face, |told| leaving(method, tile, &part, face, Some(told)))),
+                let leaving = if untold[slot as usize] || array.unwritten(slot).is_some() {
+                    FACES.map(|face| leaving(method, tile, &part, face, None))
+                } else {
+                    FACES.map(|face| array.read_face(slot, face, |told| leaving(method, tile, &part, face, Some(told))))
                 };
                 if changed {
                     plan.scatter(tile, array, slot);

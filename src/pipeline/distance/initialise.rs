@@ -7,6 +7,7 @@ use crate::exec::{Stage, Workers};
 use crate::grid::Slot;
 use crate::kernel::distance::initialise::{NO_SOURCE, fix_voxels};
 use crate::kernel::distance::method::DistanceMethod;
+use crate::kernel::distance::triangles;
 use crate::store::BrickArray;
 
 /// Fixes voxels; returns the bricks that hold any, in order of their slots, and the number of fixed voxels.
@@ -17,15 +18,19 @@ pub(super) fn initialise<M: DistanceMethod>(
 ) -> Result<(Vec<Slot>, u64)> {
     let set = array.set();
     let (grid, len) = (*set.grid(), set.grid().brick_len());
-    let near: Vec<Slot> =
-        (0..set.len() as Slot).filter(|&slot| sources.bins.beside(set.id(slot)).next().is_some()).collect();
+    let near: Vec<Slot> = (0..set.len() as Slot).filter(|&slot| sources.may_fix(set.id(slot))).collect();
     let workers = Workers::new(move || (vec![0.0; len], vec![0; len]));
     let fixed = stage.run(&near, &workers, |(squared, source), &slot| {
         let id = set.id(slot);
+        let (part, edge) = (grid.brick_box(id), grid.edge() as usize);
         squared.fill(f64::INFINITY);
         source.fill(NO_SOURCE);
-        let points = sources.bins.beside(id).map(|p| (p, sources.positions[p as usize]));
-        fix_voxels(sources.geometry, &grid.brick_box(id), grid.edge() as usize, points, squared, source);
+        fix_voxels(sources.geometry, &part, edge, sources.points_fixing(id), squared, source);
+        if let Some((mesh, bins)) = sources.mesh {
+            let first = sources.positions.len() as u32;
+            let beside = bins.of(id).iter().map(|&n| (first + n, mesh.corners(n as usize)));
+            triangles::fix_voxels(sources.geometry, &part, edge, beside, squared, source);
+        }
         let count = source.iter().filter(|&&s| s != NO_SOURCE).count() as u64;
         if count > 0 {
             array.write(slot, |out| {

@@ -1,35 +1,33 @@
-//! Distance to a point cloud over a set of bricks (algorithms: sections 2 and 3): which voxels sources fix, how distance
+//! Distance to points and triangles over a set of bricks (algorithms: sections 2 and 3): which voxels sources fix, how distance
 //! is carried outward from them, and the fields that come of it.
 //!
 //! The set need not cover the domain: a value within the set's reach of the cloud is reached only through smaller
 //! values, so leaving far bricks out changes none of the near ones.
 
+mod contiguous;
 mod field;
 mod front;
 mod initialise;
+mod job;
+mod needs;
+mod output;
+mod sign;
 mod solvers;
+mod sources;
 mod sweep;
 
 use std::sync::Arc;
 
 pub use field::{Measured, Solved};
+pub use job::{DistanceFound, DistanceSettings, Init, distance};
+pub use needs::Needs;
 pub use solvers::{Method, SOLVERS, Solver, solvers};
+pub use sources::Sources;
 
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
-use crate::grid::{BrickSet, Geometry, PointBins};
+use crate::grid::BrickSet;
 use crate::store::BrickArray;
-
-/// A cloud on a grid: what every distance method starts from.
-#[derive(Clone, Copy, Debug)]
-pub struct Sources<'a> {
-    /// The grid that the cloud lies on.
-    pub geometry: &'a Geometry,
-    /// World positions of the points.
-    pub positions: &'a [[f64; 3]],
-    /// The points by brick.
-    pub bins: &'a PointBins,
-}
 
 /// In which order bricks are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

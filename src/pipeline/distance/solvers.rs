@@ -8,12 +8,13 @@ use super::front::advance_front;
 use super::initialise::initialise;
 use super::sweep::sweep_all;
 use super::{Schedule, Sources};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::exec::{Engine, Stage};
 use crate::grid::BrickSet;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::vector_distance::VectorDistance;
 use crate::store::BrickArray;
 
@@ -32,6 +33,10 @@ pub struct Solver<P> {
     pub sweeps: bool,
     /// Whether it keeps the source of each voxel.
     pub keeps_sources: bool,
+    /// Edge of bricks that it is fastest with.
+    pub brick: i64,
+    /// Bytes of a voxel's state.
+    pub state_bytes: u64,
     /// Does it.
     pub solve: Solve<P>,
 }
@@ -45,6 +50,8 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 2] {
             about: "fast sweeping, the Eikonal equation",
             sweeps: true,
             keeps_sources: false,
+            brick: 32,
+            state_bytes: size_of::<P>() as u64,
             solve: fast_sweeping::<P>,
         },
         Solver {
@@ -52,6 +59,8 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 2] {
             about: "vector distance transform, Euclidean to a tracked source",
             sweeps: true,
             keeps_sources: true,
+            brick: 32,
+            state_bytes: 4,
             solve: vector_distance::<P>,
         },
     ]
@@ -120,6 +129,13 @@ fn vector_distance<'a, P: Precision>(
 ) -> Result<Solved<'a, P>> {
     let job = Job { stage, engine, sources, set, farthest };
     let (geometry, positions) = (sources.geometry, sources.positions);
+    if let Some(sets) = sources.sets {
+        let method = ShapeDistance::new(geometry, sets);
+        return match schedule {
+            Schedule::Front => job.front(method),
+            Schedule::Sweep { iterations } => job.sweeps(method, iterations),
+        };
+    }
     match schedule {
         Schedule::Front => job.front(VectorDistance::<P::Fast>::new(geometry, positions)),
         Schedule::Sweep { iterations } => job.sweeps(VectorDistance::<f64>::new(geometry, positions), iterations),
@@ -157,6 +173,6 @@ impl<'a> Job<'_, 'a> {
         fixed_voxels: u64,
     ) -> Solved<'a, P> {
         let values = Arc::new(Values { method, state, farthest: self.farthest });
-        Solved { sources: values.clone(), values, fixed_voxels }
+        Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels }
     }
 }

@@ -231,7 +231,7 @@ fn flood_within(
     let bins = PointBins::new(grid, geometry, cloud);
     let reach = geometry.spacing.map(|h| (farthest / h).ceil() as i64 + 1);
     let set = Arc::new(bins.bricks_within(geometry, cloud, reach));
-    let sources = Sources { geometry, positions: cloud, bins: &bins };
+    let sources = Sources::cloud(geometry, cloud, &bins);
     let stage = engine.stage(&name("distance", marks), 11 * set.len() as u64);
     stage.voxels((set.len() * grid.brick_len()) as u64);
     let distance = cloud_distance(&stage, engine, &sources, &set, settings.method, farthest as f32)?;

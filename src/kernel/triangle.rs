@@ -5,7 +5,7 @@
 //! on an edge or at a corner, and the signs of its gradient tell which. Triangles with next to no height act as the
 //! segments that bound them, those of three equal corners as a point.
 
-use super::measure::{cross, dot, sub};
+use super::vector::{cross, dot, sub};
 
 /// Below this squared ratio of height to length the region tests lose their digits: such triangles are thin.
 const THIN: f64 = 1e-8;

@@ -2,8 +2,8 @@
 
 use std::io::BufRead;
 
-use super::{LONGEST_LINE, next_line, quoted};
 use crate::error::{Error, Result};
+use crate::io::text::{next_line, quoted};
 
 /// The longest header that is read.
 const LONGEST: u64 = 1 << 20;
@@ -124,7 +124,7 @@ impl Header {
         let mut line = Vec::new();
         loop {
             header.lines += 1;
-            if header.bytes > LONGEST || !next_line(reader, &mut line, LONGEST_LINE, header.lines)? {
+            if header.bytes > LONGEST || !next_line(reader, &mut line, header.lines)? {
                 return Err(Error::input(
                     "is a PLY file whose header has no end_header; the file is cut off or damaged",
                 ));
@@ -144,6 +144,15 @@ impl Header {
         }
         header.encoding = encoding.ok_or_else(|| Error::input("is a PLY file whose header names no format"))?;
         Ok(header)
+    }
+
+    /// An element as a message names it: how many of what.
+    pub(super) fn declared(element: &Element) -> String {
+        match element.name.as_str() {
+            "vertex" => format!("{} vertices", element.count),
+            "face" => format!("{} faces", element.count),
+            name => format!("{} elements {}", element.count, quoted(name)),
+        }
     }
 
     fn add_element(&mut self, name: &str, count: &str, text: &str) -> Result<()> {

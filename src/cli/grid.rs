@@ -1,0 +1,108 @@
+//! The grid of a distance: as typed, like an image, or around the sources.
+
+use super::distance_args::GridArgs;
+use super::input::open_stack;
+use crate::error::{Error, Result};
+use crate::grid::Geometry;
+use crate::io::tiff_stack::Select;
+
+/// Voxels along the longest side where no spacing is given.
+const DEFAULT_VOXELS: f64 = 256.0;
+
+/// The room around sources where none is given, in parts of their largest extent (Kósa & Mikula 2023).
+const DEFAULT_PADDING: f64 = 1.0 / 6.0;
+
+/// The grid that was asked for; `bounds` is the box of all sources. Adds what the user should know to `notes`.
+pub(super) fn grid(args: &GridArgs, (low, high): ([f64; 3], [f64; 3]), notes: &mut Vec<String>) -> Result<Geometry> {
+    if let Some(image) = &args.like {
+        let stack = open_stack(image, Select { channel: 0, time: 0 }, None)?;
+        notes.extend(stack.notes);
+        return Ok(stack.geometry);
+    }
+    if let Some([x, y, z]) = args.spacing.filter(|h| h.iter().any(|h| !(h.is_finite() && *h > 0.0))) {
+        return Err(Error::usage(format!("--spacing is {x},{y},{z}; give one length or three, each more than 0")));
+    }
+    if let (Some(shape), Some(origin), Some(spacing)) = (args.shape, args.origin, args.spacing) {
+        return exact(shape, origin, spacing);
+    }
+    if let Some(padding) = args.padding.filter(|p| !(p.is_finite() && *p >= 0.0)) {
+        return Err(Error::usage(format!("--padding is {padding}; give a length, 0 or more")));
+    }
+    let extent: [f64; 3] = std::array::from_fn(|a| high[a] - low[a]);
+    let largest = extent.iter().copied().fold(0.0, f64::max);
+    if !largest.is_finite() {
+        return Err(Error::input("the coordinates reach farther than numbers do; scale them down"));
+    }
+    if largest == 0.0 && (args.spacing.is_none() || args.padding.is_none()) {
+        return Err(Error::input(
+            "all sources lie in one point, which tells no scale; give --spacing and --padding, or --origin and --shape",
+        ));
+    }
+    let padding = args.padding.unwrap_or(DEFAULT_PADDING * largest);
+    let spacing = args.spacing.unwrap_or([(largest + 2.0 * padding) / DEFAULT_VOXELS; 3]);
+    // One voxel more than the room needs, as the papers' grids have it.
+    let count = |a: usize| ((extent[a] + 2.0 * padding) / spacing[a]).floor() + 2.0;
+    let counts = [count(0), count(1), count(2)];
+    check_counts(counts)?;
+    let origin = low.map(|v| v - padding);
+    Ok(Geometry { shape: counts.map(|n| n as i64), spacing, origin, unit: None })
+}
+
+fn exact(shape: [i64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Geometry> {
+    if shape.iter().any(|&n| n < 1) {
+        let [x, y, z] = shape;
+        return Err(Error::usage(format!("--shape is {x},{y},{z}; give three numbers of voxels, each 1 or more")));
+    }
+    if origin.iter().any(|v| !v.is_finite()) {
+        let [x, y, z] = origin;
+        return Err(Error::usage(format!("--origin is {x},{y},{z}; give three finite coordinates")));
+    }
+    check_counts(shape.map(|n| n as f64))?;
+    Ok(Geometry { shape, spacing, origin, unit: None })
+}
+
+/// Refuses what no index could count.
+fn check_counts(counts: [f64; 3]) -> Result<()> {
+    let voxels: f64 = counts.iter().product();
+    if counts.iter().any(|&n| n >= 1e9) || voxels >= 1e18 {
+        let [x, y, z] = counts;
+        return Err(Error::usage(format!(
+            "the grid would have {x:.3e} x {y:.3e} x {z:.3e} voxels; give a larger --spacing or a smaller --shape"
+        )));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOTHING: GridArgs = GridArgs { spacing: None, padding: None, origin: None, shape: None, like: None };
+
+    fn around(args: &GridArgs, low: [f64; 3], high: [f64; 3]) -> Result<Geometry> {
+        grid(args, (low, high), &mut Vec::new())
+    }
+
+    #[test]
+    fn the_papers_grid_around_sources() {
+        let args = GridArgs { spacing: Some([0.1; 3]), ..NOTHING };
+        let found = around(&args, [0.0; 3], [3.0, 1.0, 0.0]).unwrap();
+        assert_eq!(found.shape, [42, 22, 12]);
+        assert_eq!(found.origin, [-0.5; 3]);
+        assert_eq!(around(&NOTHING, [0.0; 3], [1.0; 3]).unwrap().shape, [258; 3]);
+    }
+
+    #[test]
+    fn senseless_grids_are_refused() {
+        let with = |spacing| GridArgs { spacing: Some(spacing), ..NOTHING };
+        for spacing in [[0.0; 3], [-1.0; 3], [f64::NAN, 1.0, 1.0], [f64::INFINITY; 3], [1e-12; 3]] {
+            assert_eq!(around(&with(spacing), [0.0; 3], [1.0; 3]).unwrap_err().exit_code(), 2, "{spacing:?}");
+        }
+        assert!(around(&NOTHING, [1.0; 3], [1.0; 3]).unwrap_err().to_string().contains("one point"));
+        assert!(around(&NOTHING, [-1e308; 3], [1e308; 3]).is_err());
+        let shape = GridArgs { shape: Some([5, 0, 5]), origin: Some([0.0; 3]), ..with([1.0; 3]) };
+        assert!(around(&shape, [0.0; 3], [1.0; 3]).unwrap_err().to_string().contains("--shape"));
+        let padding = GridArgs { padding: Some(-1.0), ..NOTHING };
+        assert!(around(&padding, [0.0; 3], [1.0; 3]).unwrap_err().to_string().contains("--padding"));
+    }
+}

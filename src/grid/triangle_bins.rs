@@ -1,0 +1,121 @@
+//! `TriangleBins`: the triangles of a mesh sorted by the bricks whose voxels they may fix.
+
+use super::{Box3, BrickGrid, BrickId, BrickSet, Geometry, TriangleMesh, VoxelTriangle};
+
+/// For each brick of a grid, the triangles that cut a cell with a corner in the brick, in order of their index.
+///
+/// A triangle is listed in every brick that it concerns. Those outside of the domain are left out, but for what
+/// reaches the outermost voxels from the cells right beside them.
+#[derive(Clone, Debug)]
+pub struct TriangleBins {
+    grid: BrickGrid,
+    /// Where each brick's triangles start in `order`; a large triangle lies in many bricks.
+    starts: Vec<usize>,
+    order: Vec<u32>,
+}
+
+impl TriangleBins {
+    /// Sorts triangles into the bricks of `grid`. Two passes over the mesh, 4 bytes for each triangle in each brick.
+    ///
+    /// # Panics
+    /// With more than [`MOST_SOURCES`](super::MOST_SOURCES) triangles, or corners that do not exist; a mesh made by
+    /// [`TriangleMesh::new`] has neither.
+    #[must_use]
+    pub fn new(grid: BrickGrid, geometry: &Geometry, mesh: &TriangleMesh) -> Self {
+        assert!(mesh.len() <= super::MOST_SOURCES, "source indices have 31 bits");
+        let bricks_of = |n: usize| {
+            let triangle = VoxelTriangle::new(geometry, mesh.corners(n));
+            let bricks = grid.bricks_in(&triangle.voxels());
+            bricks.filter(move |&id| triangle.meets(&cells_beside(&grid.brick_box(id))))
+        };
+        let mut starts = vec![0_usize; grid.len() as usize + 1];
+        for brick in (0..mesh.len()).flat_map(bricks_of) {
+            starts[brick as usize + 1] += 1;
+        }
+        for n in 1..starts.len() {
+            starts[n] += starts[n - 1];
+        }
+        let mut next = starts.clone();
+        let mut order = vec![0; starts[starts.len() - 1]];
+        for (index, brick) in (0..mesh.len()).flat_map(|n| bricks_of(n).map(move |brick| (n, brick))) {
+            order[next[brick as usize]] = index as u32;
+            next[brick as usize] += 1;
+        }
+        Self { grid, starts, order }
+    }
+
+    /// The triangles that may fix voxels of a brick.
+    #[must_use]
+    pub fn of(&self, brick: BrickId) -> &[u32] {
+        &self.order[self.starts[brick as usize]..self.starts[brick as usize + 1]]
+    }
+
+    /// The bricks that hold a voxel within `reach` voxels (along each axis) of the box around what some brick's
+    /// triangles may fix in it.
+    ///
+    /// # Panics
+    /// When `mesh` is not the one that was sorted.
+    #[must_use]
+    pub fn bricks_within(&self, geometry: &Geometry, mesh: &TriangleMesh, reach: [i64; 3]) -> BrickSet {
+        let mut keep = vec![false; self.grid.len() as usize];
+        for brick in 0..self.grid.len() {
+            let own = self.grid.brick_box(brick);
+            let voxels = |&n: &u32| VoxelTriangle::new(geometry, mesh.corners(n as usize)).voxels().intersect(&own);
+            let hull = self.of(brick).iter().map(voxels).reduce(|a, b| Box3 {
+                lo: std::array::from_fn(|i| a.lo[i].min(b.lo[i])),
+                hi: std::array::from_fn(|i| a.hi[i].max(b.hi[i])),
+            });
+            let Some(hull) = hull else { continue };
+            let grown = Box3 {
+                lo: std::array::from_fn(|i| hull.lo[i] - reach[i]),
+                hi: std::array::from_fn(|i| hull.hi[i] + reach[i]),
+            };
+            self.grid.bricks_in(&grown).for_each(|id| keep[id as usize] = true);
+        }
+        BrickSet::from_fn(self.grid, |id| keep[id as usize])
+    }
+}
+
+/// The cells that have a corner among the voxels of `part`.
+#[must_use]
+pub fn cells_beside(part: &Box3) -> Box3 {
+    Box3::new(part.lo.map(|v| v - 1), part.hi)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lists by asking each triangle for each cell of each brick.
+    fn plainly(grid: BrickGrid, geometry: &Geometry, mesh: &TriangleMesh, brick: BrickId) -> Vec<u32> {
+        let cells = cells_beside(&grid.brick_box(brick));
+        let is_cut = |n: &usize| {
+            let triangle = VoxelTriangle::new(geometry, mesh.corners(*n));
+            let mut cells = cells.rows().flat_map(|(y, z)| (cells.lo[0]..cells.hi[0]).map(move |x| [x, y, z]));
+            cells.any(|cell| triangle.meets(&Box3::new(cell, cell.map(|v| v + 1))))
+        };
+        (0..mesh.len()).filter(is_cut).map(|n| n as u32).collect()
+    }
+
+    #[test]
+    fn each_brick_has_the_triangles_that_cut_its_cells() {
+        let geometry = Geometry { shape: [20, 13, 9], spacing: [0.5, 1.0, 2.0], origin: [1.0, -2.0, 0.0], unit: None };
+        let corner = |n: u32| {
+            let part = |k: u32| f64::from((n * 7919 + k * 104_729) % 1009) / 1009.0;
+            [1.0 + 12.0 * part(1) - 1.0, -2.0 + 14.0 * part(2), 20.0 * part(3) - 1.0]
+        };
+        let vertices: Vec<_> = (0..90).map(corner).collect();
+        let triangles = (0..30).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).chain([[0, 0, 0], [4, 5, 5]]).collect();
+        let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+        let grid = BrickGrid::new(geometry.shape, 4);
+        let bins = TriangleBins::new(grid, &geometry, &mesh);
+        let mut listed = 0;
+        for brick in 0..grid.len() {
+            assert_eq!(bins.of(brick), plainly(grid, &geometry, &mesh, brick), "brick {brick}");
+            listed += bins.of(brick).len();
+        }
+        assert!(listed > 200);
+        let near = bins.bricks_within(&geometry, &mesh, [0; 3]);
+        assert!((0..grid.len()).all(|brick| bins.of(brick).is_empty() || near.slot(brick).is_some()));
+    }
+}

@@ -1,0 +1,144 @@
+//! STL (stereolithography, 3D Systems 1989): triangles with corners of their own, binary or text.
+//!
+//! Binary: 80 bytes of anything, a count, then 50 bytes a triangle: normal and corners as little-endian f32, and two
+//! more bytes. Many binary files start with the `solid` of the text form, so what tells them apart is whether they are
+//! text. Normals are left aside: the order of the corners says what is outside.
+
+use std::io::{ErrorKind, Read};
+
+use super::{first_line, stl_text};
+use crate::error::{Error, Result};
+use crate::grid::{MOST_SOURCES, TriangleMesh, refuse_too_many};
+use crate::io::input::{HEAD, Input};
+use crate::io::sources::Source;
+use crate::io::text::{first_binary_byte, unreadable};
+
+/// Bytes before the first triangle.
+const HEADER: usize = 84;
+
+/// Bytes of a triangle.
+const RECORD: usize = 50;
+
+/// How other binary files start: TIFF, PNG, NumPy, HDF5, zip, gzip.
+const OTHERS: [&[u8]; 7] = [b"II*\0", b"II+\0", b"MM\0", b"\x89PNG", b"\x93NUMPY", b"\x89HDF", b"PK\x03\x04"];
+
+/// True for what starts like an STL file.
+pub(in crate::io) fn is_stl(head: &[u8]) -> bool {
+    if first_binary_byte(head).is_none() {
+        let line = first_line(head).unwrap_or_default();
+        return line.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("solid"));
+    }
+    let is_other = OTHERS.iter().any(|magic| head.starts_with(magic)) || head.starts_with(b"\x1f\x8b");
+    head.len() >= HEADER && !is_other && (has_declared_length(head) || starts_with_triangle(head))
+}
+
+/// True for a small binary file, whole in its head, whose length is what its count asks for.
+fn has_declared_length(head: &[u8]) -> bool {
+    head.len() < HEAD as usize - 3 && head.len() as u64 == length_for(declared(head))
+}
+
+/// True when the numbers of the first triangle, as far as they are there, look like lengths: finite, neither all zero
+/// nor tiny or huge beyond any unit.
+fn starts_with_triangle(head: &[u8]) -> bool {
+    let numbers = head[HEADER..].chunks_exact(4).take(12).map(float);
+    let mut nonzero = numbers.filter(|&x| x != 0.0).peekable();
+    nonzero.peek().is_some() && nonzero.all(|x| (1e-20..1e20).contains(&x.abs()))
+}
+
+fn declared(head: &[u8]) -> u32 {
+    u32::from_le_bytes([head[80], head[81], head[82], head[83]])
+}
+
+fn length_for(count: u32) -> u64 {
+    HEADER as u64 + RECORD as u64 * u64::from(count)
+}
+
+fn float(bytes: &[u8]) -> f32 {
+    f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
+}
+
+/// Reads a mesh, three vertices of its own for each triangle.
+pub(in crate::io) fn read(input: &mut Input) -> Result<Source> {
+    let corners = if first_binary_byte(input.head()?).is_none() {
+        stl_text::read(&mut input.reader)?
+    } else {
+        read_binary(input)?
+    };
+    if corners.is_empty() {
+        return Err(Error::input("is STL without a triangle; give a mesh that has some"));
+    }
+    refuse_too_many("corners", corners.len() as u64)?;
+    let triangles = (0..corners.len() as u32).step_by(3).map(|v| [v, v + 1, v + 2]).collect();
+    Ok(Source::Mesh(TriangleMesh::new(corners, triangles)?))
+}
+
+fn read_binary(input: &mut Input) -> Result<Vec<[f64; 3]>> {
+    let mut header = [0; HEADER];
+    input.reader.read_exact(&mut header).map_err(|e| cut_off(&e, 0))?;
+    let count = declared(&header);
+    if let Some(length) = input.length.filter(|&length| length != length_for(count)) {
+        return Err(Error::input(format!(
+            "is binary STL that declares {count} triangles, which take {} bytes, but has {length}; the file is damaged \
+             or holds something else",
+            length_for(count)
+        )));
+    }
+    if 3 * u64::from(count) > MOST_SOURCES as u64 {
+        return Err(Error::input(format!("declares {count} triangles, too many to be numbered; divide the mesh")));
+    }
+    let mut corners = Vec::new();
+    if input.length.is_some() {
+        corners.reserve_exact(3 * count as usize);
+    }
+    let mut record = [0; RECORD];
+    for n in 0..count {
+        input.reader.read_exact(&mut record).map_err(|e| cut_off(&e, n))?;
+        // Three numbers of the normal come first.
+        for corner in record[12..48].chunks_exact(12) {
+            let position = [0, 4, 8].map(|at| f64::from(float(&corner[at..])));
+            if !position.iter().all(|x| x.is_finite()) {
+                return Err(Error::input(format!(
+                    "triangle {n} (counted from 0, byte {}) has a coordinate that is not finite; delete the triangle",
+                    length_for(n)
+                )));
+            }
+            corners.push(position);
+        }
+    }
+    if input.reader.read(&mut [0]).map_err(|e| unreadable(&e))? > 0 {
+        return Err(Error::input(format!("is binary STL that declares {count} triangles but goes on after them")));
+    }
+    Ok(corners)
+}
+
+fn cut_off(error: &std::io::Error, read: u32) -> Error {
+    if error.kind() == ErrorKind::UnexpectedEof {
+        return Error::input(format!("is binary STL that ends after {read} triangles; the file is cut off or damaged"));
+    }
+    unreadable(error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A binary file that declares `count` triangles and goes on with `rest`.
+    fn binary(count: u32, rest: &[f32]) -> Vec<u8> {
+        let numbers: Vec<u8> = rest.iter().flat_map(|x| x.to_le_bytes()).collect();
+        [&[b's'; 80][..], &count.to_le_bytes(), &numbers].concat()
+    }
+
+    #[test]
+    fn what_starts_an_stl_file() {
+        assert!(is_stl(b"solid\n") && is_stl(b"\n SOLID a b\r\nfacet") && is_stl(&binary(0, &[])));
+        assert!(is_stl(&binary(1_000_000_000, &[0.0, 0.0, 1.0, 5.0])));
+        assert!(
+            !is_stl(&binary(7, &[0.0; 40]))
+                && !is_stl(&binary(7, &[1e-39; 40]))
+                && !is_stl(&binary(7, &[f32::NAN; 40]))
+        );
+        assert!(!is_stl(b"solidus\n") && !is_stl(b"facet\n") && !is_stl(b"\0\0\0") && !is_stl(b""));
+        let tiff = [&b"II*\0"[..], &binary(0, &[])].concat();
+        assert!(!is_stl(&tiff));
+    }
+}

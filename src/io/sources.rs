@@ -1,0 +1,120 @@
+//! Sources of a distance from files: point clouds and triangle meshes, told apart by content, never by the name.
+//!
+//! [`FORMATS`] is the one table of what is read. Polygons become fans of triangles; a vertex that no face names is no
+//! source of a mesh.
+
+use std::path::Path;
+
+pub use super::input::Input;
+
+use super::mesh::{obj, off, stl};
+use super::text::{first_binary_byte, refuse_utf16};
+use super::{ply, points};
+use crate::error::{Error, Result};
+use crate::grid::{PointCloud, TriangleMesh};
+
+/// What distances are measured to; positions are physical.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// Points, at least one.
+    Cloud(PointCloud),
+    /// Triangles, at least one.
+    Mesh(TriangleMesh),
+}
+
+/// A file format of sources.
+#[derive(Debug)]
+pub struct Format {
+    /// Its usual name.
+    pub name: &'static str,
+    /// How names of such files usually end, without the dot; for help texts alone.
+    pub extensions: &'static [&'static str],
+    /// What is read of it, in a few words.
+    pub about: &'static str,
+    /// Whether a file that starts with these bytes (64 kB, or all of a smaller file) is of this format.
+    pub sniff: fn(&[u8]) -> bool,
+    /// Reads a file of this format. Fails with an input error that says what is wrong and where.
+    pub read: fn(&mut Input) -> Result<Source>,
+}
+
+/// The formats, in the order in which they are tried.
+pub const FORMATS: &[Format] = &[
+    Format {
+        name: "PLY",
+        extensions: &["ply"],
+        about: "triangle mesh or points; text or binary of either byte order",
+        sniff: ply::is_ply,
+        read: ply::read,
+    },
+    Format {
+        name: "OFF",
+        extensions: &["off", "coff", "noff"],
+        about: "triangle mesh, or points where it has no faces; text",
+        sniff: off::is_off,
+        read: off::read,
+    },
+    Format {
+        name: "STL",
+        extensions: &["stl"],
+        about: "triangle mesh; text or binary",
+        sniff: stl::is_stl,
+        read: stl::read,
+    },
+    Format {
+        name: "OBJ",
+        extensions: &["obj"],
+        about: "triangle mesh, or points where it has no faces; text",
+        sniff: obj::is_obj,
+        read: obj::read,
+    },
+    Format {
+        name: "CSV",
+        extensions: &["csv", "tsv"],
+        about: "points; a header names the columns x, y, z, and object and contour where there are any",
+        sniff: points::is_csv,
+        read: read_table,
+    },
+    Format {
+        name: "XYZ",
+        extensions: &["xyz", "txt"],
+        about: "points; three numbers a line, and perhaps more",
+        sniff: points::is_xyz,
+        read: read_table,
+    },
+];
+
+/// Reads points or triangles in physical coordinates.
+///
+/// # Errors
+/// When the file cannot be read, is of no format in [`FORMATS`], holds neither a point nor a triangle, holds more than
+/// can be numbered, or is damaged: names the file, the place in it and the reason.
+pub fn read_source(path: &Path) -> Result<Source> {
+    read(path).map_err(|error| error.at(path))
+}
+
+fn read(path: &Path) -> Result<Source> {
+    let mut input = Input::open(path, &format!("points or a mesh ({})", names()))?;
+    let head = input.head()?;
+    if let Some(format) = FORMATS.iter().find(|format| (format.sniff)(head)) {
+        return (format.read)(&mut input);
+    }
+    refuse_utf16(head)?;
+    if let Some(place) = first_binary_byte(head) {
+        return Err(Error::input(format!(
+            "holds binary data of no known format (byte {place} is no text); give points or a mesh ({})",
+            names()
+        )));
+    }
+    // What is text and nothing else is a table that cannot be understood; its reader says why.
+    read_table(&mut input)
+}
+
+fn read_table(input: &mut Input) -> Result<Source> {
+    points::read_table(input).and_then(points::refuse_empty).map(Source::Cloud)
+}
+
+/// The names of all formats, for a message.
+fn names() -> String {
+    let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
+    names.join(", ")
+}

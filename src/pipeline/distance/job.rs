@@ -1,0 +1,128 @@
+//! The whole job of `distance`: solve on a grid of any size, and write what was asked for.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::contiguous::contiguous_margin;
+use super::output::write_fields;
+use super::sign::Signed;
+use super::{Method, Schedule, Solved, Sources};
+use crate::error::{Error, Result};
+use crate::exec::Engine;
+use crate::grid::{BrickGrid, BrickSet, DataSets, Geometry, PointBins, TriangleBins};
+use crate::io::ome_zarr::StoreWriter;
+use crate::kernel::distance::initialise::Cube;
+use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::winding_number::WindingTree;
+
+/// Which voxels points fix at the start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Init {
+    /// The corners of the point's cell (Alg. 1).
+    Cell,
+    /// So large a cube around each point that the cubes of a data set touch (Sec. 4.0.1).
+    Contiguous,
+    /// A point on a grid point that one alone, others the corners of their cell.
+    Grid,
+}
+
+/// What is computed and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistanceSettings {
+    /// Which method.
+    pub method: Method,
+    /// In which order.
+    pub schedule: Schedule,
+    /// From which start.
+    pub init: Init,
+    /// As far as that, physical; voxels farther away hold this distance.
+    pub farthest: Option<f64>,
+    /// Negative inside the meshes.
+    pub signed: bool,
+    /// Also the label of the nearest data set.
+    pub labels: bool,
+    /// Also the position of the nearest source.
+    pub closest_point: bool,
+    /// Edge of the bricks.
+    pub brick: i64,
+}
+
+/// What a job found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DistanceFound {
+    /// The largest distance.
+    pub max: f64,
+    /// Voxels that sources fixed.
+    pub fixed_voxels: u64,
+    /// Voxels that no source reached.
+    pub unlabelled_voxels: u64,
+    /// Voxels of each label, where labels were asked for.
+    pub label_voxels: BTreeMap<u32, u64>,
+}
+
+/// Computes the distance to `sets` on a grid, stored as `P`; `store` gets the fields, none when it is absent.
+///
+/// # Errors
+/// When no source touches the grid, the output cannot be written, scratch runs out, or the run is interrupted.
+pub fn distance<P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    settings: &DistanceSettings,
+    store: Option<&StoreWriter>,
+) -> Result<DistanceFound> {
+    let grid = BrickGrid::new(geometry.shape, settings.brick);
+    let set = Arc::new(BrickSet::dense(grid));
+    let stage = engine.stage("sort sources", 0);
+    let bins = PointBins::new(grid, geometry, &sets.positions);
+    let triangles = (!sets.mesh.is_empty()).then(|| TriangleBins::new(grid, geometry, &sets.mesh));
+    let cubes = cubes(geometry, sets, settings.init);
+    let sources = Sources {
+        geometry,
+        positions: &sets.positions,
+        bins: &bins,
+        cubes: &cubes,
+        mesh: triangles.as_ref().map(|bins| (&sets.mesh, bins)),
+        sets: triangles.is_some().then_some(sets),
+    };
+    stage.finish();
+    let stage = engine.stage("distance", set.len() as u64);
+    stage.voxels(geometry.domain().volume());
+    let farthest = settings.farthest.unwrap_or(f64::INFINITY);
+    let solve = settings.method.solver::<P>().solve;
+    let mut solved = solve(&stage, engine, &sources, &set, settings.schedule, farthest)?;
+    stage.finish();
+    if solved.fixed_voxels == 0 {
+        return Err(Error::input(
+            "no source lies in the grid; check --origin, --shape and --spacing against the coordinates of the files",
+        ));
+    }
+    if settings.signed {
+        let values = Arc::new(Signed::new(&solved, geometry, WindingTree::new(&sets.mesh), &sets.mesh));
+        solved = Solved { values, ..solved };
+    }
+    let stage = engine.stage("measure", set.len() as u64);
+    stage.voxels(geometry.domain().volume());
+    let labels = settings.labels.then_some(sets);
+    let (measured, label_voxels) = solved.measure(&stage, &set, labels)?;
+    stage.finish();
+    if let Some(store) = store {
+        write_fields(engine, geometry, sets, settings, &solved, measured.max, store)?;
+    }
+    let unlabelled_voxels = measured.unlabelled_voxels;
+    Ok(DistanceFound { max: measured.max, fixed_voxels: solved.fixed_voxels, unlabelled_voxels, label_voxels })
+}
+
+/// The voxels that the points of each data set fix.
+fn cubes(geometry: &Geometry, sets: &DataSets, init: Init) -> Vec<(u32, Cube)> {
+    let clouds = sets.clouds().filter(|points| !points.is_empty());
+    let cube = |points: &std::ops::Range<u32>| match init {
+        Init::Cell => Cube::CELL,
+        Init::Grid => Cube { snaps: true, ..Cube::CELL },
+        Init::Contiguous => {
+            let points = &sets.positions[points.start as usize..points.end as usize];
+            Cube { margin: contiguous_margin(geometry, points), snaps: false }
+        }
+    };
+    clouds.map(|points| (points.end, cube(&points))).collect()
+}

@@ -1,0 +1,41 @@
+//! What a distance will take: memory that must be held, temporary fields, time.
+
+use super::DistanceSettings;
+use crate::grid::{BrickGrid, DataSets, Geometry};
+use crate::kernel::distance::precision::Precision;
+
+/// An estimate; sizes in bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Needs {
+    /// What must be in memory at the same time, bricks left out.
+    pub held: u64,
+    /// Temporary fields.
+    pub scratch: u64,
+    /// Time, very roughly.
+    pub seconds: f64,
+}
+
+/// Bytes of a voxel of the tiles of one thread: the tile, its layout along diagonals (twice as long), coordinates.
+const TILE_BYTES: u64 = 48;
+/// Bytes kept of each brick: its lock, its state, its places in tables.
+const BRICK_BYTES: u64 = 80;
+/// Bytes kept of each source: its position, twice, its place in a brick's list, its corners.
+const SOURCE_BYTES: u64 = 160;
+/// Seconds for a voxel on one thread.
+const VOXEL_SECONDS: f64 = 30e-9;
+
+impl DistanceSettings {
+    /// What these settings take on a grid.
+    #[must_use]
+    pub fn needs<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize) -> Needs {
+        let grid = BrickGrid::new(geometry.shape, self.brick);
+        let brick = grid.brick_len() as u64;
+        let faces = 6 * (self.brick * self.brick) as u64;
+        let element = self.method.solver::<P>().state_bytes;
+        let buffers = threads as u64 * brick * (TILE_BYTES + element + 12);
+        let held = buffers + grid.len().saturating_mul(BRICK_BYTES) + sets.len() as u64 * SOURCE_BYTES;
+        let scratch = grid.len().saturating_mul((brick + faces) * element);
+        let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
+        Needs { held, scratch, seconds }
+    }
+}

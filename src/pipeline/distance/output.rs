@@ -1,0 +1,126 @@
+//! Writes a solved distance: the distance itself, the label of the nearest data set, the position of the nearest source.
+
+use super::{DistanceSettings, Solved};
+use crate::error::Result;
+use crate::exec::Engine;
+use crate::grid::{Box3, DataSets, Geometry};
+use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
+use crate::kernel::distance::initialise::NO_SOURCE;
+use crate::kernel::distance::precision::Precision;
+use crate::kernel::image::palette::label_color;
+use crate::kernel::triangle::Triangle;
+use crate::pipeline::pyramid::{Reduce, write_levels};
+use crate::store::{BoxSource, Element, ElementType};
+
+/// Writes all fields that the settings ask for.
+pub(super) fn write_fields<P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    settings: &DistanceSettings,
+    solved: &Solved<'_, P>,
+    max: f64,
+    store: &StoreWriter,
+) -> Result<()> {
+    let window = Some([if settings.signed { -max } else { 0.0 }, max]);
+    let image = store.image("", &ImageSpec { name: "distance", geometry, element: P::TYPE, window })?;
+    let stage = engine.stage("write distance", 0);
+    stage.voxels(geometry.domain().volume());
+    write_levels::<P>(&stage, engine, image.levels(), &*solved.values, Reduce::Mean)?;
+    stage.finish();
+    if settings.labels {
+        match sets.count() {
+            0..=0xff => write_labels::<u8, P>(engine, geometry, sets, solved, store)?,
+            0x100..=0xffff => write_labels::<u16, P>(engine, geometry, sets, solved, store)?,
+            _ => write_labels::<u32, P>(engine, geometry, sets, solved, store)?,
+        }
+    }
+    if settings.closest_point {
+        let triangles: Vec<_> = (0..sets.mesh.len()).map(|n| Triangle::new(sets.mesh.corners(n))).collect();
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let group = format!("closest-point/{name}");
+            let spec = ImageSpec { name: &group, geometry, element: ElementType::F32, window: None };
+            let closest = ClosestPoint { solved, sets, triangles: &triangles, geometry, axis };
+            let stage = engine.stage(&format!("write closest {name}"), 0);
+            stage.voxels(geometry.domain().volume());
+            write_levels::<f32>(&stage, engine, store.image(&group, &spec)?.levels(), &closest, Reduce::Mean)?;
+            stage.finish();
+        }
+    }
+    Ok(())
+}
+
+fn write_labels<T: Element, P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    solved: &Solved<'_, P>,
+    store: &StoreWriter,
+) -> Result<()> {
+    let color = |label: u32| {
+        let [red, green, blue] = label_color(label);
+        LabelColor { label, rgba: [red, green, blue, 255] }
+    };
+    let colors: Vec<LabelColor> = (1..=sets.count() as u32).map(color).collect();
+    let image = store.labels(&LabelSpec { name: "nearest", geometry, element: T::TYPE, colors: &colors })?;
+    let stage = engine.stage("write labels", 0);
+    stage.voxels(geometry.domain().volume());
+    write_levels::<T>(&stage, engine, image.levels(), &Labels { solved, sets }, Reduce::Mode)?;
+    stage.finish();
+    Ok(())
+}
+
+/// The label of each voxel's nearest data set; 0 where no source is known.
+struct Labels<'a, 'b, P> {
+    solved: &'a Solved<'b, P>,
+    sets: &'a DataSets,
+}
+
+impl<T: Element, P: Precision> BoxSource<T> for Labels<'_, '_, P> {
+    fn shape(&self) -> [i64; 3] {
+        self.solved.sources.shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
+        let mut sources = vec![NO_SOURCE; part.len()];
+        self.solved.sources.read_box(part, &mut sources)?;
+        let label = |&source: &u32| T::from_f64(f64::from(self.sets.label(source)));
+        out.iter_mut().zip(&sources).for_each(|(out, source)| *out = label(source));
+        Ok(())
+    }
+}
+
+/// One coordinate of the point of the nearest source that is closest to the voxel; NaN where no source is known.
+struct ClosestPoint<'a, 'b, P> {
+    solved: &'a Solved<'b, P>,
+    sets: &'a DataSets,
+    triangles: &'a [Triangle],
+    geometry: &'a Geometry,
+    axis: usize,
+}
+
+impl<P: Precision> BoxSource<f32> for ClosestPoint<'_, '_, P> {
+    fn shape(&self) -> [i64; 3] {
+        self.geometry.shape
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [f32]) -> Result<()> {
+        let mut sources = vec![NO_SOURCE; part.len()];
+        self.solved.sources.read_box(part, &mut sources)?;
+        let points = &self.sets.positions;
+        for (y, z) in part.rows() {
+            for x in part.lo[0]..part.hi[0] {
+                let at = part.offset_of([x, y, z]);
+                let source = sources[at] as usize;
+                let triangle = || self.triangles.get(source.checked_sub(points.len())?);
+                out[at] = match points.get(source) {
+                    Some(point) => point[self.axis] as f32,
+                    None => triangle().map_or(f32::NAN, |triangle| {
+                        triangle.closest_point(self.geometry.position([x, y, z]))[self.axis] as f32
+                    }),
+                };
+            }
+        }
+        Ok(())
+    }
+}

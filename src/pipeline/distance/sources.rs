@@ -1,0 +1,61 @@
+//! Sources on a grid: what every distance method starts from.
+
+use crate::grid::{Box3, BrickId, DataSets, Geometry, PointBins, TriangleBins, TriangleMesh};
+use crate::kernel::distance::initialise::Cube;
+
+/// Points, and triangles where there are any, sorted by the bricks of a grid.
+#[derive(Clone, Copy, Debug)]
+pub struct Sources<'a> {
+    /// The grid that the sources lie on.
+    pub geometry: &'a Geometry,
+    /// World positions of the points.
+    pub positions: &'a [[f64; 3]],
+    /// The points by brick.
+    pub bins: &'a PointBins,
+    /// The voxels that points fix: by the last place of each data set's points, in order; none where all fix their cell.
+    pub cubes: &'a [(u32, Cube)],
+    /// Triangles, whose numbers follow those of the points.
+    pub mesh: Option<(&'a TriangleMesh, &'a TriangleBins)>,
+    /// All of them as data sets, where there are triangles.
+    pub sets: Option<&'a DataSets>,
+}
+
+impl<'a> Sources<'a> {
+    /// A cloud whose points fix the corners of their cells.
+    #[must_use]
+    pub fn cloud(geometry: &'a Geometry, positions: &'a [[f64; 3]], bins: &'a PointBins) -> Self {
+        Self { geometry, positions, bins, cubes: &[], mesh: None, sets: None }
+    }
+
+    fn cube(&self, point: u32) -> Cube {
+        let at = self.cubes.partition_point(|(end, _)| *end <= point);
+        self.cubes.get(at).map_or(Cube::CELL, |(_, cube)| *cube)
+    }
+
+    /// The bricks whose points may fix voxels of a brick.
+    fn bricks_fixing(&self, id: BrickId) -> impl Iterator<Item = BrickId> + use<'_> {
+        let grid = self.bins.grid();
+        let part = grid.brick_box(id);
+        let margin = self
+            .cubes
+            .iter()
+            .fold([0; 3], |most: [i64; 3], (_, cube)| std::array::from_fn(|a| most[a].max(cube.margin[a])));
+        let reach = Box3 {
+            lo: std::array::from_fn(|a| part.lo[a] - 1 - margin[a]),
+            hi: std::array::from_fn(|a| part.hi[a] + margin[a]),
+        };
+        grid.bricks_in(&reach.intersect(&Box3::from_shape(grid.shape())))
+    }
+
+    /// The points that may fix voxels of a brick, with their positions and cubes.
+    pub(super) fn points_fixing(&self, id: BrickId) -> impl Iterator<Item = (u32, [f64; 3], Cube)> + '_ {
+        let points = self.bricks_fixing(id).flat_map(|brick| self.bins.of(brick).iter().copied());
+        points.map(|p| (p, self.positions[p as usize], self.cube(p)))
+    }
+
+    /// Whether any source may fix a voxel of a brick.
+    pub(super) fn may_fix(&self, id: BrickId) -> bool {
+        self.bricks_fixing(id).any(|brick| !self.bins.of(brick).is_empty())
+            || self.mesh.is_some_and(|(_, bins)| !bins.of(id).is_empty())
+    }
+}
