@@ -7,8 +7,16 @@
 
 use crate::tile::HaloTile;
 
-/// Voxels taken at a time.
-pub(crate) const LANES: usize = 8;
+/// Voxels taken at a time at most.
+pub(crate) const MOST_LANES: usize = 16;
+
+/// Whether that many are worth it: where vectors of 64 bytes are to be had. Elsewhere half of them are taken at a time.
+pub(crate) fn has_wide_vectors() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return pulp::x86::V4::try_new().is_some();
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
 
 /// Where voxels of a tile of `edge`^3 voxels and their halo lie, and how much of it is in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,13 +35,18 @@ impl Diagonals {
     pub(crate) fn new(edge: usize) -> Self {
         let grown = edge + 2;
         // Vectors may reach past the end of a diagonal.
-        let row = grown + LANES;
+        let row = grown + MOST_LANES;
         Self { row, plane: (2 * grown - 1) * row, valid: [edge; 3], turned: false }
+    }
+
+    /// Voxels along an edge of a whole tile.
+    pub(crate) fn edge(&self) -> usize {
+        self.row - MOST_LANES - 2
     }
 
     /// Places of all planes of a tile of `edge`^3 voxels.
     pub(crate) fn len(edge: usize) -> usize {
-        Self::new(edge).plane * (edge + 2) + LANES
+        Self::new(edge).plane * (edge + 2) + MOST_LANES
     }
 
     /// Place of a voxel; indices count from the lower ghost.
@@ -116,6 +129,12 @@ pub(crate) struct Run<'a, T> {
 }
 
 impl Diagonals {
+    /// Sides of a run's voxels that a sweep passed before them, along x, y and z; y as laid out.
+    pub(crate) fn passed(upward: [bool; 2]) -> [usize; 3] {
+        let [s, z] = upward.map(|upward| usize::from(!upward));
+        [s, 2 + s, 4 + z]
+    }
+
     /// The `count` voxels from place `at` on, and those beside them.
     #[inline(always)]
     pub(crate) fn run<'a, T>(&self, data: &'a mut [T], at: usize, count: usize) -> Run<'a, T> {

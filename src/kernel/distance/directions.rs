@@ -1,38 +1,26 @@
-//! Which sweeps a tile needs: those along the directions in which something still enters its voxels.
+//! Which sweeps a tile needs until nothing in it can fall.
+//!
+//! In a sweep every voxel takes what its neighbours know at that moment. So after it only a voxel can fall that was
+//! passed before a neighbour fell below it, and then the next sweep has to go from that neighbour back to it. A sweep
+//! reports those axes; one that reports none was the last, without another to confirm it.
 
-/// Directions in an order that turns the layout round only once: x, y, z upward or not.
-const CYCLE: [[bool; 3]; 8] = [
-    [true, true, true],
-    [false, false, true],
-    [false, false, false],
-    [true, true, false],
-    [true, false, false],
-    [false, true, false],
-    [false, true, true],
-    [true, false, true],
-];
+/// What a sweep tells: bit a says that something is to be carried back along axis a, [`CHANGED`] that any voxel fell.
+pub(crate) type Swept = u32;
 
-/// The sides through which voxels fell: bit 2 a for the lower side of axis a, bit 2 a + 1 for the upper one.
-pub(crate) type Sides = u32;
+/// Set in [`Swept`] when any voxel fell.
+pub(crate) const CHANGED: Swept = 8;
 
-/// Repeats `sweep(direction)`, which returns the sides through which voxels fell, until a sweep changes nothing.
-/// Starts with `first` and goes on with the directions that the sides call for. Returns whether anything changed.
-pub(crate) fn sweep_until_quiet(first: [bool; 3], mut sweep: impl FnMut([bool; 3]) -> Sides) -> bool {
-    let mut at = CYCLE.iter().position(|&d| d == first).unwrap_or(0);
+/// Repeats `sweep(direction)`, the first along `first`, turning the axes along which something is to be carried back.
+/// Returns whether anything changed.
+pub(crate) fn sweep_until_quiet(first: [bool; 3], mut sweep: impl FnMut([bool; 3]) -> Swept) -> bool {
+    let mut direction = first;
     let mut changed = false;
     loop {
-        let sides = sweep(CYCLE[at]);
-        if sides == 0 {
+        let swept = sweep(direction);
+        changed |= swept & CHANGED != 0;
+        if swept & (CHANGED - 1) == 0 {
             return changed;
         }
-        changed = true;
-        let called = |direction: &[bool; 3]| {
-            (0..3).all(|a| {
-                let (lower, upper) = (sides >> (2 * a) & 1 == 1, sides >> (2 * a + 1) & 1 == 1);
-                (!lower && !upper) || if direction[a] { lower } else { upper }
-            })
-        };
-        // A full turn ends at the same direction again: it is called for by what it carried itself.
-        at = (1..=8).map(|step| (at + step) % 8).find(|&n| called(&CYCLE[n])).unwrap_or(at);
+        direction = std::array::from_fn(|a| direction[a] ^ (swept >> a & 1 == 1));
     }
 }

@@ -7,8 +7,8 @@
 
 use std::marker::PhantomData;
 
-use super::diagonals::{Diagonals, LANES};
-use super::directions::{Sides, sweep_until_quiet};
+use super::diagonals::{Diagonals, has_wide_vectors};
+use super::directions::{CHANGED, Swept, sweep_until_quiet};
 use super::method::{DistanceMethod, OrderedSweeps};
 use super::precision::{Precision, Real};
 use crate::grid::Box3;
@@ -101,43 +101,45 @@ pub(crate) fn godunov<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>)
     first + x
 }
 
-/// One ordered pass over a tile laid out along diagonals; returns the sides through which voxels fell.
+/// One ordered pass over a tile laid out along diagonals, `N` voxels at a time.
 #[inline(always)]
-fn pass<P: Precision, A: Real, const ISOTROPIC: bool>(
+fn pass<P: Precision, A: Real, const N: usize, const ISOTROPIC: bool>(
     data: &mut [P::Lane],
     layout: &Diagonals,
     upward: [bool; 2],
     k: &Axes<A>,
-) -> Sides {
+) -> Swept {
     let depth = layout.valid[2];
-    let mut fell = 0;
+    let passed = Diagonals::passed(upward);
+    let mut swept = 0;
     for n in 0..depth {
         let z = if upward[1] { n + 1 } else { depth - n };
         for (start, count) in layout.diagonals(upward[0]) {
-            let count = count.next_multiple_of(LANES);
+            let count = count.next_multiple_of(N);
             let run = layout.run(data, z * layout.plane + start, count);
-            for at in (0..count).step_by(LANES) {
-                let here = run.here[at..].first_chunk_mut::<LANES>();
-                let beside = run.beside.map(|side| side[at..].first_chunk::<LANES>());
+            for at in (0..count).step_by(N) {
+                let here = run.here[at..].first_chunk_mut::<N>();
+                let beside = run.beside.map(|side| side[at..].first_chunk::<N>());
                 if let (Some(here), [Some(xl), Some(xu), Some(yl), Some(yu), Some(zl), Some(zu)]) = (here, beside) {
-                    fell |= lower::<P, A, ISOTROPIC>(here, [xl, xu, yl, yu, zl, zu], k);
+                    swept |= lower::<P, A, N, ISOTROPIC>(here, [xl, xu, yl, yu, zl, zu], passed, k);
                 }
             }
         }
     }
-    fell
+    swept
 }
 
-/// Lowers the voxels of one vector.
+/// Lowers the voxels of one vector. Something is to be carried back to a side that was passed before and is larger.
 #[inline(always)]
-fn lower<P: Precision, A: Real, const ISOTROPIC: bool>(
-    here: &mut [P::Lane; LANES],
-    beside: [&[P::Lane; LANES]; 6],
+fn lower<P: Precision, A: Real, const N: usize, const ISOTROPIC: bool>(
+    here: &mut [P::Lane; N],
+    beside: [&[P::Lane; N]; 6],
+    passed: [usize; 3],
     k: &Axes<A>,
-) -> Sides {
-    let mut value = [P::Lane::default(); LANES];
-    let mut falls = [0_u32; LANES];
-    for i in 0..LANES {
+) -> Swept {
+    let mut value = [P::Lane::default(); N];
+    let mut falls = [0_u32; N];
+    for i in 0..N {
         let near = |a: usize| A::of_lane(beside[2 * a][i].magnitude().smaller(beside[2 * a + 1][i].magnitude()));
         let x = P::round(godunov::<A, ISOTROPIC>([near(0), near(1), near(2)], k));
         // A fixed voxel is below zero and so below anything.
@@ -147,37 +149,36 @@ fn lower<P: Precision, A: Real, const ISOTROPIC: bool>(
     if falls.iter().fold(0, |any, f| any | f) == 0 {
         return 0;
     }
-    let mut sides = 0;
-    for a in 0..3 {
-        let (mut lower, mut upper) = (0, 0);
-        for i in 0..LANES {
-            let [l, u] = [beside[2 * a][i].magnitude(), beside[2 * a + 1][i].magnitude()];
-            lower |= falls[i] & u32::from(l <= u) & u32::from(l < value[i]);
-            upper |= falls[i] & u32::from(u < l) & u32::from(u < value[i]);
+    let mut swept = CHANGED;
+    for (axis, side) in passed.into_iter().enumerate() {
+        let before = beside[side];
+        let mut back = 0;
+        for i in 0..N {
+            back |= falls[i] & u32::from(value[i] < before[i]);
         }
-        sides |= lower << (2 * a) | upper << (2 * a + 1);
+        swept |= back << axis;
     }
     *here = value;
-    sides
+    swept
 }
 
 /// A pass, compiled for each vector unit.
-struct Pass<'a, P: Precision, A> {
+struct Pass<'a, P: Precision, A, const N: usize> {
     data: &'a mut [P::Lane],
     layout: &'a Diagonals,
     upward: [bool; 2],
     axes: &'a Axes<A>,
 }
 
-impl<P: Precision, A: Real> pulp::NullaryFnOnce for Pass<'_, P, A> {
-    type Output = Sides;
+impl<P: Precision, A: Real, const N: usize> pulp::NullaryFnOnce for Pass<'_, P, A, N> {
+    type Output = Swept;
 
     #[inline(always)]
-    fn call(self) -> Sides {
+    fn call(self) -> Swept {
         if self.axes.isotropic {
-            pass::<P, A, true>(self.data, self.layout, self.upward, self.axes)
+            pass::<P, A, N, true>(self.data, self.layout, self.upward, self.axes)
         } else {
-            pass::<P, A, false>(self.data, self.layout, self.upward, self.axes)
+            pass::<P, A, N, false>(self.data, self.layout, self.upward, self.axes)
         }
     }
 }
@@ -202,11 +203,14 @@ impl<P: Precision, A: Real> FastSweeping<P, A> {
     }
 
     /// Sweeps the tile as it is laid out.
-    fn sweep_layout(&self, work: &mut Work<P::Lane>, upward: [bool; 3]) -> Sides {
+    fn sweep_layout(&self, work: &mut Work<P::Lane>, upward: [bool; 3]) -> Swept {
         let Work { data, layout } = work;
-        let pass = Pass::<P, A> { data, layout, upward: [upward[0], upward[2]], axes: &self.axes };
-        let sides = pulp::Arch::new().dispatch(pass);
-        if layout.turned { sides & !0b1100 | (sides & 0b0100) << 1 | (sides & 0b1000) >> 1 } else { sides }
+        let (upward, axes) = ([upward[0], upward[2]], &self.axes);
+        if has_wide_vectors() {
+            pulp::Arch::new().dispatch(Pass::<P, A, 16> { data, layout, upward, axes })
+        } else {
+            pulp::Arch::new().dispatch(Pass::<P, A, 8> { data, layout, upward, axes })
+        }
     }
 }
 
@@ -260,7 +264,7 @@ impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
 impl<P: Precision, A: Real> OrderedSweeps for FastSweeping<P, A> {
     fn sweep(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3, upward: [bool; 3]) -> bool {
         Self::lay_out(work, tile, upward);
-        let changed = self.sweep_layout(work, upward) != 0;
+        let changed = self.sweep_layout(work, upward) & CHANGED != 0;
         if changed {
             work.layout.store(&work.data, tile, P::of_lane);
         }

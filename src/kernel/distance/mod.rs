@@ -2,6 +2,7 @@
 
 mod diagonals;
 mod directions;
+pub mod extent;
 pub mod fast_sweeping;
 pub mod initialise;
 pub mod method;

@@ -4,7 +4,7 @@
 //! point–triangle distance (Eberly 1999), f64. It costs tens of additions, so a source is asked for its distance only
 //! where a neighbour's differs from the kept one and from those just asked.
 
-use super::directions::{Sides, sweep_until_quiet};
+use super::directions::{CHANGED, Swept, sweep_until_quiet};
 use super::initialise::{NO_SOURCE, squared_distance};
 use super::method::{DistanceMethod, OrderedSweeps};
 use super::vector_distance::FIXED;
@@ -38,9 +38,9 @@ impl<'a> ShapeDistance<'a> {
         triangle.map_or(f64::INFINITY, |triangle| triangle.distance_squared(here))
     }
 
-    /// The nearest of the kept source and the six beside, and the side it came through.
-    fn nearest(&self, state: &[u32], at: usize, strides: [usize; 3], here: [f64; 3]) -> (u32, Sides) {
-        let mut best = (state[at], f64::NAN, 0);
+    /// The nearest of the kept source and the six beside.
+    fn nearest(&self, state: &[u32], at: usize, strides: [usize; 3], here: [f64; 3]) -> u32 {
+        let mut best = (state[at], f64::NAN);
         let mut asked = [NO_SOURCE; 6];
         for side in 0..6 {
             let stride = strides[side / 2];
@@ -54,38 +54,64 @@ impl<'a> ShapeDistance<'a> {
             }
             let squared = self.squared(here, source);
             if squared < best.1 {
-                best = (source, squared, 1 << side);
+                best = (source, squared);
             }
         }
-        (best.0, best.2)
+        best.0
     }
 
-    fn pass(&self, tile: &mut HaloTile<u32>, part: &Box3, upward: [bool; 3]) -> Sides {
+    fn pass(&self, tile: &mut HaloTile<u32>, part: &Box3, upward: [bool; 3]) -> Swept {
         let (valid, pitch) = (tile.valid(), tile.pitch());
         let strides = [1, pitch, pitch * pitch];
         let ordered = |axis: usize| {
             let count = valid[axis];
             (0..count).map(move |i| if upward[axis] { i } else { count - 1 - i })
         };
-        let mut sides = 0;
+        let mut swept = 0;
         for z in ordered(2) {
             for y in ordered(1) {
                 let row = tile.at(0, y as isize, z as isize);
                 for x in ordered(0) {
-                    let at = row + x;
-                    if tile.data()[at] & FIXED != 0 {
+                    let (at, state) = (row + x, tile.data_mut());
+                    let kept = state[at];
+                    if kept & FIXED != 0 {
                         continue;
                     }
                     let voxel = [part.lo[0] + x as i64, part.lo[1] + y as i64, part.lo[2] + z as i64];
-                    let (source, side) = self.nearest(tile.data(), at, strides, self.geometry.position(voxel));
-                    if side != 0 {
-                        tile.data_mut()[at] = source;
-                        sides |= side;
+                    state[at] = self.nearest(state, at, strides, self.geometry.position(voxel));
+                    if state[at] != kept {
+                        let first = [x, y, z].map(|n| n == 0);
+                        let last: [bool; 3] = std::array::from_fn(|a| [x, y, z][a] + 1 == valid[a]);
+                        let inside = std::array::from_fn(|a| if upward[a] { !first[a] } else { !last[a] });
+                        swept |= CHANGED | self.carried_back(state, (at, voxel), strides, upward, inside);
                     }
                 }
             }
         }
-        sides
+        swept
+    }
+
+    /// The axes along which the voxel that was passed before, `inside` the tile, is nearer to the source at place `at`
+    /// than to its own.
+    fn carried_back(
+        &self,
+        state: &[u32],
+        (at, voxel): (usize, [i64; 3]),
+        strides: [usize; 3],
+        upward: [bool; 3],
+        inside: [bool; 3],
+    ) -> Swept {
+        let is_nearer = |axis: usize| {
+            let before = if upward[axis] { at - strides[axis] } else { at + strides[axis] };
+            if !inside[axis] || state[before] & FIXED != 0 || state[before] == state[at] {
+                return false;
+            }
+            let mut there = voxel;
+            there[axis] += if upward[axis] { -1 } else { 1 };
+            let there = self.geometry.position(there);
+            self.squared(there, state[at]) < self.squared(there, state[before])
+        };
+        (0..3).map(|axis| u32::from(is_nearer(axis)) << axis).sum()
     }
 }
 
@@ -128,6 +154,6 @@ impl DistanceMethod for ShapeDistance<'_> {
 
 impl OrderedSweeps for ShapeDistance<'_> {
     fn sweep(&self, tile: &mut HaloTile<u32>, (): &mut (), part: &Box3, upward: [bool; 3]) -> bool {
-        self.pass(tile, part, upward) != 0
+        self.pass(tile, part, upward) & CHANGED != 0
     }
 }

@@ -6,8 +6,8 @@
 //! source indices, the top bit set on voxels that a source fixed. Halo 1, faces. While a tile is worked on every voxel
 //! holds its source's position beside the index, so that sweeps look nothing up.
 
-use super::diagonals::{Diagonals, LANES};
-use super::directions::{Sides, sweep_until_quiet};
+use super::diagonals::{Diagonals, MOST_LANES, Run, has_wide_vectors};
+use super::directions::{CHANGED, Swept, sweep_until_quiet};
 use super::initialise::{NO_SOURCE, squared_distance};
 use super::method::{DistanceMethod, OrderedSweeps};
 use super::precision::Real;
@@ -56,13 +56,12 @@ pub struct Work<A> {
     at: [Vec<A>; 3],
 }
 
-/// The nearest source so far of one voxel, and the side that it came through.
+/// The nearest source so far of one voxel.
 #[derive(Clone, Copy)]
 struct Nearest<A> {
     squared: A,
     source: u32,
     point: [A; 3],
-    side: u32,
 }
 
 #[inline(always)]
@@ -72,9 +71,9 @@ fn squared<A: Real>(here: [A; 3], point: [A; 3]) -> A {
 }
 
 impl<A: Real> Nearest<A> {
-    /// Looks at the source beside the voxel on the side `SIDE`; without branches, so that lanes stay together.
+    /// Looks at a source beside the voxel; without branches, so that lanes stay together.
     #[inline(always)]
-    fn look<const SIDE: u32>(self, here: [A; 3], free: bool, source: u32, point: [A; 3]) -> Self {
+    fn look(self, here: [A; 3], free: bool, source: u32, point: [A; 3]) -> Self {
         let squared = squared(here, point);
         let nearer = (squared < self.squared) & free;
         let pick = |a: A, b: A| if nearer { a } else { b };
@@ -82,111 +81,137 @@ impl<A: Real> Nearest<A> {
             squared: pick(squared, self.squared),
             source: if nearer { source & !FIXED } else { self.source },
             point: [pick(point[0], self.point[0]), pick(point[1], self.point[1]), pick(point[2], self.point[2])],
-            side: if nearer { 1 << SIDE } else { self.side },
         }
     }
 }
 
-/// Eight values of a run from its place `at` on, and those beside them; y sides as the layout has them.
-struct Beside<'a, T>([&'a [T; LANES]; 6]);
-
-#[inline(always)]
-fn beside<T>(sides: [&[T]; 6], at: usize) -> Beside<'_, T> {
-    let [xl, xu, yl, yu, zl, zu] = sides;
-    Beside([chunk(xl, at), chunk(xu, at), chunk(yl, at), chunk(yu, at), chunk(zl, at), chunk(zu, at)])
+/// `N` voxels of a run and those beside them; y sides as the layout has them.
+struct Lanes<'a, T, const N: usize> {
+    here: &'a mut [T; N],
+    beside: [&'a [T; N]; 6],
 }
 
-/// Takes the nearest of the kept source and the six beside for each voxel of a vector; returns the sides they came
-/// through. Where y is turned round (`TURNED`), the neighbour at y - 1 stands where y + 1 does.
-#[inline(always)]
-fn nearest<A: Real, const TURNED: bool>(
-    (source, sources): (&mut [u32; LANES], Beside<'_, u32>),
-    [(px, pxs), (py, pys), (pz, pzs)]: [(&mut [A; LANES], Beside<'_, A>); 3],
-    (x, y, z): (&[A; LANES], &[A; LANES], A),
-) -> Sides {
-    let (yl, yu) = if TURNED { (3, 2) } else { (2, 3) };
-    let mut kept = [0_u32; LANES];
-    let mut points = [[A::default(); LANES]; 3];
-    let mut came = [0_u32; LANES];
-    for i in 0..LANES {
-        let here = [x[i], y[i], z];
-        let point = [px[i], py[i], pz[i]];
-        let free = (source[i] as i32) >= 0;
-        let at = |side: usize| (sources.0[side][i], [pxs.0[side][i], pys.0[side][i], pzs.0[side][i]]);
-        let start = Nearest { squared: squared(here, point), source: source[i], point, side: 0 };
-        let [(s0, p0), (s1, p1), (s2, p2)] = [at(0), at(1), at(yl)];
-        let [(s3, p3), (s4, p4), (s5, p5)] = [at(yu), at(4), at(5)];
-        let found = start.look::<0>(here, free, s0, p0).look::<1>(here, free, s1, p1);
-        let found = found.look::<2>(here, free, s2, p2).look::<3>(here, free, s3, p3);
-        let found = found.look::<4>(here, free, s4, p4).look::<5>(here, free, s5, p5);
-        (kept[i], came[i]) = (found.source, found.side);
-        (points[0][i], points[1][i], points[2][i]) = (found.point[0], found.point[1], found.point[2]);
+impl<'a, T, const N: usize> Lanes<'a, T, N> {
+    #[inline(always)]
+    fn new(run: &'a mut Run<'_, T>, at: usize) -> Self {
+        let here = run.here[at..].first_chunk_mut().expect("runs are whole vectors");
+        let [xl, xu, yl, yu, zl, zu] = run.beside;
+        // Written out: a map over the six would be a call.
+        let beside = [chunk(xl, at), chunk(xu, at), chunk(yl, at), chunk(yu, at), chunk(zl, at), chunk(zu, at)];
+        Self { here, beside }
     }
-    let sides = came.iter().fold(0, |any, side| any | side);
-    if sides != 0 {
-        *source = kept;
-        (*px, *py, *pz) = (points[0], points[1], points[2]);
-    }
-    sides
-}
-
-/// One ordered pass; returns the sides through which nearer sources came.
-#[inline(always)]
-fn pass<A: Real, const TURNED: bool>(work: &mut Work<A>, upward: [bool; 2]) -> Sides {
-    let Work { layout, source, point: [px, py, pz], at: [at_x, at_y, at_z] } = work;
-    let (depth, last_x) = (layout.valid[2], at_x.len() - 1 - LANES);
-    let mut sides = 0;
-    for n in 0..depth {
-        let z = if upward[1] { n + 1 } else { depth - n };
-        for (start, count) in layout.diagonals(upward[0]) {
-            let count = count.next_multiple_of(LANES);
-            let place = z * layout.plane + start;
-            let (s, y) = (start / layout.row, start % layout.row);
-            let run = layout.run(source, place, count);
-            let (rx, ry, rz) =
-                (layout.run(px, place, count), layout.run(py, place, count), layout.run(pz, place, count));
-            let (x, y) = (&at_x[last_x + y - s..][..count], &at_y[y..][..count]);
-            for at in (0..count).step_by(LANES) {
-                sides |= nearest::<A, TURNED>(
-                    (chunk_mut(run.here, at), beside(run.beside, at)),
-                    [
-                        (chunk_mut(rx.here, at), beside(rx.beside, at)),
-                        (chunk_mut(ry.here, at), beside(ry.beside, at)),
-                        (chunk_mut(rz.here, at), beside(rz.beside, at)),
-                    ],
-                    (chunk(x, at), chunk(y, at), at_z[z]),
-                );
-            }
-        }
-    }
-    sides
 }
 
 #[inline(always)]
-fn chunk<T>(run: &[T], at: usize) -> &[T; LANES] {
+fn chunk<T, const N: usize>(run: &[T], at: usize) -> &[T; N] {
     run[at..].first_chunk().expect("runs are whole vectors")
 }
 
+/// Coordinates of the voxels of a vector, and of those that were passed before them along x, y and z.
+struct Places<'a, A, const N: usize> {
+    x: [&'a [A; N]; 2],
+    y: [&'a [A; N]; 2],
+    z: [A; 2],
+}
+
+/// Takes the nearest of the kept source and the six beside for each voxel of a vector. Where y is turned round
+/// (`TURNED`), the neighbour at y - 1 stands where y + 1 does. Something is to be carried back to a side that was
+/// passed before and is nearer to the source taken than to its own.
 #[inline(always)]
-fn chunk_mut<T>(run: &mut [T], at: usize) -> &mut [T; LANES] {
-    run[at..].first_chunk_mut().expect("runs are whole vectors")
+fn nearest<A: Real, const N: usize, const TURNED: bool>(
+    source: Lanes<'_, u32, N>,
+    point: [Lanes<'_, A, N>; 3],
+    places: &Places<'_, A, N>,
+    passed: [usize; 3],
+) -> Swept {
+    let (yl, yu) = if TURNED { (3, 2) } else { (2, 3) };
+    let [px, py, pz] = point;
+    let mut kept = [0_u32; N];
+    let mut points = [[A::default(); N]; 3];
+    let mut falls = [0_u32; N];
+    for i in 0..N {
+        let here = [places.x[0][i], places.y[0][i], places.z[0]];
+        let point = [px.here[i], py.here[i], pz.here[i]];
+        let free = (source.here[i] as i32) >= 0;
+        let at = |side: usize| (source.beside[side][i], [px.beside[side][i], py.beside[side][i], pz.beside[side][i]]);
+        let start = Nearest { squared: squared(here, point), source: source.here[i], point };
+        let [(s0, p0), (s1, p1), (s2, p2)] = [at(0), at(1), at(yl)];
+        let [(s3, p3), (s4, p4), (s5, p5)] = [at(yu), at(4), at(5)];
+        let found = start.look(here, free, s0, p0).look(here, free, s1, p1).look(here, free, s2, p2);
+        let found = found.look(here, free, s3, p3).look(here, free, s4, p4).look(here, free, s5, p5);
+        kept[i] = found.source;
+        falls[i] = u32::from(found.squared < start.squared);
+        (points[0][i], points[1][i], points[2][i]) = (found.point[0], found.point[1], found.point[2]);
+    }
+    if falls.iter().fold(0, |any, f| any | f) == 0 {
+        return 0;
+    }
+    let mut swept = CHANGED;
+    for (axis, side) in passed.into_iter().enumerate() {
+        let step = |a: usize| usize::from(a == axis);
+        let mut back = 0;
+        for i in 0..N {
+            let there = [places.x[step(0)][i], places.y[step(1)][i], places.z[step(2)]];
+            let own = squared(there, [px.beside[side][i], py.beside[side][i], pz.beside[side][i]]);
+            let free = u32::from((source.beside[side][i] as i32) >= 0);
+            back |= falls[i] & free & u32::from(squared(there, [points[0][i], points[1][i], points[2][i]]) < own);
+        }
+        swept |= back << axis;
+    }
+    *source.here = kept;
+    (*px.here, *py.here, *pz.here) = (points[0], points[1], points[2]);
+    swept
+}
+
+/// One ordered pass, `N` voxels at a time.
+#[inline(always)]
+fn pass<A: Real, const N: usize, const TURNED: bool>(work: &mut Work<A>, upward: [bool; 2]) -> Swept {
+    let Work { layout, source, point: [px, py, pz], at: [at_x, at_y, at_z] } = work;
+    let (depth, last_x) = (layout.valid[2], layout.edge() + 1);
+    let passed = Diagonals::passed(upward);
+    // Coordinates along x are kept from the upper end on.
+    let before = |at: usize, up: bool| if up { at - 1 } else { at + 1 };
+    let mut swept = 0;
+    for n in 0..depth {
+        let z = if upward[1] { n + 1 } else { depth - n };
+        let z_places = [at_z[z], at_z[before(z, upward[1])]];
+        for (start, count) in layout.diagonals(upward[0]) {
+            let count = count.next_multiple_of(N);
+            let place = z * layout.plane + start;
+            let (s, y) = (start / layout.row, start % layout.row);
+            let x = last_x + y - s;
+            let mut sources = layout.run(source, place, count);
+            let [mut run_x, mut run_y, mut run_z] =
+                [layout.run(px, place, count), layout.run(py, place, count), layout.run(pz, place, count)];
+            for at in (0..count).step_by(N) {
+                let places = Places {
+                    x: [chunk(at_x, x + at), chunk(at_x, before(x + at, !upward[0]))],
+                    y: [chunk(at_y, y + at), chunk(at_y, before(y + at, upward[0]))],
+                    z: z_places,
+                };
+                let points = [Lanes::new(&mut run_x, at), Lanes::new(&mut run_y, at), Lanes::new(&mut run_z, at)];
+                swept |= nearest::<A, N, TURNED>(Lanes::new(&mut sources, at), points, &places, passed);
+            }
+        }
+    }
+    swept
 }
 
 /// A pass, compiled for each vector unit.
-struct Pass<'a, A> {
+struct Pass<'a, A, const N: usize> {
     work: &'a mut Work<A>,
     upward: [bool; 2],
 }
 
-impl<A: Real> pulp::NullaryFnOnce for Pass<'_, A> {
-    type Output = Sides;
+impl<A: Real, const N: usize> pulp::NullaryFnOnce for Pass<'_, A, N> {
+    type Output = Swept;
 
     #[inline(always)]
-    fn call(self) -> Sides {
+    fn call(self) -> Swept {
         if self.work.layout.turned {
-            pass::<A, true>(self.work, self.upward)
+            pass::<A, N, true>(self.work, self.upward)
         } else {
-            pass::<A, false>(self.work, self.upward)
+            pass::<A, N, false>(self.work, self.upward)
         }
     }
 }
@@ -198,12 +223,17 @@ impl<A: Real> Work<A> {
             layout: Diagonals::new(edge),
             source: vec![FIXED | NO_SOURCE; len],
             point: std::array::from_fn(|_| vec![A::INFINITY; len]),
-            at: std::array::from_fn(|_| vec![A::default(); edge + 2 + LANES]),
+            at: std::array::from_fn(|_| vec![A::default(); edge + 3 + MOST_LANES]),
         }
     }
 
-    fn sweep(&mut self, upward: [bool; 3]) -> Sides {
-        pulp::Arch::new().dispatch(Pass { work: self, upward: [upward[0], upward[2]] })
+    fn sweep(&mut self, upward: [bool; 3]) -> Swept {
+        let upward = [upward[0], upward[2]];
+        if has_wide_vectors() {
+            pulp::Arch::new().dispatch(Pass::<A, 16> { work: self, upward })
+        } else {
+            pulp::Arch::new().dispatch(Pass::<A, 8> { work: self, upward })
+        }
     }
 }
 
@@ -290,7 +320,7 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
 impl<A: Real> OrderedSweeps for VectorDistance<'_, A> {
     fn sweep(&self, tile: &mut HaloTile<u32>, work: &mut Work<A>, part: &Box3, upward: [bool; 3]) -> bool {
         self.lay_out(work, tile, part, upward);
-        let changed = work.sweep(upward) != 0;
+        let changed = work.sweep(upward) & CHANGED != 0;
         if changed {
             work.layout.store(&work.source, tile, |s| s);
         }

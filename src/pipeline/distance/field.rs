@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::exec::{Stage, Workers, one_wave};
 use crate::grid::{Box3, BrickSet, DataSets};
+use crate::kernel::distance::extent::extent;
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::method::DistanceMethod;
 use crate::kernel::distance::precision::Precision;
@@ -50,9 +51,7 @@ impl<P: Precision> Solved<'_, P> {
             let part = set.grid().brick_box(set.id(slot));
             let values = &mut values[..part.len()];
             self.values.read_box(&part, values)?;
-            let known = |v: &f64| v.is_finite();
-            let max = values.iter().map(|v| v.to_f64()).filter(known).fold(0.0, f64::max);
-            let unknown = values.iter().filter(|v| !v.to_f64().is_finite()).count();
+            let (max, unlabelled_voxels) = extent(values);
             let mut counts = BTreeMap::<u32, u64>::new();
             if let Some(sets) = labels {
                 sources.resize(part.len(), NO_SOURCE);
@@ -61,7 +60,7 @@ impl<P: Precision> Solved<'_, P> {
                     *counts.entry(sets.label(same[0])).or_default() += same.len() as u64;
                 }
             }
-            Ok((Measured { max, unlabelled_voxels: unknown as u64 }, counts))
+            Ok((Measured { max, unlabelled_voxels }, counts))
         })?;
         let mut all = (Measured::default(), BTreeMap::<u32, u64>::new());
         for (measured, counts) in parts {
