@@ -384,6 +384,9 @@ fn nothing_is_written_without_an_output_but_what_was_named() {
     assert!(printed.contains("object "));
     assert_eq!(bench.entries("out"), ["m.ply", "r.json"]);
     assert!(bench.entries("scratch").is_empty());
+    // With no mesh to be written none is kept, and it is measured all the same.
+    bench.succeed("segment image.tif --points marks.csv -o none --report out/measured.json");
+    assert_eq!(bench.json("out/measured.json")["result"], bench.json("out/r.json")["result"]);
     let output = bench.run("segment image.tif --points marks.csv -o none -q");
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
 }
