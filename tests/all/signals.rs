@@ -68,3 +68,21 @@ fn a_stage_under_way_is_left() {
     assert_eq!((status.code(), said.lines().last()), (Some(130), Some(SENTENCE)), "{said}");
     assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty());
 }
+
+/// Nothing can be done in order when a process is killed; the next one cleans up after it.
+#[test]
+fn what_a_killed_run_leaves_goes_with_the_next_one() {
+    let bench = Bench::new(&Ball::small());
+    let mut run = Held::start(bench.command(&format!("{RUN} --tol 1e-30 --max-steps 1000000000")));
+    run.hear("edges 1  done");
+    // While a run goes on, another one leaves its store alone.
+    bench.succeed("segment image.tif --points marks.csv -o out/x.zarr -q --max-steps 1");
+    assert_eq!(bench.entries("out").len(), 2, "{:?}", bench.entries("out"));
+    fs::remove_dir_all(bench.path("out/x.zarr")).unwrap();
+    run.signal("KILL");
+    assert_eq!(run.finish().status.code(), None);
+    let left = bench.entries("out");
+    assert!(left.len() == 1 && left[0].starts_with(".x.zarr.partial-"), "{left:?}");
+    bench.succeed("segment image.tif --points marks.csv -o out/x.zarr -q");
+    assert_eq!(bench.entries("out"), ["x.zarr"]);
+}

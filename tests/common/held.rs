@@ -40,7 +40,7 @@ impl Held {
 
     /// Lets it go on until it begins to say line `number`, counted from 0.
     pub(crate) fn hold_at(&mut self, number: usize) {
-        while self.said.iter().filter(|byte| **byte == b'\n').count() < number {
+        while String::from_utf8_lossy(&self.said).matches('\n').count() < number {
             assert!(self.take() > 0, "ended before line {number}: {}", String::from_utf8_lossy(&self.said));
         }
         let mut ears = [PollFd::new(&self.ear, PollFlags::IN)];
