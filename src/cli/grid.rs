@@ -4,7 +4,7 @@ use super::distance_args::GridArgs;
 use super::input::open_stack;
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
-use crate::io::tiff_stack::Select;
+use crate::io::stacks::Select;
 
 /// Voxels along the longest side where no spacing is given.
 const DEFAULT_VOXELS: f64 = 256.0;

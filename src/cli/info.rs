@@ -8,9 +8,9 @@ use super::args::InfoArgs;
 use super::print;
 use super::text::{grouped, number, triple};
 use crate::error::{Error, Result};
-use crate::io::ome_zarr::ImageReader;
+use crate::io::ome_zarr::{ImageReader, is_store};
 use crate::io::points::read_cloud;
-use crate::io::tiff_stack::{Select, TiffStack};
+use crate::io::stacks::{self, Select};
 use crate::pipeline::marks::split;
 
 /// Runs the command.
@@ -19,10 +19,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     if !path.exists() {
         return Err(Error::input("there is no such file or folder").at(path));
     }
-    let (document, lines) = if path.join("zarr.json").is_file() {
+    let (document, lines) = if is_store(path) {
         store(path)?
-    } else if path.is_dir() || is_tiff(path) {
-        stack(path)?
+    } else if let Some(format) = stacks::format_of(path) {
+        stack(path, format)?
     } else {
         points(path)?
     };
@@ -42,23 +42,14 @@ fn line(name: &str, value: impl Into<String>) -> (String, String) {
     (name.into(), value.into())
 }
 
-/// The first bytes of classic and big TIFF in both byte orders.
-fn is_tiff(path: &Path) -> bool {
-    let mut head = [0; 4];
-    let read = std::fs::File::open(path).and_then(|mut file| std::io::Read::read_exact(&mut file, &mut head));
-    let name = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    (read.is_ok() && [*b"II*\0", *b"MM\0*", *b"II+\0", *b"MM\0+"].contains(&head))
-        || matches!(name.as_deref(), Some("tif" | "tiff"))
-}
-
-fn stack(path: &Path) -> Result<(Value, Lines)> {
-    let stack = TiffStack::open(path, Select::default())?;
+fn stack(path: &Path, format: &stacks::Format) -> Result<(Value, Lines)> {
+    let stack = (format.open)(path, Select::default())?;
     let info = stack.info();
     let [x, y, z] = info.shape;
     let unit = info.unit.clone().unwrap_or_default();
     let spacing = info.spacing.map(|h| h.map_or("?".into(), number)).join(", ");
     let mut lines = vec![
-        line("kind", if path.is_dir() { "folder of TIFF slices" } else { "TIFF stack" }),
+        line("kind", format.name),
         line("size x, y, z", format!("{x}, {y}, {z}")),
         line("spacing x, y, z", format!("{spacing} {unit}").trim_end()),
         line("channels", info.channels.to_string()),

@@ -8,11 +8,11 @@ use super::values::Crop;
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry, PointCloud};
 use crate::io::points::read_cloud;
-use crate::io::tiff_stack::{Select, StackInfo, TiffStack};
+use crate::io::stacks::{self, Select, Stack, StackInfo};
 
 /// A stack and where it lies.
 pub(super) struct OpenStack {
-    pub(super) stack: TiffStack,
+    pub(super) stack: Box<dyn Stack>,
     /// The grid of the whole stack.
     pub(super) geometry: Geometry,
     /// What the user should know about how the file was understood.
@@ -23,10 +23,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Opens one channel and time of a stack; `spacing` stands in place of the file's.
 pub(super) fn open_stack(path: &Path, select: Select, spacing: Option<[f64; 3]>) -> Result<OpenStack> {
-    if !path.exists() {
-        return Err(Error::input("there is no such file or folder").at(path));
-    }
-    let stack = TiffStack::open(path, select)?;
+    let stack = stacks::open_stack(path, select)?;
     let info = stack.info();
     if let Some(axis) = (0..3).find(|&a| info.shape[a] < 2) {
         return Err(Error::input(format!(

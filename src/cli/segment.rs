@@ -16,10 +16,10 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
-use crate::io::tiff_stack::{Select, TiffStack};
+use crate::io::stacks::{Select, Stack};
 use crate::pipeline::marks::split;
 use crate::pipeline::segment::{Estimate, Guides, Outcome, SegmentSettings, check_marks, estimate, segment};
-use crate::store::{PlaneSource, Scratch, free_space};
+use crate::store::{Scratch, free_space};
 
 /// A segmentation that is ready to start: all inputs are open and checked.
 pub(super) struct Job {
@@ -30,7 +30,7 @@ pub(super) struct Job {
     args: SegmentArgs,
     settings: SegmentSettings,
     resources: Resources,
-    stack: TiffStack,
+    stack: Box<dyn Stack>,
     /// The grid of the part that is segmented.
     geometry: Geometry,
     crop: Box3,
@@ -112,7 +112,7 @@ impl Job {
     pub(super) fn estimate(&self) -> Estimate {
         let guides = Guides { geometry: &self.geometry, cloud: &self.marks.cloud };
         let threads = self.resources.threads as u64;
-        estimate(&self.stack, &self.crop, &guides, &self.settings, threads, self.needs_store())
+        estimate(self.stack.as_ref(), &self.crop, &guides, &self.settings, threads, self.needs_store())
     }
 
     /// Fields are written out, or needed for what is drawn from them.
@@ -189,7 +189,7 @@ impl Job {
             None => None,
         };
         let guides = Guides { geometry: &self.geometry, cloud: &self.marks.cloud };
-        let outcome = segment(engine, &self.stack, &self.crop, &guides, &self.settings, store.as_ref())?;
+        let outcome = segment(engine, self.stack.as_ref(), &self.crop, &guides, &self.settings, store.as_ref())?;
         if let Some(store) = &store {
             if self.command == "demo" {
                 picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;

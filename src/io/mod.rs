@@ -8,5 +8,6 @@ mod ply;
 pub mod png;
 pub mod points;
 pub mod sources;
+pub mod stacks;
 mod text;
 pub mod tiff_stack;

@@ -1,8 +1,7 @@
 //! The narrow band and its start (algorithms: section 5, "Initial condition", "Narrow band").
 //!
-//! Start: u = 0 where the flood reaches at threshold beta, 1 elsewhere. Solved are the voxels within `inner` of the
-//! cloud on the inside and within `outer` on the outside; all others keep their start value. Only cells that hold a
-//! solved voxel, or touch one, are stored; the others are constant.
+//! What a voxel is at the start is told by `kernel/level_set/start.rs`. Only cells that hold a solved voxel, or touch
+//! one, are stored; the others are constant.
 
 use std::sync::Arc;
 
@@ -10,18 +9,10 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{BrickSet, NEIGHBOURS_26, Slot};
 use crate::kernel::level_set::covolume::CellMask;
-use crate::store::{BoxSource, BrickArray};
+use crate::kernel::level_set::start;
+use crate::store::BrickArray;
 
-/// How far the band reaches, and where the start surface lies. Physical lengths.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reaches {
-    /// The start surface lies at this distance outside of the cloud.
-    pub beta: f32,
-    /// The band's reach on the inside.
-    pub inner: f32,
-    /// The band's reach on the outside.
-    pub outer: f32,
-}
+pub use crate::kernel::level_set::start::Reaches;
 
 /// The fields of the band before the first time step; all over the same set of cells.
 pub struct Band {
@@ -33,12 +24,6 @@ pub struct Band {
     pub solved: BrickArray<u8>,
     /// Number of solved voxels.
     pub voxels: u64,
-}
-
-/// What a voxel is at the start.
-#[inline]
-fn classify(d: f32, level: f32, reaches: &Reaches) -> (f32, bool) {
-    if level >= reaches.beta { (0.0, d <= reaches.outer) } else { (1.0, d <= reaches.inner) }
 }
 
 /// Makes the band from the distance and the flood's level, both over the same cells.
@@ -57,8 +42,8 @@ pub fn make_band(
     let mut band =
         Band { u: [new()?, new()?], distance: new()?, solved: BrickArray::new(engine.scratch(), &set)?, voxels: 0 };
     for id in 0..set.grid().len() {
-        let inside = f32::from(start_of_cell(distance, level, id, reaches) > 0.5);
-        band.u.iter_mut().for_each(|u| u.set_absent(id, inside));
+        let start = start_of_cell(level, id, reaches);
+        band.u.iter_mut().for_each(|u| u.set_absent(id, start));
         band.distance.set_absent(id, distance.absent(id));
     }
     let counts = stage
@@ -69,34 +54,20 @@ pub fn make_band(
 }
 
 /// The start value of a cell that is constant, told from its first voxel.
-fn start_of_cell(distance: &BrickArray<f32>, level: &BrickArray<f32>, id: u64, reaches: &Reaches) -> f32 {
-    match distance.set().slot(id) {
-        None => classify(distance.absent(id), level.absent(id), reaches).0,
-        Some(slot) => level.read(slot, |b| distance.read(slot, |d| classify(d[0], b[0], reaches).0)),
-    }
+fn start_of_cell(level: &BrickArray<f32>, id: u64, reaches: &Reaches) -> f32 {
+    let first = level.set().slot(id).map_or_else(|| level.absent(id), |slot| level.read(slot, |b| b[0]));
+    reaches.start(first)
 }
 
 fn fill_cell(band: &Band, distance: &BrickArray<f32>, level: &BrickArray<f32>, reaches: &Reaches, slot: Slot) -> u64 {
     let set = band.solved.set();
-    let id = set.id(slot);
+    let (id, edge) = (set.id(slot), set.grid().edge() as usize);
+    let valid = set.grid().brick_box(id).shape().map(|n| n as usize);
     // A cell of the band's rim may lie where the distance is not stored: it is constant there.
     let fill = |d: &[f32], b: &[f32]| {
         band.distance.write(slot, |out| out.copy_from_slice(d));
-        band.u[0].write(slot, |u| {
-            u.iter_mut().zip(d.iter().zip(b)).for_each(|(u, (&d, &b))| *u = classify(d, b, reaches).0);
-        });
-        let valid = set.grid().brick_box(id).shape().map(|n| n as usize);
-        let edge = set.grid().edge() as usize;
-        band.solved.write(slot, |solved| {
-            let mut count = 0;
-            for (place, flag) in solved.iter_mut().enumerate() {
-                let at = [place % edge, place / edge % edge, place / (edge * edge)];
-                let inside = (0..3).all(|a| at[a] < valid[a]);
-                *flag = u8::from(inside && classify(d[place], b[place], reaches).1);
-                count += u64::from(*flag);
-            }
-            count
-        })
+        band.u[0].write(slot, |u| start::fill(b, reaches, u));
+        band.solved.write(slot, |solved| start::mark(d, b, edge, valid, reaches, solved))
     };
     let count = if let Some(from) = distance.set().slot(id) {
         distance.read(from, |d| level.read(from, |b| fill(d, b)))
@@ -121,19 +92,7 @@ fn band_cells(
     let edge = grid.edge() as usize;
     let hulls = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
         let valid = grid.brick_box(set.id(slot)).shape().map(|n| n as usize);
-        Ok(distance.read(slot, |d| {
-            level.read(slot, |b| {
-                let mut hull: Option<[[usize; 2]; 3]> = None;
-                for place in 0..d.len() {
-                    let at = [place % edge, place / edge % edge, place / (edge * edge)];
-                    if (0..3).all(|a| at[a] < valid[a]) && classify(d[place], b[place], reaches).1 {
-                        let hull = hull.get_or_insert(at.map(|v| [v, v]));
-                        (0..3).for_each(|a| hull[a] = [hull[a][0].min(at[a]), hull[a][1].max(at[a])]);
-                    }
-                }
-                hull
-            })
-        }))
+        Ok(distance.read(slot, |d| level.read(slot, |b| start::hull(d, b, edge, valid, reaches))))
     })?;
     let mut keep = vec![false; grid.len() as usize];
     for (slot, hull) in hulls.iter().enumerate().filter_map(|(s, h)| Some((s as Slot, h.as_ref()?))) {
@@ -161,24 +120,4 @@ pub fn read_mask(solved: &BrickArray<u8>, slot: Slot, mask: &mut CellMask) {
     let border = std::array::from_fn(|a| [at[a] == 0, at[a] == counts[a] - 1]);
     let valid = grid.brick_box(id).shape().map(|n| n as usize);
     solved.read(slot, |flags| mask.set(flags, valid, border));
-}
-
-/// Volume enclosed by u, in voxels, cells in grid order: what the stopping rule and the report look at.
-///
-/// # Errors
-/// When a brick cannot be read.
-pub fn enclosed_voxels(u: &BrickArray<f32>) -> Result<u64> {
-    let grid = *u.set().grid();
-    let mut count = 0;
-    let mut values = vec![0.0; grid.brick_len()];
-    for id in 0..grid.len() {
-        let part = grid.brick_box(id);
-        if let Some(value) = u.constant_in(&part) {
-            count += if value >= 0.5 { part.volume() } else { 0 }
-        } else {
-            u.read_box(&part, &mut values[..part.len()])?;
-            count += values[..part.len()].iter().filter(|v| **v >= 0.5).count() as u64;
-        }
-    }
-    Ok(count)
 }

@@ -193,8 +193,8 @@ pub fn evolve(
 const FIXED_LEN: usize = 2 * GROWN_LEN;
 pub(super) const KEPT_LAYERS: usize = FIXED_LEN.div_ceil(CELL_LEN);
 
-/// Bricks to keep all cells' schemes and fixed fields in, if they and the band fit the window together: streaming them
-/// through the disk would cost more than making them again, which gives the same bits.
+/// Bricks to keep all cells' distance and edges in, halos included, if they and the band fit the window together:
+/// streaming them through the disk would cost more than gathering them again, which gives the same bits.
 fn room_to_keep(engine: &Engine, band: &Band) -> Result<Option<BrickArray<f32>>> {
     // Of every voxel: two time levels, distance and edges with their faces, flags.
     const BAND_BYTES: u64 = 4 * (4 + 2) + 1;
@@ -278,7 +278,7 @@ impl Solver<'_> {
         self.engine.comm().sum(&partial)
     }
 
-    /// Takes up a cell: assembles its scheme unless it was kept, relaxes it, writes it back.
+    /// Takes up a cell: makes its scheme, relaxes it, writes it back.
     fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) -> Visit {
         let [old, new] = &self.band.u;
         read_mask(&self.band.solved, slot, &mut w.mask);

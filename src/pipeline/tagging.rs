@@ -11,11 +11,9 @@ use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboar
 use crate::grid::{BrickId, BrickSet, FACES, Face, Slot};
 use crate::kernel::level_set::basins::{self, Piece};
 use crate::kernel::level_set::flood;
+use crate::kernel::level_set::persistence::Joins;
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
-
-/// A basin persists when its depth is at least this many times its saddle; noise stays below 1.5.
-const PERSISTENCE: f32 = 2.0;
 
 /// A space that the cloud encloses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,7 +152,7 @@ fn wake_neighbours(set: &BrickSet, slot: Slot, level: &mut BrickArray<f32>, far:
             dirty[neighbour as usize] = true;
             continue;
         }
-        let highest = level.read_face(slot, face, |f| f.iter().copied().fold(0.0, f32::max));
+        let highest = level.read_face(slot, face, flood::highest);
         let Some((bricks, raised)) = far.raise(id, highest) else { continue };
         for &far_brick in bricks {
             level.set_absent(far_brick, raised);
@@ -202,31 +200,38 @@ fn find_basins(
         depth: if saddle < far.farthest { far.farthest } else { 0.0 },
         saddle,
     }));
-    let mut join = DisjointSets::new(pieces.len());
+    let mut joins = Joins::new(pieces);
+    join_bricks(&mut joins, &labels, &first, far, far_first);
+    let (whole, basin) = joins.persisting();
+    let found = |p: &Piece| Basin { voxels: p.voxels, depth: p.depth, saddle: p.saddle, place: [0; 3] };
+    let far = (0..set.grid().len()).map(|id| far_first.wrapping_add(far.region[id as usize])).collect();
+    Ok((whole.iter().map(found).collect(), Pieces { labels, first, far, basin }))
+}
+
+/// Joins the pieces of neighbouring bricks, and those beside a far region with it, where that is a basin.
+fn join_bricks(joins: &mut Joins, labels: &BrickArray<u16>, first: &[u32], far: &FarRegions, far_first: u32) {
+    let set = labels.set();
     for slot in 0..set.len() as Slot {
-        for face in FACES.into_iter().filter(|f| f.upper) {
+        let here = first[slot as usize];
+        for face in FACES {
             let Some(id) = set.grid().neighbour(set.id(slot), face.offset()) else { continue };
-            let here = |l: u16| first[slot as usize] + u32::from(l) - 1;
-            labels.read_face(slot, face, |mine| match set.slot(id) {
-                Some(other) => labels.read_face(other, face.opposite(), |theirs| {
-                    for (&a, &b) in mine.iter().zip(theirs).filter(|(a, b)| **a != 0 && **b != 0) {
-                        join.union(here(a), first[other as usize] + u32::from(b) - 1);
-                    }
+            match set.slot(id) {
+                // Faces between stored bricks are seen from below, once.
+                Some(other) if face.upper => labels.read_face(slot, face, |mine| {
+                    labels.read_face(other, face.opposite(), |theirs| {
+                        joins.across([mine, theirs], [here, first[other as usize]]);
+                    });
                 }),
-                None => join_far(mine, here, far, far_first, id, &mut join),
-            });
-        }
-        for face in FACES.into_iter().filter(|f| !f.upper) {
-            let beside = set.grid().neighbour(set.id(slot), face.offset()).filter(|&id| set.slot(id).is_none());
-            if let Some(id) = beside {
-                let here = |l: u16| first[slot as usize] + u32::from(l) - 1;
-                labels.read_face(slot, face, |mine| join_far(mine, here, far, far_first, id, &mut join));
+                Some(_) => {}
+                None => {
+                    let region = far.region[id as usize];
+                    if far.level[region as usize] < far.farthest {
+                        labels.read_face(slot, face, |mine| joins.beyond(mine, here, far_first + region));
+                    }
+                }
             }
         }
     }
-    let (basins, basin) = persisting(&pieces, &mut join);
-    let far = (0..set.grid().len()).map(|id| far_first.wrapping_add(far.region[id as usize])).collect();
-    Ok((basins, Pieces { labels, first, far, basin }))
 }
 
 /// The labelled pieces and the basins they belong to.
@@ -258,41 +263,6 @@ impl Pieces {
     }
 }
 
-/// Joins the labelled voxels of a face with the far region beyond it, where that is a basin.
-fn join_far(
-    mine: &[u16],
-    here: impl Fn(u16) -> u32,
-    far: &FarRegions,
-    far_first: u32,
-    id: BrickId,
-    join: &mut DisjointSets,
-) {
-    let region = far.region[id as usize];
-    if far.level[region as usize] < far.farthest {
-        mine.iter().filter(|l| **l != 0).for_each(|&l| join.union(here(l), far_first + region));
-    }
-}
-
-/// Adds up the joined pieces and keeps the basins that persist; tells for each piece which one it is part of.
-fn persisting(pieces: &[Piece], join: &mut DisjointSets) -> (Vec<Basin>, Vec<Option<u32>>) {
-    let mut whole: Vec<Piece> = pieces.to_vec();
-    let roots: Vec<u32> = (0..pieces.len() as u32).map(|n| join.find(n)).collect();
-    for (n, &root) in roots.iter().enumerate().filter(|(n, root)| *n as u32 != **root) {
-        let sum = &mut whole[root as usize];
-        sum.voxels += pieces[n].voxels;
-        sum.depth = sum.depth.max(pieces[n].depth);
-    }
-    let (mut basins, mut names) = (Vec::new(), vec![None; pieces.len()]);
-    for (n, p) in whole.iter().enumerate().filter(|(n, _)| roots[*n] == *n as u32) {
-        if p.depth > 0.0 && p.depth >= PERSISTENCE * p.saddle {
-            names[n] = Some(basins.len() as u32);
-            basins.push(Basin { voxels: p.voxels, depth: p.depth, saddle: p.saddle, place: [0; 3] });
-        }
-    }
-    let basin = roots.iter().map(|&root| names[root as usize]).collect();
-    (basins, basin)
-}
-
 /// Finds where the flood enters each basin: the first voxel in grid order that lies beside it and has the saddle's
 /// value both in d and in b. The value alone would not do: equal objects have equal saddles.
 fn locate_saddles(
@@ -311,7 +281,14 @@ fn locate_saddles(
             return Ok(Vec::new());
         }
         plan.gather(&pieces.labels, slot, Boundary::Constant(0), labels);
-        Ok(distance.read(slot, |d| level.read(slot, |b| entries(labels, slot, d, b, pieces, &saddles))))
+        let basin = |beyond: Option<Face>, label| match beyond {
+            None => pieces.basin(slot, label),
+            Some(face) => pieces.basin_beyond(slot, face, label),
+        };
+        let entries = distance.read(slot, |d| level.read(slot, |b| basins::entries(labels, d, b, &saddles, basin)));
+        let lo = set.grid().brick_box(set.id(slot)).lo;
+        let placed = |(name, at): (u32, [usize; 3])| (name, std::array::from_fn(|a| lo[a] + at[a] as i64));
+        Ok(entries.into_iter().map(placed).collect::<Vec<(u32, [i64; 3])>>())
     })?;
     let order = |v: &[i64; 3]| sources.geometry.domain().offset_of(*v);
     for (n, basin) in basins.iter_mut().enumerate() {
@@ -321,62 +298,4 @@ fn locate_saddles(
         }
     }
     Ok(())
-}
-
-/// The voxels of one brick through which the flood may enter a basin.
-fn entries(
-    labels: &HaloTile<u16>,
-    slot: Slot,
-    d: &[f32],
-    b: &[f32],
-    pieces: &Pieces,
-    saddles: &[f32],
-) -> Vec<(u32, [i64; 3])> {
-    let set = pieces.labels.set();
-    let (edge, part) = (labels.edge(), set.grid().brick_box(set.id(slot)));
-    let mut found = Vec::new();
-    for (y, z) in part.translate(part.lo.map(|v| -v)).rows() {
-        for x in 0..part.shape()[0] {
-            let value = d[(z as usize * edge + y as usize) * edge + x as usize];
-            if value != b[(z as usize * edge + y as usize) * edge + x as usize] || !saddles.contains(&value) {
-                continue;
-            }
-            for face in FACES {
-                let beside: [i64; 3] = std::array::from_fn(|a| [x, y, z][a] + face.offset()[a]);
-                let [i, j, k] = beside.map(|v| v as isize);
-                let label = labels.data()[labels.at(i, j, k)];
-                let inside = (0..3).all(|a| 0 <= beside[a] && beside[a] < part.shape()[a]);
-                let basin = if inside { pieces.basin(slot, label) } else { pieces.basin_beyond(slot, face, label) };
-                if let Some(basin) = basin.filter(|&n| saddles[n as usize] == value) {
-                    found.push((basin, std::array::from_fn(|a| part.lo[a] + [x, y, z][a])));
-                }
-            }
-        }
-    }
-    found
-}
-
-/// Disjoint sets with path halving.
-struct DisjointSets(Vec<u32>);
-
-impl DisjointSets {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn find(&mut self, mut n: u32) -> u32 {
-        while self.0[n as usize] != n {
-            let parent = self.0[self.0[n as usize] as usize];
-            self.0[n as usize] = parent;
-            n = parent;
-        }
-        n
-    }
-
-    /// The smaller name becomes the set's, so that names do not depend on the order of unions.
-    fn union(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.find(a), self.find(b));
-        let (low, high) = (a.min(b), a.max(b));
-        self.0[high as usize] = low;
-    }
 }

@@ -10,5 +10,5 @@ mod window;
 pub use brick_array::{BrickArray, Scratch};
 pub use element::{Element, ElementType, SamplesMut};
 pub use free_space::free_space;
-pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, PlaneSource};
+pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, NoMesh, PlaneSource};
 pub use window::{Traffic, Window};

@@ -83,3 +83,17 @@ impl MeshSink for MeshBuffer {
         Ok(())
     }
 }
+
+/// Keeps nothing: for meshes of which only the measures are wanted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoMesh;
+
+impl MeshSink for NoMesh {
+    fn vertex(&mut self, _position: [f32; 3]) -> Result<()> {
+        Ok(())
+    }
+
+    fn triangle(&mut self, _corners: [u32; 3]) -> Result<()> {
+        Ok(())
+    }
+}

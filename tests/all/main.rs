@@ -17,6 +17,8 @@ mod triangle_distance;
 
 mod cli;
 mod layering;
+#[cfg(target_os = "linux")]
+mod signals;
 mod tiff_derived;
 mod tiff_handmade;
 mod tiff_hostile;

@@ -2,6 +2,8 @@
 
 pub(crate) mod ball;
 pub(crate) mod clouds;
+#[cfg(target_os = "linux")]
+pub(crate) mod held;
 pub(crate) mod lab;
 pub(crate) mod meshes;
 pub(crate) mod npy;

@@ -6,6 +6,7 @@
 //! A [`StoreWriter`] builds the store under a hidden name beside its final one and moves it into place when all is
 //! written. Shards are the unit of writing: each is encoded whole, by one caller, and appears under its name complete.
 
+mod abandoned;
 mod files;
 mod level;
 mod metadata;
@@ -18,4 +19,4 @@ pub use level::LevelWriter;
 pub use metadata::{ImageSpec, LabelColor, LabelSpec};
 pub use pyramid::{LevelPlan, plan_levels};
 pub use read::{ImageReader, StoredLevel};
-pub use store::{ImageWriter, StoreWriter};
+pub use store::{ImageWriter, StoreWriter, is_store};

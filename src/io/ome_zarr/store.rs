@@ -1,11 +1,12 @@
 //! `StoreWriter`: one `OUT.zarr`, built under a hidden name beside its final one and moved into place when it is whole.
 
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempDir;
 
+use super::abandoned::{self, REPLACED};
 use super::files::{create_parent, io_error, sync_tree, write_json};
 use super::level::LevelWriter;
 use super::metadata::{self, ImageSpec, LabelSpec};
@@ -21,6 +22,8 @@ pub struct StoreWriter {
     path: PathBuf,
     overwrite: bool,
     partial: TempDir,
+    /// Says to other runs that somebody works on `partial`.
+    _claim: Option<File>,
     /// Names of the label images; also the lock under which group documents are written.
     labels: Mutex<Vec<String>>,
 }
@@ -41,6 +44,7 @@ impl ImageWriter {
 
 impl StoreWriter {
     /// Begins the store that is to lie at `path`. With `overwrite` a store that is there already is replaced, at the end.
+    /// What killed runs left in the making of the same store is removed.
     ///
     /// # Errors
     /// `Usage` when something is at `path` that may not be replaced, or the folder it is to lie in does not exist; `Failed`
@@ -49,11 +53,15 @@ impl StoreWriter {
         let path = resolve(path)?;
         check_target(&path, overwrite)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let folder = path.parent().unwrap_or(Path::new("."));
+        abandoned::remove(folder, &name, METADATA);
         let partial = tempfile::Builder::new()
-            .prefix(&format!(".{name}.partial-{}-", std::process::id()))
-            .tempdir_in(path.parent().unwrap_or(Path::new(".")))
+            .prefix(&format!("{}{}-", abandoned::prefix(&name), std::process::id()))
+            .tempdir_in(folder)
             .map_err(|error| io_error("the output cannot be created in its folder", &error).at(&path))?;
-        let store = Self { path, overwrite, partial, labels: Mutex::default() };
+        // Locked before anything is in it: see `abandoned`.
+        let claim = abandoned::claim(partial.path());
+        let store = Self { path, overwrite, partial, _claim: claim, labels: Mutex::default() };
         store.ensure_groups(Path::new("")).map_err(|error| error.at(&store.path))?;
         Ok(store)
     }
@@ -113,7 +121,7 @@ impl StoreWriter {
         let fault = |error: std::io::Error| io_error("the output cannot be put in its place", &error).at(&self.path);
         if exists(&self.path) {
             let mut old = self.partial.path().as_os_str().to_owned();
-            old.push("-replaced");
+            old.push(REPLACED);
             let old = PathBuf::from(old);
             fs::rename(&self.path, &old).map_err(fault)?;
             if let Err(error) = fs::rename(self.partial.path(), &self.path) {
@@ -209,6 +217,12 @@ fn exists(path: &Path) -> bool {
     fs::symlink_metadata(path).is_ok()
 }
 
+/// Whether a folder is a Zarr store, of version 2 or 3.
+#[must_use]
+pub fn is_store(path: &Path) -> bool {
+    [METADATA, ".zgroup", ".zattrs", ".zarray"].iter().any(|name| path.join(name).is_file())
+}
+
 fn check_target(path: &Path, overwrite: bool) -> Result<()> {
     if !exists(path) {
         return Ok(());
@@ -217,7 +231,7 @@ fn check_target(path: &Path, overwrite: bool) -> Result<()> {
         let what = "the output exists already; choose another name, or give --overwrite to replace it";
         return Err(Error::usage(what).at(path));
     }
-    if [METADATA, ".zgroup", ".zattrs", ".zarray"].iter().any(|name| path.join(name).is_file()) {
+    if is_store(path) {
         return Ok(());
     }
     let what = "this is no Zarr store, so --overwrite does not replace it; remove it yourself or choose another name";
@@ -265,6 +279,18 @@ mod tests {
         assert!(entries(folder.path())[0].starts_with(".out.zarr.partial-"));
         drop(store);
         assert!(entries(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn stores_in_the_making_are_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.zarr");
+        let first = StoreWriter::create(&path, false).unwrap();
+        let dead = folder.path().join(".out.zarr.partial-1-abcdef");
+        fs::create_dir(&dead).unwrap();
+        fs::write(dead.join(METADATA), "{}").unwrap();
+        let second = StoreWriter::create(&path, false).unwrap();
+        assert!(first.folder().exists() && second.folder().exists() && !dead.exists());
     }
 
     #[test]

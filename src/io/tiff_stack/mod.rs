@@ -21,43 +21,18 @@ mod units;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use super::stacks::Stack;
 use crate::error::{Error, Result};
 use crate::store::{ElementType, PlaneSource, SamplesMut};
 use decode::Scratch;
 use source::{Opened, Source};
 
-/// What a stack is, told without decoding a plane of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StackInfo {
-    /// Voxels along x, y, z of the chosen channel and time.
-    pub shape: [i64; 3],
-    /// Number of channels, those inside a pixel (RGB) included.
-    pub channels: u32,
-    /// Number of time points.
-    pub times: u32,
-    /// The sample type in the file: `uint8`, `uint16`, `int16`, `float32`, `uint12`, ...
-    pub file_type: String,
-    /// The type that planes are handed out in.
-    pub element: ElementType,
-    /// Distance between voxel centres along x, y, z, each where the file tells it.
-    pub spacing: [Option<f64>; 3],
-    /// The unit of `spacing` as OME-Zarr spells it, where the file tells it.
-    pub unit: Option<String>,
-    /// The axes as stored, slowest first, `S` for samples inside a pixel: `TZCYX`.
-    pub axes: String,
-    /// How strips and tiles are compressed.
-    pub compression: String,
-    /// What the user should know about how the file was understood.
-    pub notes: Vec<String>,
-}
+pub use super::stacks::{Select, StackInfo};
 
-/// Which part of a file with several channels or time points to read, counted from 0.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Select {
-    /// The channel.
-    pub channel: u32,
-    /// The time point.
-    pub time: u32,
+/// Whether a file that starts with these bytes is TIFF: classic or big, of either byte order.
+#[must_use]
+pub fn is_tiff(head: [u8; 4]) -> bool {
+    [*b"II*\0", *b"MM\0*", *b"II+\0", *b"MM\0+"].contains(&head)
 }
 
 /// One channel at one time of a TIFF file or of a folder of slices.
@@ -108,6 +83,12 @@ impl TiffStack {
             return Err(Error::failed(format!("plane {z} was asked for, of {depth}")).at(&self.path));
         }
         Ok(())
+    }
+}
+
+impl Stack for TiffStack {
+    fn info(&self) -> &StackInfo {
+        &self.info
     }
 }
 

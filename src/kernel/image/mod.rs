@@ -1,7 +1,10 @@
-//! Image terms and pictures: presmoothing, edge detector, pyramid, slices with contours.
+//! Image terms, labels and pictures: grey range, presmoothing, edge detector, pyramid, slices with contours.
 
 pub mod downsample;
 pub mod edge_detector;
+pub mod grey_range;
 pub mod heat;
+pub mod histogram;
+pub mod labels;
 pub mod palette;
 pub mod panel;

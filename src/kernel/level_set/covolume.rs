@@ -15,7 +15,7 @@
 //! In: grown cells of u, d, g (f32; d in physical units, g in 0..1). Halo 1, all 26 directions for u. Work buffers:
 //! a few planes. Cost: 12 tetrahedra norms and about 60 operations per voxel.
 
-use super::gradients::{FaceNorms, Metric, vertex_plane, x_faces, y_faces, z_faces};
+use super::gradients::{FaceNorms, Metric, faces, vertex_plane};
 use super::scheme::{LANES, SCHEME_LAYERS, write_part};
 use super::{CELL, CELL_LEN, GROWN, PLANE};
 
@@ -186,14 +186,14 @@ fn assemble_cell(
     if first < end {
         let rows = mask.rows_around(first);
         vertex_plane(fields.u, first, rows, &mut work.low);
-        z_faces(fields.u, first, rows, &work.low, &metric, &mut work.z_low);
+        faces::<2>(fields.u, first, rows, [&work.low, &work.low[GROWN..]], &metric, &mut work.z_low);
     }
     for z in first..end {
         let (rows, next) = (mask.rows[z], mask.rows_around(z + 1));
         vertex_plane(fields.u, z + 1, next, &mut work.high);
-        x_faces(fields.u, z, rows, [&work.low, &work.high], &metric, &mut work.x);
-        y_faces(fields.u, z, rows, [&work.low, &work.high], &metric, &mut work.y);
-        z_faces(fields.u, z + 1, next, &work.high, &metric, &mut work.z_high);
+        faces::<0>(fields.u, z, rows, [&work.low, &work.high], &metric, &mut work.x);
+        faces::<1>(fields.u, z, rows, [&work.low, &work.high], &metric, &mut work.y);
+        faces::<2>(fields.u, z + 1, next, [&work.high, &work.high[GROWN..]], &metric, &mut work.z_high);
         for y in rows[0]..rows[1] {
             let row = Row { y, z, work, mask, metric: &metric, step, velocity };
             if velocity.rho == 0.0 {
@@ -405,12 +405,12 @@ fn mean_gradient_cell(u: &[f32], spacing: [f64; 3], work: &mut Planes, out: &mut
     let velocity = Velocity { theta: 0.0, rho: 0.0, delta: 0.0, epsilon: 0.0, tau: 0.0, normalised: false };
     let rows = [0, CELL];
     vertex_plane(u, 0, rows, &mut work.low);
-    z_faces(u, 0, rows, &work.low, &metric, &mut work.z_low);
+    faces::<2>(u, 0, rows, [&work.low, &work.low[GROWN..]], &metric, &mut work.z_low);
     for z in 0..CELL {
         vertex_plane(u, z + 1, rows, &mut work.high);
-        x_faces(u, z, rows, [&work.low, &work.high], &metric, &mut work.x);
-        y_faces(u, z, rows, [&work.low, &work.high], &metric, &mut work.y);
-        z_faces(u, z + 1, rows, &work.high, &metric, &mut work.z_high);
+        faces::<0>(u, z, rows, [&work.low, &work.high], &metric, &mut work.x);
+        faces::<1>(u, z, rows, [&work.low, &work.high], &metric, &mut work.y);
+        faces::<2>(u, z + 1, rows, [&work.high, &work.high[GROWN..]], &metric, &mut work.z_high);
         for y in 0..CELL {
             let row = Row { y, z, work, mask: &mask, metric: &metric, step: [0.0; 3], velocity: &velocity };
             out[(z * CELL + y) * CELL..][..CELL].copy_from_slice(&row.mean_norms::<CELL>(y * GROWN));

@@ -20,6 +20,12 @@ pub fn relax(b: &mut HaloTile<f32>, d: &[f32]) -> bool {
     }
 }
 
+/// The highest level of a layer of voxels, 0 at least: what a region beside it is flooded with.
+#[must_use]
+pub fn highest(layer: &[f32]) -> f32 {
+    layer.iter().copied().fold(0.0, f32::max)
+}
+
 fn pass(b: &mut HaloTile<f32>, d: &[f32], upward: bool) -> bool {
     let (edge, pitch, valid) = (b.edge(), b.pitch(), b.valid());
     let mut rose = false;

@@ -99,32 +99,13 @@ fn tetrahedron(across: f32, z1: f32, z2: f32, mean: f32, inverse_edge: f32, inve
     across + along * along + inward * inward
 }
 
-/// Norms of the lower x-faces of voxel plane `k`: place n holds the face between voxels (i - 1, j) and (i, j).
-/// `vertices` are the planes of vertices below and above.
+/// Norms of the lower faces across `AXIS` of voxel plane `k`: place n holds the face between a voxel and the one below it.
+///
+/// Of y-faces the upper ones of the last row come with them; for z, `k == CELL` gives the upper ones of the last plane.
+/// `vertices` are the planes of vertices on both sides along z; for z-faces the plane itself, and again from its next
+/// row on: the vertices on both sides along y.
 #[inline(always)]
-pub(crate) fn x_faces(
-    u: &[f32],
-    k: usize,
-    rows: [usize; 2],
-    vertices: [&[f32]; 2],
-    metric: &Metric,
-    out: &mut FaceNorms,
-) {
-    let (start, len) = (rows[0] * GROWN, (rows[1].saturating_sub(rows[0])) * GROWN);
-    let u = &u[(k + 1) * PLANE + GROWN + start..][..len + 1];
-    let [low, high] = vertices.map(|v| &v[start..][..len + GROWN]);
-    let [ix, iy, iz] = metric.inverse_spacing;
-    let (inverse, norm) = (&mut out.inverse[start..][..len], &mut out.norm[start..][..len]);
-    for n in 0..len {
-        let (p, q) = (u[n + 1], u[n]);
-        let corners = [low[n], low[n + GROWN], high[n], high[n + GROWN]];
-        (inverse[n], norm[n]) = face_sums((q - p) * ix, 0.5 * (p + q), corners, [iy, iz], metric.epsilon_squared);
-    }
-}
-
-/// Norms of the lower y-faces of voxel plane `k`, the upper ones of the last row included.
-#[inline(always)]
-pub(crate) fn y_faces(
+pub(crate) fn faces<const AXIS: usize>(
     u: &[f32],
     k: usize,
     rows: [usize; 2],
@@ -135,34 +116,19 @@ pub(crate) fn y_faces(
     if rows[0] >= rows[1] {
         return;
     }
-    let (start, len) = (rows[0] * GROWN, (rows[1] - rows[0] + 1) * GROWN - 1);
-    let u = &u[(k + 1) * PLANE + start..][..len + GROWN + 1];
-    let [low, high] = vertices.map(|v| &v[start..][..len + 1]);
-    let [ix, iy, iz] = metric.inverse_spacing;
+    let tangents = [[1, 2], [0, 2], [0, 1]][AXIS];
+    // The first tangent lies within a plane of vertices, or within a row of it.
+    let (below, side) = ([1, GROWN, PLANE][AXIS], [GROWN, 1, 1][AXIS]);
+    let (start, len) = (rows[0] * GROWN, (rows[1] - rows[0] + usize::from(AXIS == 1)) * GROWN - 1);
+    let first = (k + 1) * PLANE + GROWN + 1 + start;
+    let (p, q) = (&u[first..][..len], &u[first - below..][..len]);
+    let [low, high] = vertices.map(|v| &v[start..][..len + side]);
+    let (across, along) = (metric.inverse_spacing[AXIS], tangents.map(|t| metric.inverse_spacing[t]));
     let (inverse, norm) = (&mut out.inverse[start..][..len], &mut out.norm[start..][..len]);
     for n in 0..len {
-        let (p, q) = (u[n + GROWN + 1], u[n + 1]);
-        let corners = [low[n], low[n + 1], high[n], high[n + 1]];
-        (inverse[n], norm[n]) = face_sums((q - p) * iy, 0.5 * (p + q), corners, [ix, iz], metric.epsilon_squared);
-    }
-}
-
-/// Norms of the lower z-faces of voxel plane `k`; `k == CELL` gives the upper ones of the last plane.
-#[inline(always)]
-pub(crate) fn z_faces(u: &[f32], k: usize, rows: [usize; 2], vertices: &[f32], metric: &Metric, out: &mut FaceNorms) {
-    if rows[0] >= rows[1] {
-        return;
-    }
-    let (start, len) = (rows[0] * GROWN, (rows[1] - rows[0]) * GROWN - 1);
-    let below = &u[k * PLANE + GROWN + start..][..len + 1];
-    let above = &u[(k + 1) * PLANE + GROWN + start..][..len + 1];
-    let v = &vertices[start..][..len + GROWN + 1];
-    let [ix, iy, iz] = metric.inverse_spacing;
-    let (inverse, norm) = (&mut out.inverse[start..][..len], &mut out.norm[start..][..len]);
-    for n in 0..len {
-        let (p, q) = (above[n + 1], below[n + 1]);
-        let corners = [v[n], v[n + 1], v[n + GROWN], v[n + GROWN + 1]];
-        (inverse[n], norm[n]) = face_sums((q - p) * iz, 0.5 * (p + q), corners, [ix, iy], metric.epsilon_squared);
+        let corners = [low[n], low[n + side], high[n], high[n + side]];
+        let (step, mean) = ((q[n] - p[n]) * across, 0.5 * (p[n] + q[n]));
+        (inverse[n], norm[n]) = face_sums(step, mean, corners, along, metric.epsilon_squared);
     }
 }
 

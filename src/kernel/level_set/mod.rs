@@ -8,8 +8,10 @@ pub mod border;
 pub mod covolume;
 pub mod flood;
 pub mod gradients;
+pub mod persistence;
 pub mod scheme;
 pub mod sor;
+pub mod start;
 
 /// Voxels along the edge of a cell.
 pub const CELL: usize = 16;

@@ -1,14 +1,15 @@
 //! What a segmentation will take: memory that it must hold, scratch, output and a rough time, told before it starts.
 //!
 //! The cells of every object are counted as the run itself begins with them; the rest follows from the fields that are
-//! alive at one time. Everything is an upper bound but for objects whose search has to reach farther than its start.
+//! alive at one time. Everything is an upper bound but for objects whose search has to reach farther than its start:
+//! how far, only the flood can tell, and it is what the estimate is to be given before.
 
-use super::object::first_cells;
 use super::settings::{Guides, SegmentSettings};
+use super::vicinity::{Vicinity, first_reach};
 use crate::grid::{Box3, BrickGrid};
 use crate::kernel::level_set::CELL_LEN;
 use crate::pipeline::evolve::KEPT_LAYERS;
-use crate::pipeline::marks::split;
+use crate::pipeline::marks::{cloud_of, split};
 use crate::store::PlaneSource;
 
 /// What a run is expected to take.
@@ -16,7 +17,8 @@ use crate::store::PlaneSource;
 pub struct Estimate {
     /// Bytes that must be in memory at one time, beside the window of scratch pages.
     pub held: u64,
-    /// Bytes of scratch at one time.
+    /// Bytes of scratch at one time, for objects that are closed within the first reach of their search; one whose cloud
+    /// has wider holes is solved among more cells and takes more.
     pub scratch: u64,
     /// Bytes of scratch without which the run cannot even start to solve.
     pub least_scratch: u64,
@@ -50,6 +52,8 @@ const SECONDS_PER_NEAR_VOXEL: f64 = 2.5e-6;
 const SECONDS_PER_VOXEL: f64 = 6e-8;
 
 /// Estimates the segmentation of `crop` with `threads` threads; `writes` says whether there is an output.
+///
+/// The search for what a cloud encloses is taken to end where it begins, at its first reach.
 #[must_use]
 pub fn estimate(
     stack: &dyn PlaneSource,
@@ -63,8 +67,10 @@ pub fn estimate(
     let plane = stack.shape()[0].unsigned_abs() * stack.shape()[1].unsigned_abs() * size;
     let (mut points, mut grid_cells, mut largest, mut near) = (0, 0, 0, 0);
     for marks in split(guides.cloud) {
-        let (cloud, cells) = first_cells(&marks, guides.geometry, settings);
-        points = points.max(cloud);
+        let cloud = cloud_of(&marks, guides.geometry, settings.caps);
+        let reach = first_reach(&marks, guides.geometry, settings);
+        let cells = Vicinity::new(guides.geometry, &cloud, reach).cells;
+        points = points.max(cloud.len() as u64);
         grid_cells = grid_cells.max(cells.grid().len());
         largest = largest.max(cells.len() as u64);
         near += cells.len() as u64;

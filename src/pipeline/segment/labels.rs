@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::grid::Box3;
+use crate::kernel::image::labels;
 use crate::store::{BoxSource, BrickArray, Element};
 
 /// Which object a voxel belongs to where several overlap.
@@ -70,14 +71,8 @@ impl<T: Element> BoxSource<T> for LabelVolume<'_> {
             }
             values.resize(own.len(), 0.0f32);
             object.u.read_box(&own, &mut values)?;
-            let label = T::from_f64(f64::from(object.label));
-            let width = own.shape()[0] as usize;
-            for (row, (y, z)) in values.chunks_exact(width).zip(own.rows()) {
-                let [x, y, z] = [own.lo[0], y, z];
-                let at: [i64; 3] = std::array::from_fn(|a| [x, y, z][a] + object.window.lo[a]);
-                let out = &mut out[part.offset_of(at)..][..width];
-                out.iter_mut().zip(row).filter(|(_, u)| **u >= 0.5).for_each(|(o, _)| *o = label);
-            }
+            let covered = own.translate(object.window.lo);
+            labels::paint(&values, &covered, T::from_f64(f64::from(object.label)), part, out);
         }
         Ok(())
     }

@@ -12,6 +12,7 @@ mod labels;
 mod object;
 mod output;
 mod settings;
+mod vicinity;
 
 pub use check::check_marks;
 pub use estimate::{Estimate, estimate};

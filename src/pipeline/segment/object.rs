@@ -3,17 +3,18 @@
 use std::sync::Arc;
 
 use super::settings::SegmentSettings;
+use super::vicinity::{Vicinity, first_reach, voxel_bounds};
 use crate::error::{Error, Result};
 use crate::exec::Engine;
-use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, PointBins};
-use crate::kernel::level_set::CELL;
+use crate::grid::{Box3, Geometry};
+use crate::kernel::image::grey_range::GreyRange;
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::{Band, Reaches, make_band};
 use crate::pipeline::distance::{Sources, cloud_distance};
 use crate::pipeline::evolve::{Evolution, evolve};
 use crate::pipeline::image_terms::{EdgeSettings, edges, presmooth};
-use crate::pipeline::intensity::{GreyRange, Normalised};
-use crate::pipeline::marks::{ObjectMarks, cloud_of, contour_gap};
+use crate::pipeline::intensity::Normalised;
+use crate::pipeline::marks::{ObjectMarks, cloud_of};
 use crate::pipeline::tagging::{Basin, Tagging, tag};
 use crate::store::{BoxSource, BrickArray, Element};
 
@@ -79,9 +80,6 @@ pub(super) struct Solution {
     pub evolution: Evolution,
 }
 
-/// Distances that the search for a closed cloud starts with, in largest spacings and in gaps between contours.
-const FIRST_REACH_VOXELS: f64 = 6.0;
-const FIRST_REACH_GAPS: f64 = 1.5;
 /// The start surface lies a little beyond the largest saddle, and at least so many smallest spacings from the cloud.
 const ABOVE_SADDLE: f64 = 1.05;
 const SMALLEST_BETA_VOXELS: f64 = 0.75;
@@ -180,8 +178,9 @@ fn enclose(
     let mean = image.voxel_volume().cbrt();
     let mut farthest = first_reach(marks, image, settings);
     loop {
-        let (geometry, window) = grid_around(image, &bounds, farthest);
-        let (distance, tagging) = flood_within(engine, marks, cloud, &geometry, settings, farthest)?;
+        let around = Vicinity::new(image, cloud, farthest);
+        let (geometry, window) = (around.geometry.clone(), around.window);
+        let (distance, tagging) = flood_within(engine, marks, cloud, around, settings, farthest)?;
         let beta = settings.beta.or_else(|| automatic_beta(&tagging.basins, image));
         let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|b| f64::from(b.saddle) < beta)) else {
             if farthest > extent || (settings.beta.is_some() && !tagging.basins.is_empty()) {
@@ -201,43 +200,23 @@ fn enclose(
     }
 }
 
-/// The distance from the cloud within which the search begins.
-fn first_reach(marks: &ObjectMarks, image: &Geometry, settings: &SegmentSettings) -> f64 {
-    let wanted = settings.beta.map_or(0.0, |beta| 2.0 * beta);
-    (FIRST_REACH_VOXELS * image.max_spacing())
-        .max(FIRST_REACH_GAPS * contour_gap(marks, image))
-        .max(wanted + 2.0 * image.max_spacing())
-}
-
-/// What the search begins with, for an estimate: the cloud's points and the cells within its first reach.
-pub(super) fn first_cells(marks: &ObjectMarks, image: &Geometry, settings: &SegmentSettings) -> (u64, BrickSet) {
-    let cloud = cloud_of(marks, image, settings.caps);
-    let farthest = first_reach(marks, image, settings);
-    let (geometry, _) = grid_around(image, &voxel_bounds(&cloud, image), farthest);
-    let bins = PointBins::new(BrickGrid::new(geometry.shape, CELL as i64), &geometry, &cloud);
-    let reach = geometry.spacing.map(|h| (farthest / h).ceil() as i64 + 1);
-    (cloud.len() as u64, bins.bricks_within(&geometry, &cloud, reach))
-}
-
 fn flood_within(
     engine: &Engine,
     marks: &ObjectMarks,
     cloud: &[[f64; 3]],
-    geometry: &Geometry,
+    around: Vicinity,
     settings: &SegmentSettings,
     farthest: f64,
 ) -> Result<(BrickArray<f32>, Tagging)> {
-    let grid = BrickGrid::new(geometry.shape, CELL as i64);
-    let bins = PointBins::new(grid, geometry, cloud);
-    let reach = geometry.spacing.map(|h| (farthest / h).ceil() as i64 + 1);
-    let set = Arc::new(bins.bricks_within(geometry, cloud, reach));
-    let sources = Sources::cloud(geometry, cloud, &bins);
+    let set = Arc::new(around.cells);
+    let voxels = (set.len() * set.grid().brick_len()) as u64;
+    let sources = Sources::cloud(&around.geometry, cloud, &around.bins);
     let stage = engine.stage(&name("distance", marks), 11 * set.len() as u64);
-    stage.voxels((set.len() * grid.brick_len()) as u64);
+    stage.voxels(voxels);
     let distance = cloud_distance(&stage, engine, &sources, &set, settings.method, farthest as f32)?;
     stage.finish();
     let stage = engine.stage(&name("tagging", marks), 0);
-    stage.voxels((set.len() * grid.brick_len()) as u64);
+    stage.voxels(voxels);
     let tagging = tag(&stage, engine, &sources, &distance)?;
     stage.finish();
     Ok((distance, tagging))
@@ -262,25 +241,4 @@ fn leak(marks: &ObjectMarks, settings: &SegmentSettings, basins: &[Basin], image
              slices, in the order of the contour"
         )),
     }
-}
-
-/// The voxels of the image grid that hold the cloud; may reach past the image.
-fn voxel_bounds(cloud: &[[f64; 3]], image: &Geometry) -> Box3 {
-    let mut voxels = cloud.iter().map(|&p| image.to_voxels(p));
-    let first = voxels.next().unwrap_or_default();
-    let (lo, hi) = voxels.fold((first, first), |(lo, hi), v| {
-        (std::array::from_fn(|a| lo[a].min(v[a])), std::array::from_fn(|a| hi[a].max(v[a])))
-    });
-    Box3::new(lo.map(|v| v.floor() as i64), hi.map(|v| v.ceil() as i64 + 1))
-}
-
-/// The object's box: its cloud and a margin, starting at a whole cell of the image's grid.
-fn grid_around(image: &Geometry, bounds: &Box3, farthest: f64) -> (Geometry, Box3) {
-    let cell = CELL as i64;
-    let margin: [i64; 3] = image.spacing.map(|h| (farthest / h).ceil() as i64 + 2);
-    let window = Box3 {
-        lo: std::array::from_fn(|a| (bounds.lo[a] - margin[a]).div_euclid(cell) * cell),
-        hi: std::array::from_fn(|a| bounds.hi[a] + margin[a]),
-    };
-    (image.crop(&window), window)
 }

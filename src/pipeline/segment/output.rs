@@ -10,13 +10,14 @@ use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, Geometry};
 use crate::io::mesh_ply::PlyWriter;
 use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
+use crate::kernel::image::labels;
 use crate::kernel::image::palette::label_color;
 use crate::kernel::surface::Hausdorff;
 use crate::pipeline::ingest::{Image, Sample, ingest};
 use crate::pipeline::marks::{ObjectMarks, split};
 use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface;
-use crate::store::{BoxSource, Element, ElementType, MeshBuffer, PlaneSource};
+use crate::store::{BoxSource, Element, ElementType, NoMesh, PlaneSource};
 
 /// What a segmentation found.
 #[derive(Clone, Debug)]
@@ -104,7 +105,7 @@ fn draw(
             mesh.finish()?;
             measures
         }
-        None => surface::extract(&stage, u, geometry, &mut MeshBuffer::default())?,
+        None => surface::extract(&stage, u, geometry, &mut NoMesh)?,
     };
     let points = marks.contours.concat();
     let distances = surface::distances_to(&stage, u, geometry, &points)?;
@@ -185,14 +186,12 @@ fn count_labels(stage: &Stage<'_>, geometry: &Geometry, volume: &LabelVolume<'_>
     let grid = BrickGrid::new(geometry.shape, 64);
     let parts: Vec<Box3> = (0..grid.len()).map(|id| grid.brick_box(id)).collect();
     let counts = stage.run(&parts, &Workers::new(Vec::new), |labels, part| {
-        let mut counts = BTreeMap::<u32, u64>::new();
         if BoxSource::<u32>::constant_in(volume, part) == Some(0) {
-            return Ok(counts);
+            return Ok(BTreeMap::new());
         }
         labels.resize(part.len(), 0);
         volume.read_box(part, labels)?;
-        labels.iter().filter(|&&l| l > 0).for_each(|&l| *counts.entry(l).or_default() += 1);
-        Ok(counts)
+        Ok(labels::count(labels))
     })?;
     Ok(counts.into_iter().flatten().fold(BTreeMap::new(), |mut all, (label, n)| {
         *all.entry(label).or_default() += n;

@@ -1,0 +1,144 @@
+//! Stacks of planes from files and folders, told apart by content. [`FORMATS`] is the one table of what is read.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::ome_zarr::is_store;
+use super::tiff_stack::{self, TiffStack};
+use crate::error::{Error, Result};
+use crate::store::{ElementType, PlaneSource};
+
+/// What a stack is, told without decoding a plane of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StackInfo {
+    /// Voxels along x, y, z of the chosen channel and time.
+    pub shape: [i64; 3],
+    /// Number of channels, those inside a pixel (RGB) included.
+    pub channels: u32,
+    /// Number of time points.
+    pub times: u32,
+    /// The sample type in the file: `uint8`, `uint16`, `int16`, `float32`, `uint12`, ...
+    pub file_type: String,
+    /// The type that planes are handed out in.
+    pub element: ElementType,
+    /// Distance between voxel centres along x, y, z, each where the file tells it.
+    pub spacing: [Option<f64>; 3],
+    /// The unit of `spacing` as OME-Zarr spells it, where the file tells it.
+    pub unit: Option<String>,
+    /// The axes as stored, slowest first, `S` for samples inside a pixel: `TZCYX`.
+    pub axes: String,
+    /// How the samples are compressed.
+    pub compression: String,
+    /// What the user should know about how the file was understood.
+    pub notes: Vec<String>,
+}
+
+/// Which part of a file with several channels or time points to read, counted from 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Select {
+    /// The channel.
+    pub channel: u32,
+    /// The time point.
+    pub time: u32,
+}
+
+/// One channel at one time of a stack that was opened.
+pub trait Stack: PlaneSource {
+    /// What the stack is.
+    fn info(&self) -> &StackInfo;
+}
+
+/// A format of stacks.
+#[derive(Debug)]
+pub struct Format {
+    /// What a stack of this format is called.
+    pub name: &'static str,
+    /// How names of such files usually end, without the dot. What is of no format by its content, but ends so, is opened
+    /// as one: its reader says best what is wrong with it.
+    pub extensions: &'static [&'static str],
+    /// Whether what lies at a path, which exists, is of this format by its content.
+    pub sniff: fn(&Path) -> bool,
+    /// Opens one channel and time and reads what the file says of itself; no plane is decoded. Fails with an input error
+    /// that names the file and says what is wrong.
+    pub open: fn(&Path, Select) -> Result<Box<dyn Stack>>,
+}
+
+/// The formats, in the order in which they are tried.
+pub const FORMATS: &[Format] = &[
+    Format {
+        name: "TIFF stack",
+        extensions: &["tif", "tiff"],
+        sniff: |path| head(path).is_some_and(tiff_stack::is_tiff),
+        open: open_tiff,
+    },
+    Format {
+        name: "folder of TIFF slices",
+        extensions: &[],
+        sniff: |path| path.is_dir() && !is_store(path),
+        open: open_tiff,
+    },
+];
+
+/// The format of what lies at a path; none when it is no stack, or nothing lies there.
+#[must_use]
+pub fn format_of(path: &Path) -> Option<&'static Format> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let by_content = FORMATS.iter().find(|format| (format.sniff)(path));
+    by_content.or_else(|| FORMATS.iter().find(|format| format.extensions.contains(&extension.as_str())))
+}
+
+/// Opens one channel and time of a stack.
+///
+/// # Errors
+/// When there is nothing at the path, it is of no format in [`FORMATS`], unreadable, damaged, of a kind that is not
+/// supported, or has no such channel or time.
+pub fn open_stack(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
+    if !path.exists() {
+        return Err(Error::input("there is no such file or folder").at(path));
+    }
+    let Some(format) = format_of(path) else {
+        let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
+        return Err(Error::input(format!("is no stack of images that can be read ({})", names.join(", "))).at(path));
+    };
+    (format.open)(path, select)
+}
+
+fn open_tiff(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
+    Ok(Box::new(TiffStack::open(path, select)?))
+}
+
+/// The first bytes of a file, where there are so many.
+fn head(path: &Path) -> Option<[u8; 4]> {
+    let mut head = [0; 4];
+    File::open(path).and_then(|mut file| file.read_exact(&mut head)).ok().map(|()| head)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_decides_and_the_name_only_where_nothing_else_does() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, bytes: &[u8]| {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, bytes).unwrap();
+            path
+        };
+        let (slice, node) = (write("slices/s1.tif", b"II*\0"), write("a.zarr/zarr.json", b"{}"));
+        let (slices, store) = (slice.parent().unwrap(), node.parent().unwrap());
+        let name = |path: &Path| format_of(path).map(|format| format.name);
+        for bytes in [b"II*\0----", b"MM\0*----", b"II+\0----", b"MM\0+----"] {
+            assert_eq!(name(&write("data.bin", bytes)), Some("TIFF stack"), "{bytes:?}");
+        }
+        assert_eq!(name(slices), Some("folder of TIFF slices"));
+        assert_eq!(name(&write("text.TIF", b"no image")), Some("TIFF stack"));
+        for other in [store, &write("marks.csv", b"x,y,z\n"), &write("empty", b""), &folder.path().join("missing")] {
+            assert_eq!(name(other), None, "{}", other.display());
+            let error = open_stack(other, Select::default()).err().unwrap();
+            assert_eq!((error.exit_code(), error.path()), (2, Some(other)));
+        }
+    }
+}

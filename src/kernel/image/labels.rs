@@ -1,0 +1,47 @@
+//! Label volumes: painting an object where its segmentation function says so, and counting voxels.
+
+use std::collections::BTreeMap;
+
+use crate::grid::Box3;
+use crate::store::Element;
+
+/// Writes `label` into `out` where u is at least 1/2. `u` is dense `[z][y][x]` over the box `from`, `out` over the box
+/// `to`, which holds `from`.
+pub fn paint<T: Element>(u: &[f32], from: &Box3, label: T, to: &Box3, out: &mut [T]) {
+    let width = from.shape()[0] as usize;
+    for (row, (y, z)) in u.chunks_exact(width).zip(from.rows()) {
+        let out = &mut out[to.offset_of([from.lo[0], y, z])..][..width];
+        out.iter_mut().zip(row).filter(|(_, u)| **u >= 0.5).for_each(|(o, _)| *o = label);
+    }
+}
+
+/// Voxels of each label but 0.
+#[must_use]
+pub fn count(labels: &[u32]) -> BTreeMap<u32, u64> {
+    let mut counts = BTreeMap::new();
+    // Equal labels come in long runs.
+    for run in labels.chunk_by(|a, b| a == b).filter(|run| run[0] > 0) {
+        *counts.entry(run[0]).or_default() += run.len() as u64;
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn objects_are_painted_from_one_half_on() {
+        let (from, to) = (Box3::new([1, 0, 3], [3, 2, 4]), Box3::new([0, 0, 3], [4, 2, 4]));
+        let mut out = [9_u8, 9, 9, 9, 0, 0, 0, 0];
+        paint(&[0.5, 0.4999, 0.0, 1.0], &from, 3, &to, &mut out);
+        assert_eq!(out, [9, 3, 9, 9, 0, 0, 3, 0]);
+    }
+
+    #[test]
+    fn labels_are_counted_wherever_they_stand() {
+        let counts = count(&[0, 2, 2, 0, 1, 2, 70_000, 1, 1]);
+        assert_eq!(counts, BTreeMap::from([(1, 3), (2, 3), (70_000, 1)]));
+        assert!(count(&[0, 0]).is_empty() && count(&[]).is_empty());
+    }
+}

@@ -1,0 +1,104 @@
+//! Which basins persist (algorithms: section 5, "Automatic beta"): the pieces of all bricks, joined where they touch,
+//! their depths compared with their saddles.
+//!
+//! A forest over the pieces (union-find, paths halved on the way). The smallest number of a tree is its root, so names
+//! and sums do not depend on the order in which pieces are joined; depths and saddles are only compared.
+
+use super::basins::Piece;
+
+/// A basin persists when its depth is at least this many times its saddle; noise stays below 1.5.
+pub const PERSISTENCE: f32 = 2.0;
+
+/// Pieces that are being joined.
+#[derive(Clone, Debug)]
+pub struct Joins {
+    pieces: Vec<Piece>,
+    parent: Vec<u32>,
+}
+
+impl Joins {
+    /// Pieces of which none touch yet; they are numbered in this order.
+    #[must_use]
+    pub fn new(pieces: Vec<Piece>) -> Self {
+        let parent = (0..pieces.len() as u32).collect();
+        Self { pieces, parent }
+    }
+
+    /// Joins what touches across a face between two bricks: `labels` of the voxels on its two sides, in the same order,
+    /// 0 for none; `first` are the pieces that label 1 stands for on each side.
+    pub fn across(&mut self, labels: [&[u16]; 2], first: [u32; 2]) {
+        for (&a, &b) in labels[0].iter().zip(labels[1]).filter(|(a, b)| **a != 0 && **b != 0) {
+            self.union(first[0] + u32::from(a) - 1, first[1] + u32::from(b) - 1);
+        }
+    }
+
+    /// Joins everything labelled on a face with the one piece that lies beyond all of it.
+    pub fn beyond(&mut self, labels: &[u16], first: u32, piece: u32) {
+        labels.iter().filter(|label| **label != 0).for_each(|&label| self.union(first + u32::from(label) - 1, piece));
+    }
+
+    /// Adds up what was joined and keeps the basins that persist, in order of their roots; tells for each piece which of
+    /// them it is part of.
+    #[must_use]
+    pub fn persisting(mut self) -> (Vec<Piece>, Vec<Option<u32>>) {
+        let roots: Vec<u32> = (0..self.parent.len() as u32).map(|n| self.root(n)).collect();
+        let mut whole = self.pieces.clone();
+        for (n, &root) in roots.iter().enumerate().filter(|(n, root)| *n as u32 != **root) {
+            let sum = &mut whole[root as usize];
+            sum.voxels += self.pieces[n].voxels;
+            sum.depth = sum.depth.max(self.pieces[n].depth);
+        }
+        let (mut basins, mut names) = (Vec::new(), vec![None; whole.len()]);
+        for (n, piece) in whole.iter().enumerate().filter(|(n, _)| roots[*n] == *n as u32) {
+            if piece.depth > 0.0 && piece.depth >= PERSISTENCE * piece.saddle {
+                names[n] = Some(basins.len() as u32);
+                basins.push(*piece);
+            }
+        }
+        (basins, roots.iter().map(|&root| names[root as usize]).collect())
+    }
+
+    fn root(&mut self, mut n: u32) -> u32 {
+        while self.parent[n as usize] != n {
+            let above = self.parent[self.parent[n as usize] as usize];
+            self.parent[n as usize] = above;
+            n = above;
+        }
+        n
+    }
+
+    fn union(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(voxels: u64, depth: f32, saddle: f32) -> Piece {
+        Piece { voxels, depth, saddle }
+    }
+
+    #[test]
+    fn what_touches_is_one_basin() {
+        // Two bricks with two pieces each, and a far region beyond the second brick.
+        let pieces =
+            vec![piece(5, 1.5, 1.0), piece(7, 1.0, 0.9), piece(1, 1.2, 0.9), piece(2, 1.9, 1.0), piece(64, 2.5, 1.0)];
+        let mut joins = Joins::new(pieces);
+        joins.across([&[0, 1, 2, 1], &[1, 2, 1, 0]], [0, 2]);
+        joins.beyond(&[0, 0, 2], 2, 4);
+        let (basins, names) = joins.persisting();
+        assert_eq!(basins, [piece(71, 2.5, 1.0)], "1.2 over 0.9 is noise");
+        assert_eq!(names, [Some(0), None, None, Some(0), Some(0)]);
+    }
+
+    #[test]
+    fn depth_twice_the_saddle_persists_and_no_depth_never_does() {
+        let joins = Joins::new(vec![piece(1, 1.99, 1.0), piece(1, 2.0, 1.0), piece(9, 0.0, 0.0), piece(1, 1.0, 0.0)]);
+        let (basins, names) = joins.persisting();
+        assert_eq!(basins, [piece(1, 2.0, 1.0), piece(1, 1.0, 0.0)]);
+        assert_eq!(names, [None, Some(0), None, Some(1)]);
+    }
+}

@@ -1,0 +1,88 @@
+//! Signals: a run that is asked to end does so in the stage it is in, in order, and leaves nothing behind.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+
+use crate::common::ball::{Ball, Bench};
+use crate::common::held::{Ended, Held};
+
+const RUN: &str = "segment image.tif --points marks.csv -o out/x.zarr -v";
+const SENTENCE: &str = "strandline: interrupted; nothing was left half-written";
+
+/// True for the line that says how far a slow stage is.
+fn is_progress(line: &str) -> bool {
+    line.contains(" %  ") || line.contains(" steps  ")
+}
+
+#[test]
+fn every_stage_heeds_signals() {
+    let bench = Bench::new(&Ball::small());
+    let Ended { status, said, .. } = Held::start(bench.command(RUN)).finish();
+    assert!(status.success(), "{said}");
+    fs::remove_dir_all(bench.path("out/x.zarr")).unwrap();
+    let lines: Vec<&str> = said.lines().filter(|line| !is_progress(line)).collect();
+    let stages: Vec<&str> = lines.iter().filter_map(|line| Some(line.split_once("  done  ")?.0)).collect();
+    let wanted = [
+        "read stack",
+        "distance 1",
+        "tagging 1",
+        "band 1",
+        "presmoothing 1",
+        "edges 1",
+        "level set 1",
+        "surface 1",
+        "write levelset 1",
+        "write distance 1",
+        "write labels",
+        "write image",
+    ];
+    assert_eq!(stages, wanted);
+    // The line at which a stage ends is said right before the next one begins: that one is interrupted. Before the first
+    // one the settings are said; after the last one nothing is left but to put the output in its place.
+    for (number, line) in lines.iter().enumerate().skip(lines.len() - 1 - stages.len()) {
+        let (signal, code) = if number % 2 == 0 { ("INT", 130) } else { ("TERM", 143) };
+        let mut run = Held::start(bench.command(RUN));
+        run.hold_at(number);
+        run.signal(signal);
+        let Ended { status, said, printed } = run.finish();
+        assert_eq!(status.code(), Some(code), "{signal} at {line:?}: {said}");
+        assert_eq!(said.lines().last(), Some(SENTENCE), "{signal} at {line:?}: {said}");
+        let more = said.lines().skip(1).filter(|line| !is_progress(line)).count();
+        assert_eq!(more, 1, "{signal} at {line:?}: the run goes on: {said}");
+        assert!(printed.is_empty(), "{printed}");
+        for folder in ["out", "scratch"] {
+            assert!(bench.entries(folder).is_empty(), "{signal} at {line:?}: {:?} left", bench.entries(folder));
+        }
+    }
+}
+
+#[test]
+fn a_stage_under_way_is_left() {
+    let bench = Bench::new(&Ball::small());
+    // A level set that never rests: what ends the run is the signal, wherever in the stage it comes.
+    let mut run = Held::start(bench.command(&format!("{RUN} --tol 1e-30 --max-steps 1000000000")));
+    run.hear("edges 1  done");
+    run.signal("INT");
+    let Ended { status, said, .. } = run.finish();
+    assert_eq!((status.code(), said.lines().last()), (Some(130), Some(SENTENCE)), "{said}");
+    assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty());
+}
+
+/// Nothing can be done in order when a process is killed; the next one cleans up after it.
+#[test]
+fn what_a_killed_run_leaves_goes_with_the_next_one() {
+    let bench = Bench::new(&Ball::small());
+    let mut run = Held::start(bench.command(&format!("{RUN} --tol 1e-30 --max-steps 1000000000")));
+    run.hear("edges 1  done");
+    // While a run goes on, another one leaves its store alone.
+    bench.succeed("segment image.tif --points marks.csv -o out/x.zarr -q --max-steps 1");
+    assert_eq!(bench.entries("out").len(), 2, "{:?}", bench.entries("out"));
+    fs::remove_dir_all(bench.path("out/x.zarr")).unwrap();
+    run.signal("KILL");
+    assert_eq!(run.finish().status.code(), None);
+    let left = bench.entries("out");
+    assert!(left.len() == 1 && left[0].starts_with(".x.zarr.partial-"), "{left:?}");
+    bench.succeed("segment image.tif --points marks.csv -o out/x.zarr -q");
+    assert_eq!(bench.entries("out"), ["x.zarr"]);
+}
