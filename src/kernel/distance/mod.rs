@@ -1,7 +1,9 @@
 //! Distance to point sources on one tile: where sources fix voxels, and how sweeps carry them outward.
 
+mod buckets;
 mod diagonals;
 mod directions;
+pub mod fast_marching;
 pub mod fast_sweeping;
 pub mod initialise;
 pub mod method;

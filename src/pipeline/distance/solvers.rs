@@ -11,6 +11,7 @@ use super::{Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
 use crate::grid::BrickSet;
+use crate::kernel::distance::fast_marching::FastMarching;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::precision::Precision;
@@ -43,7 +44,7 @@ pub struct Solver<P> {
 
 /// The distance methods, in the order in which the help lists them.
 #[must_use]
-pub const fn solvers<P: Precision>() -> [Solver<P>; 2] {
+pub const fn solvers<P: Precision>() -> [Solver<P>; 3] {
     [
         Solver {
             name: "fsm",
@@ -62,6 +63,15 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 2] {
             brick: 32,
             state_bytes: 4,
             solve: vector_distance::<P>,
+        },
+        Solver {
+            name: "fmm",
+            about: "fast marching, the Eikonal equation",
+            sweeps: false,
+            keeps_sources: false,
+            brick: 32,
+            state_bytes: size_of::<P>() as u64,
+            solve: fast_marching::<P>,
         },
     ]
 }
@@ -117,6 +127,18 @@ fn fast_sweeping<'a, P: Precision>(
         Schedule::Front => job.front(FastSweeping::<P, P::Fast>::new(spacing)),
         Schedule::Sweep { iterations } => job.sweeps(FastSweeping::<P, f64>::new(spacing), iterations),
     }
+}
+
+fn fast_marching<'a, P: Precision>(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'a>,
+    set: &Arc<BrickSet>,
+    _: Schedule,
+    farthest: f64,
+) -> Result<Solved<'a, P>> {
+    let job = Job { stage, engine, sources, set, farthest };
+    job.front(FastMarching::<P, P::Fast>::new(sources.geometry.spacing))
 }
 
 fn vector_distance<'a, P: Precision>(
