@@ -163,6 +163,6 @@ mod tests {
             assert_eq!(parse_method(solver.name).map(Method::name), Ok(solver.name));
             assert!(solvers_help().contains(solver.name));
         }
-        assert!(parse_method("fmm").unwrap_err().contains("vdt"));
+        assert!(parse_method("fim").unwrap_err().contains("vdt"));
     }
 }

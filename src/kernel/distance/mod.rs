@@ -2,6 +2,7 @@
 
 mod buckets;
 mod diagonals;
+pub mod dijkstra_pythagoras;
 mod directions;
 pub mod fast_marching;
 pub mod fast_sweeping;
@@ -9,6 +10,7 @@ pub mod initialise;
 pub mod method;
 pub mod precision;
 pub mod shape_distance;
+pub mod tracked;
 pub mod triangles;
 pub mod vector_distance;
 pub mod winding_number;

@@ -11,6 +11,7 @@ use super::{Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
 use crate::grid::BrickSet;
+use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
 use crate::kernel::distance::fast_marching::FastMarching;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
@@ -44,7 +45,7 @@ pub struct Solver<P> {
 
 /// The distance methods, in the order in which the help lists them.
 #[must_use]
-pub const fn solvers<P: Precision>() -> [Solver<P>; 3] {
+pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
     [
         Solver {
             name: "fsm",
@@ -72,6 +73,15 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 3] {
             brick: 32,
             state_bytes: size_of::<P>() as u64,
             solve: fast_marching::<P>,
+        },
+        Solver {
+            name: "dp",
+            about: "Dijkstra-Pythagoras, Euclidean to a tracked source",
+            sweeps: false,
+            keeps_sources: true,
+            brick: 32,
+            state_bytes: 4,
+            solve: dijkstra_pythagoras::<P>,
         },
     ]
 }
@@ -162,6 +172,22 @@ fn vector_distance<'a, P: Precision>(
         Schedule::Front => job.front(VectorDistance::<P::Fast>::new(geometry, positions)),
         Schedule::Sweep { iterations } => job.sweeps(VectorDistance::<f64>::new(geometry, positions), iterations),
     }
+}
+
+fn dijkstra_pythagoras<'a, P: Precision>(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'a>,
+    set: &Arc<BrickSet>,
+    _: Schedule,
+    farthest: f64,
+) -> Result<Solved<'a, P>> {
+    let job = Job { stage, engine, sources, set, farthest };
+    let geometry = sources.geometry;
+    if let Some(sets) = sources.sets {
+        return job.front(DijkstraPythagoras::new(geometry, ShapeDistance::new(geometry, sets)));
+    }
+    job.front(DijkstraPythagoras::new(geometry, VectorDistance::<P::Fast>::new(geometry, sources.positions)))
 }
 
 /// What every method is given.
