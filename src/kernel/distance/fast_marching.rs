@@ -217,12 +217,8 @@ impl<P: Precision, A: Real> DistanceMethod for FastMarching<P, A> {
         work.list_beside_fixed(tile);
         let width = WIDTH * self.spacing.iter().copied().fold(f64::INFINITY, f64::min);
         let range = (0..3).map(|a| self.spacing[a] * valid[a] as f64).sum();
-        let changed = pulp::Arch::new().dispatch(March::<P, A> {
-            work,
-            strides,
-            axes: &self.axes,
-            reach: [width, range],
-        });
+        let changed =
+            pulp::Arch::new().dispatch(March::<P, A> { work, strides, axes: &self.axes, reach: [width, range] });
         if changed {
             store(&work.data, tile);
         }
@@ -250,7 +246,9 @@ fn load<P: Precision>(tile: &HaloTile<P>, data: &mut [P::Lane]) {
             let row = (z * pitch + y) * pitch;
             let (from, to) = (&tile.data()[row..][..nx + 2], &mut data[row..][..nx + 2]);
             let beyond = y == 0 || z == 0 || y > ny || z > nz;
-            to.iter_mut().zip(from).for_each(|(to, from)| *to = if beyond { from.lane().marked() } else { from.lane() });
+            to.iter_mut()
+                .zip(from)
+                .for_each(|(to, from)| *to = if beyond { from.lane().marked() } else { from.lane() });
             (to[0], to[nx + 1]) = (to[0].marked(), to[nx + 1].marked());
         }
     }

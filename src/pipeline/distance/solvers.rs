@@ -7,22 +7,38 @@ use super::field::{Solved, Values};
 use super::front::advance_front;
 use super::initialise::initialise;
 use super::sweep::sweep_all;
-use super::{Schedule, Sources};
+use super::textbook::{heap_dijkstra, heap_marching};
+use super::trace::{SourceField, trace_sources};
+use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
-use crate::grid::BrickSet;
+use crate::grid::{BrickSet, Slot};
 use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
 use crate::kernel::distance::fast_marching::FastMarching;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::shape_distance::ShapeDistance;
+use crate::kernel::distance::tracked::TrackedSource;
 use crate::kernel::distance::vector_distance::VectorDistance;
+use crate::kernel::distance::{dijkstra_heap, marching_heap};
 use crate::store::BrickArray;
 
-/// Solves on the bricks of a set, by a schedule, as far as a distance.
+/// Solves on the bricks of a set, by a schedule.
 pub(super) type Solve<P> =
-    for<'a> fn(&Stage<'_>, &Engine, &Sources<'a>, &Arc<BrickSet>, Schedule, f64) -> Result<Solved<'a, P>>;
+    for<'a> fn(&Stage<'_>, &Engine, &Sources<'a>, &Arc<BrickSet>, Schedule, Options) -> Result<Solved<'a, P>>;
+
+/// The order of `--schedule sweep`: that of the textbook.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Textbook {
+    /// Ordered sweeps, brick by brick.
+    Sweeps,
+    /// One heap over the whole volume in memory.
+    Heap {
+        /// Bytes of memory for each voxel.
+        bytes: u64,
+    },
+}
 
 /// One row of the table, for fields stored as `P`.
 #[derive(Clone, Copy, Debug)]
@@ -31,14 +47,18 @@ pub struct Solver<P> {
     pub name: &'static str,
     /// One line for the help.
     pub about: &'static str,
-    /// Whether it can be done by ordered sweeps.
-    pub sweeps: bool,
+    /// The order in which a textbook does it.
+    pub textbook: Textbook,
+    /// Whether it can look at all 26 neighbours.
+    pub takes_all_neighbours: bool,
     /// Whether it keeps the source of each voxel.
     pub keeps_sources: bool,
     /// Edge of bricks that it is fastest with.
     pub brick: i64,
     /// Bytes of a voxel's state.
     pub state_bytes: u64,
+    /// Bytes of a voxel's source, where sources are asked for and not part of the state.
+    pub source_bytes: u64,
     /// Does it.
     pub solve: Solve<P>,
 }
@@ -50,37 +70,45 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
         Solver {
             name: "fsm",
             about: "fast sweeping, the Eikonal equation",
-            sweeps: true,
+            textbook: Textbook::Sweeps,
+            takes_all_neighbours: false,
             keeps_sources: false,
             brick: 32,
             state_bytes: size_of::<P>() as u64,
+            source_bytes: 0,
             solve: fast_sweeping::<P>,
         },
         Solver {
             name: "vdt",
             about: "vector distance transform, Euclidean to a tracked source",
-            sweeps: true,
+            textbook: Textbook::Sweeps,
+            takes_all_neighbours: false,
             keeps_sources: true,
             brick: 32,
             state_bytes: 4,
+            source_bytes: 0,
             solve: vector_distance::<P>,
         },
         Solver {
             name: "fmm",
             about: "fast marching, the Eikonal equation",
-            sweeps: false,
-            keeps_sources: false,
+            textbook: Textbook::Heap { bytes: size_of::<P>() as u64 + 4 + marching_heap::SCRATCH_BYTES },
+            takes_all_neighbours: false,
+            keeps_sources: true,
             brick: 32,
             state_bytes: size_of::<P>() as u64,
+            source_bytes: 4,
             solve: fast_marching::<P>,
         },
         Solver {
             name: "dp",
             about: "Dijkstra-Pythagoras, Euclidean to a tracked source",
-            sweeps: false,
+            textbook: Textbook::Heap { bytes: 4 + dijkstra_heap::SCRATCH_BYTES },
+            takes_all_neighbours: false,
             keeps_sources: true,
             brick: 32,
             state_bytes: 4,
+            source_bytes: 0,
             solve: dijkstra_pythagoras::<P>,
         },
     ]
@@ -98,6 +126,10 @@ impl Method {
     pub const FSM: Self = Self(0);
     /// The vector distance transform.
     pub const VDT: Self = Self(1);
+    /// Fast marching.
+    pub const FMM: Self = Self(2);
+    /// Dijkstra-Pythagoras.
+    pub const DP: Self = Self(3);
 
     /// What `--method` calls it.
     #[must_use]
@@ -129,26 +161,14 @@ fn fast_sweeping<'a, P: Precision>(
     sources: &Sources<'a>,
     set: &Arc<BrickSet>,
     schedule: Schedule,
-    farthest: f64,
+    options: Options,
 ) -> Result<Solved<'a, P>> {
-    let job = Job { stage, engine, sources, set, farthest };
+    let job = Job { stage, engine, sources, set, options };
     let spacing = sources.geometry.spacing;
     match schedule {
         Schedule::Front => job.front(FastSweeping::<P, P::Fast>::new(spacing)),
         Schedule::Sweep { iterations } => job.sweeps(FastSweeping::<P, f64>::new(spacing), iterations),
     }
-}
-
-fn fast_marching<'a, P: Precision>(
-    stage: &Stage<'_>,
-    engine: &Engine,
-    sources: &Sources<'a>,
-    set: &Arc<BrickSet>,
-    _: Schedule,
-    farthest: f64,
-) -> Result<Solved<'a, P>> {
-    let job = Job { stage, engine, sources, set, farthest };
-    job.front(FastMarching::<P, P::Fast>::new(sources.geometry.spacing))
 }
 
 fn vector_distance<'a, P: Precision>(
@@ -157,9 +177,9 @@ fn vector_distance<'a, P: Precision>(
     sources: &Sources<'a>,
     set: &Arc<BrickSet>,
     schedule: Schedule,
-    farthest: f64,
+    options: Options,
 ) -> Result<Solved<'a, P>> {
-    let job = Job { stage, engine, sources, set, farthest };
+    let job = Job { stage, engine, sources, set, options };
     let (geometry, positions) = (sources.geometry, sources.positions);
     if let Some(sets) = sources.sets {
         let method = ShapeDistance::new(geometry, sets);
@@ -174,20 +194,40 @@ fn vector_distance<'a, P: Precision>(
     }
 }
 
+fn fast_marching<'a, P: Precision>(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'a>,
+    set: &Arc<BrickSet>,
+    schedule: Schedule,
+    options: Options,
+) -> Result<Solved<'a, P>> {
+    let job = Job { stage, engine, sources, set, options };
+    let (geometry, positions) = (sources.geometry, sources.positions);
+    let method = FastMarching::<P, P::Fast>::new(geometry.spacing);
+    match (schedule, sources.sets) {
+        (Schedule::Front, _) => job.front_then_sources(method),
+        (_, Some(sets)) => job.heap_marching(method, &ShapeDistance::new(geometry, sets)),
+        (_, None) => job.heap_marching(method, &VectorDistance::<f64>::new(geometry, positions)),
+    }
+}
+
 fn dijkstra_pythagoras<'a, P: Precision>(
     stage: &Stage<'_>,
     engine: &Engine,
     sources: &Sources<'a>,
     set: &Arc<BrickSet>,
-    _: Schedule,
-    farthest: f64,
+    schedule: Schedule,
+    options: Options,
 ) -> Result<Solved<'a, P>> {
-    let job = Job { stage, engine, sources, set, farthest };
-    let geometry = sources.geometry;
-    if let Some(sets) = sources.sets {
-        return job.front(DijkstraPythagoras::new(geometry, ShapeDistance::new(geometry, sets)));
+    let job = Job { stage, engine, sources, set, options };
+    let (geometry, positions) = (sources.geometry, sources.positions);
+    match (schedule, sources.sets) {
+        (Schedule::Front, Some(sets)) => job.front_dijkstra(ShapeDistance::new(geometry, sets)),
+        (Schedule::Front, None) => job.front_dijkstra(VectorDistance::<P::Fast>::new(geometry, positions)),
+        (_, Some(sets)) => job.heap_dijkstra(ShapeDistance::new(geometry, sets)),
+        (_, None) => job.heap_dijkstra(VectorDistance::<f64>::new(geometry, positions)),
     }
-    job.front(DijkstraPythagoras::new(geometry, VectorDistance::<P::Fast>::new(geometry, sources.positions)))
 }
 
 /// What every method is given.
@@ -196,22 +236,62 @@ struct Job<'j, 'a> {
     engine: &'j Engine,
     sources: &'j Sources<'a>,
     set: &'j Arc<BrickSet>,
-    farthest: f64,
+    options: Options,
 }
 
 impl<'a> Job<'_, 'a> {
-    fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+    /// A method's start: its state with the voxels that sources fix, the bricks that hold any, their number.
+    fn start<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, Vec<Slot>, u64)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
         let (start, fixed) = initialise::<M>(self.stage, self.sources, &state)?;
-        advance_front(self.stage, &method, &state, &start, self.sources.geometry.spacing, self.farthest)?;
+        Ok((state, start, fixed))
+    }
+
+    fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+        let (state, start, fixed) = self.start::<M>()?;
+        let spacing = self.sources.geometry.spacing;
+        advance_front(self.stage, &method, &state, &start, spacing, self.options.farthest)?;
         Ok(self.solved(method, state, fixed))
     }
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
-        let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state)?;
+        let (state, start, fixed) = self.start::<M>()?;
         sweep_all(self.stage, &method, &state, &start, iterations)?;
         Ok(self.solved(method, state, fixed))
+    }
+
+    /// Distances, and then their sources, where these are asked for.
+    fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+        let (state, start, fixed) = self.start::<M>()?;
+        let geometry = self.sources.geometry;
+        advance_front(self.stage, &method, &state, &start, geometry.spacing, self.options.farthest)?;
+        if !self.options.sources {
+            return Ok(self.solved(method, state, fixed));
+        }
+        let (sources, start, _) = self.start::<ShapeDistance<'_>>()?;
+        trace_sources(self.stage, geometry, &state, &sources, &start)?;
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
+    }
+
+    fn front_dijkstra<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+        self.front(DijkstraPythagoras::new(self.sources.geometry, sources))
+    }
+
+    fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
+        let (state, _, fixed) = self.start::<S>()?;
+        heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
+        Ok(self.solved(method, state, fixed))
+    }
+
+    fn heap_marching<P: Precision, M: DistanceMethod<State = P> + 'a, S: TrackedSource>(
+        &self,
+        method: M,
+        start: &S,
+    ) -> Result<Solved<'a, P>> {
+        let (sources, _, fixed) = self.start::<S>()?;
+        let state = BrickArray::new(self.engine.scratch(), self.set)?;
+        heap_marching(self.engine, self.sources.geometry, start, self.options.sources, &state, &sources)?;
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
     }
 
     fn solved<P: Precision, M: DistanceMethod + 'a>(
@@ -220,7 +300,7 @@ impl<'a> Job<'_, 'a> {
         state: BrickArray<M::State>,
         fixed_voxels: u64,
     ) -> Solved<'a, P> {
-        let values = Arc::new(Values { method, state, farthest: self.farthest });
+        let values = Arc::new(Values { method, state, farthest: self.options.farthest });
         Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels }
     }
 }
