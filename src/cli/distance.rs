@@ -186,18 +186,15 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     let field = &args.field;
     let row = field.method.solver::<f32>();
     let sweeps = field.schedule == ScheduleArg::Sweep;
-    if field.neighbours == Neighbours::All && !row.takes_all_neighbours {
-        return Err(Error::usage(format!("--method {} has no use for --neighbours 26; leave it out", row.name)));
-    }
-    if sweeps && field.neighbours == Neighbours::All && row.textbook == Textbook::Sweeps {
-        return Err(Error::usage("bricks cannot keep the textbook's order of 26 neighbours; leave --schedule out"));
+    if field.neighbours == Neighbours::All && !(sweeps && row.takes_all_neighbours) {
+        return Err(Error::usage("--neighbours 26 is for --method dp with --schedule sweep; leave it out"));
     }
     if sweeps && field.max_distance.is_some() {
         return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
     }
     if !row.keeps_sources && (field.labels || field.closest_point) {
         return Err(Error::usage(format!(
-            "--method {} keeps no sources, which --labels and --closest-point are made of; give --method vdt",
+            "--method {} keeps no sources, which --labels and --closest-point are made of; give --method vdt, fmm or dp",
             row.name
         )));
     }

@@ -104,7 +104,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             name: "dp",
             about: "Dijkstra-Pythagoras, Euclidean to a tracked source",
             textbook: Textbook::Heap { bytes: 4 + dijkstra_heap::SCRATCH_BYTES },
-            takes_all_neighbours: false,
+            takes_all_neighbours: true,
             keeps_sources: true,
             brick: 32,
             state_bytes: 4,
