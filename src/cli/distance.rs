@@ -21,7 +21,7 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::precision::Precision;
-use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, Schedule, Textbook, distance};
+use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, SOLVERS, Schedule, Textbook, distance};
 use crate::store::{Scratch, free_space};
 
 /// A distance that is ready to be computed: all inputs are read and checked.
@@ -186,16 +186,21 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     let field = &args.field;
     let row = field.method.solver::<f32>();
     let sweeps = field.schedule == ScheduleArg::Sweep;
-    if field.neighbours == Neighbours::All && !(sweeps && row.takes_all_neighbours) {
-        return Err(Error::usage("--neighbours 26 is for --method dp with --schedule sweep; leave it out"));
+    if field.neighbours == Neighbours::All && !row.takes_all_neighbours {
+        return Err(Error::usage(format!("--method {} looks at 6 neighbours; leave --neighbours out", row.name)));
+    }
+    if sweeps && field.neighbours == Neighbours::All && row.textbook == Textbook::Sweeps {
+        return Err(Error::usage("sweeps by bricks cannot keep the order of 26 neighbours; leave --schedule out"));
     }
     if sweeps && field.max_distance.is_some() {
         return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
     }
     if !row.keeps_sources && (field.labels || field.closest_point) {
+        let keeping: Vec<&str> = SOLVERS.iter().filter(|row| row.keeps_sources).map(|row| row.name).collect();
         return Err(Error::usage(format!(
-            "--method {} keeps no sources, which --labels and --closest-point are made of; give --method vdt, fmm or dp",
-            row.name
+            "--method {} keeps no sources, which --labels and --closest-point are made of; give one of {}",
+            row.name,
+            keeping.join(", ")
         )));
     }
     if field.iterations == 0 {

@@ -58,8 +58,7 @@ pub(super) struct FieldArgs {
     /// vdt), one heap over the whole volume in memory (fmm, dp)
     #[arg(long, value_enum, default_value_t = ScheduleArg::Front)]
     pub(super) schedule: ScheduleArg,
-    /// Whose sources a voxel is offered with dp and --schedule sweep: the 6 neighbours across its faces, or all 26, which
-    /// loses fewer
+    /// Whose sources a voxel is offered with vdt and dp: the 6 neighbours across its faces, or all 26, which loses fewer
     #[arg(long, value_name = "6|26", value_parser = parse_neighbours, default_value = "6")]
     pub(super) neighbours: Neighbours,
     /// Iterations of eight passes each with --schedule sweep; fewer when one changes nothing

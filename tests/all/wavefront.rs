@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 
 use proptest::prelude::*;
-use strandline::grid::{Box3, Geometry, PointBins};
+use strandline::grid::{Box3, DataSets, Geometry, PointBins, TriangleBins};
 use strandline::kernel::distance::Neighbours;
 use strandline::kernel::distance::initialise::Cube;
 use strandline::kernel::distance::precision::Precision;
@@ -13,6 +13,7 @@ use strandline::pipeline::distance::{Method, Options, Schedule, Sources};
 
 use crate::common::clouds::{grid_around, sponge};
 use crate::common::lab::{Lab, PlainGrid, dense};
+use crate::common::meshes;
 use crate::distance::{assert_same_bits, fixing_sources, godunov, grid, position, random_cloud, scattered, squared};
 
 const TEXTBOOK: Schedule = Schedule::Sweep { iterations: 1 };
@@ -217,6 +218,7 @@ fn check_front_fmm(labs: &[Lab], geometry: &Geometry, cloud: &[[f64; 3]], edges:
             let fmm = (Method::FMM, Schedule::Front, Neighbours::Faces);
             let found = ours::<f32>(lab, geometry, cloud, edge, fmm, Cube::CELL);
             let (apart, allowed) = (most_ulps(&found.0, &expected), allowed(geometry));
+            println!("{what}: {apart}");
             assert!(apart <= allowed, "{what}: {apart} units of the last place");
             assert_eq!(found.1, sources_of(geometry, cloud, &found.0), "{what}");
             if let Some(first) = &first {
@@ -261,8 +263,83 @@ fn every_order_of_dp_is_nearly_everywhere_exact() {
             let found = labs.each_ref().map(|lab| ours::<f32>(lab, &geometry, &cloud, edge, dp, Cube::CELL));
             assert!(found[1] == found[0] && found[2] == found[0], "{schedule:?}, bricks of {edge}");
             let (count, most) = excess(&geometry, &cloud, &found[0].0);
-            assert!(most < 0.1 * spacing[0], "{schedule:?}, bricks of {edge}: {most}");
+            println!("{schedule:?}, bricks of {edge}: {count} voxels, by {most} at most");
+            // The heap never looks at a frozen voxel again.
+            let allowed = if schedule == Schedule::Front { 0.1 } else { 0.25 };
+            assert!(most < allowed * spacing[0], "{schedule:?}, bricks of {edge}: {most}");
             assert!(count * 1000 < found[0].0.len(), "{schedule:?}, bricks of {edge}: {count} voxels");
+        }
+    }
+}
+
+/// The end of VDT and DP in the front: no voxel has a neighbour with a nearer source, but for the rounding of f32.
+#[test]
+fn no_neighbour_knows_a_nearer_source() {
+    let labs = [Lab::new(1), Lab::new(2), Lab::new(4)];
+    for (seed, spacing) in [[0.5; 3], [0.4, 0.4, 1.3]].into_iter().enumerate() {
+        let geometry = grid([45, 37, 30], spacing);
+        let cloud = random_cloud(&geometry, 120, 90 + seed as u64);
+        let fixing = fixing_sources(&geometry, &cloud);
+        let voxels: Vec<[i64; 3]> = (PlainGrid { shape: geometry.shape }).voxels().collect();
+        for (method, neighbours) in [
+            (Method::VDT, Neighbours::Faces),
+            (Method::VDT, Neighbours::All),
+            (Method::DP, Neighbours::Faces),
+            (Method::DP, Neighbours::All),
+        ] {
+            for edge in [8, 16, 32] {
+                let what = format!("{method:?}, {neighbours:?}, {spacing:?}, bricks of {edge}");
+                let order = (method, Schedule::Front, neighbours);
+                let found = labs.each_ref().map(|lab| ours::<f32>(lab, &geometry, &cloud, edge, order, Cube::CELL));
+                assert!(found[1] == found[0] && found[2] == found[0], "{what}: threads");
+                let s = &found[0].1;
+                for at in (0..s.len()).filter(|&at| fixing[at].is_none()) {
+                    let distance = |s: Option<usize>| squared(position(&geometry, voxels[at]), cloud[s.expect("all")]);
+                    let kept = distance(s[at]);
+                    for (q, _) in beside(&geometry, voxels[at], neighbours) {
+                        assert!(distance(s[q]) > kept * (1.0 - 1e-5) - 1e-12, "{what}: {:?}", voxels[at]);
+                    }
+                }
+                println!("{what}: {:?} beyond the nearest point", excess(&geometry, &cloud, &found[0].0));
+            }
+        }
+    }
+}
+
+/// Triangles instead of points: a box, whose distance is a formula.
+#[test]
+fn a_box_of_triangles_has_its_distance() {
+    let lab = Lab::new(2);
+    let geometry = Geometry { shape: [40, 33, 37], spacing: [0.1, 0.13, 0.11], origin: [-1.0; 3], unit: None };
+    let (low, high) = ([0.03, -0.21, 0.4], [1.72, 2.05, 1.61]);
+    let mut sets = DataSets::default();
+    sets.add_mesh(&meshes::cuboid(low, high));
+    let exact = |v: [i64; 3]| {
+        let p = position(&geometry, v);
+        let beyond: [f64; 3] = std::array::from_fn(|a| (low[a] - p[a]).max(p[a] - high[a]));
+        let most = beyond.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if most <= 0.0 { -most } else { beyond.iter().map(|b| b.max(0.0).powi(2)).sum::<f64>().sqrt() }
+    };
+    for (schedule, neighbours) in
+        [(Schedule::Front, Neighbours::Faces), (Schedule::Front, Neighbours::All), (TEXTBOOK, Neighbours::Faces)]
+    {
+        let set = dense(geometry.shape, 16);
+        let (bins, triangles) =
+            (PointBins::new(*set.grid(), &geometry, &[]), TriangleBins::new(*set.grid(), &geometry, &sets.mesh));
+        let sources = Sources {
+            mesh: Some((&sets.mesh, &triangles)),
+            sets: Some(&sets),
+            ..Sources::cloud(&geometry, &[], &bins)
+        };
+        let stage = lab.engine.stage("distance", 0);
+        let options = Options { farthest: f64::INFINITY, neighbours, sources: true };
+        let solve = Method::DP.solver::<f32>().solve;
+        let solved = solve(&stage, &lab.engine, &sources, &set, schedule, options).expect("room for a distance");
+        let part = Box3::from_shape(geometry.shape);
+        let mut values = vec![0.0_f32; part.len()];
+        solved.values.read_box(&part, &mut values).expect("memory can be read");
+        for (v, d) in (PlainGrid { shape: geometry.shape }).voxels().zip(&values) {
+            assert!((f64::from(*d) - exact(v)).abs() < 1e-5, "{schedule:?}, {neighbours:?}: {v:?} has {d}");
         }
     }
 }

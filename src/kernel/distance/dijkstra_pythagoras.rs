@@ -4,14 +4,16 @@
 //! voxels, is carried through it in order of exact distance: a voxel offers its source to its neighbours, which keep
 //! it where it is nearer than theirs. A voxel whose nearest source arrives late takes it up again: the march ends when
 //! no voxel knows a nearer source than its neighbour has. In and out: a grown tile of source indices, the top bit set
-//! on voxels that a source fixed. Halo 1, faces. Scratch: about 20 bytes a voxel. A voxel asks for about five distances.
+//! on voxels that a source fixed. Halo 1: faces, or all of it where sources are offered to all 26 neighbours. Scratch:
+//! about 20 bytes a voxel. A voxel asks for about five distances.
 
+use super::Neighbours;
 use super::buckets::Buckets;
 use super::method::DistanceMethod;
 use super::precision::Real;
 use super::tracked::{TrackedSource, has_source, source_of};
 use super::vector_distance::FIXED;
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, Geometry, NEIGHBOURS_26};
 use crate::tile::HaloTile;
 
 /// Width of a bucket, in the smallest spacing.
@@ -22,13 +24,14 @@ const WIDTH: f64 = 0.5;
 pub struct DijkstraPythagoras<S> {
     sources: S,
     spacing: [f64; 3],
+    neighbours: Neighbours,
 }
 
 impl<S: TrackedSource> DijkstraPythagoras<S> {
-    /// To those sources on a grid.
+    /// To those sources on a grid, offered to those neighbours.
     #[must_use]
-    pub fn new(geometry: &Geometry, sources: S) -> Self {
-        Self { sources, spacing: geometry.spacing }
+    pub fn new(geometry: &Geometry, neighbours: Neighbours, sources: S) -> Self {
+        Self { sources, spacing: geometry.spacing, neighbours }
     }
 }
 
@@ -36,6 +39,8 @@ impl<S: TrackedSource> DijkstraPythagoras<S> {
 #[derive(Debug)]
 pub struct Work<A> {
     pitch: usize,
+    valid: [usize; 3],
+    neighbours: Neighbours,
     /// The grown tile; ghosts count as fixed.
     source: Vec<u32>,
     /// Squared distances to the sources; below zero where nobody asked yet.
@@ -53,6 +58,8 @@ impl<A: Real> Work<A> {
         let len = pitch.pow(3);
         Self {
             pitch,
+            valid: [edge; 3],
+            neighbours: Neighbours::Faces,
             source: vec![FIXED; len],
             squared: vec![A::default(); len],
             at: std::array::from_fn(|_| vec![A::default(); pitch]),
@@ -66,6 +73,7 @@ impl<A: Real> Work<A> {
         self.source.copy_from_slice(tile.data());
         self.squared.fill(A::of(-1.0));
         let (valid, pitch) = (tile.valid(), self.pitch);
+        self.valid = valid;
         let strides = [1, pitch, pitch * pitch];
         for axis in 0..3 {
             for n in 0..pitch {
@@ -112,9 +120,12 @@ impl<A: Real> Work<A> {
         }
     }
 
-    /// Offers a voxel's source to its six neighbours.
+    /// Offers a voxel's source to its neighbours in the tile.
     #[inline(always)]
     fn offer_around<S: TrackedSource<Number = A>>(&mut self, sources: &S, [x, y, z]: [usize; 3]) {
+        if self.neighbours == Neighbours::All {
+            return self.offer_to_all(sources, [x, y, z]);
+        }
         let place = (z * self.pitch + y) * self.pitch + x;
         self.offer(sources, place, [x - 1, y, z]);
         self.offer(sources, place, [x + 1, y, z]);
@@ -124,8 +135,36 @@ impl<A: Real> Work<A> {
         self.offer(sources, place, [x, y, z + 1]);
     }
 
+    /// Offers the source of a voxel or ghost to those of its 26 neighbours that lie in the tile.
+    fn offer_to_all<S: TrackedSource<Number = A>>(&mut self, sources: &S, at: [usize; 3]) {
+        let place = (at[2] * self.pitch + at[1]) * self.pitch + at[0];
+        for offset in NEIGHBOURS_26 {
+            let beside: [usize; 3] = std::array::from_fn(|a| at[a].wrapping_add_signed(offset[a] as isize));
+            if (0..3).all(|a| (1..=self.valid[a]).contains(&beside[a])) {
+                self.offer(sources, place, beside);
+            }
+        }
+    }
+
+    /// Offers what ghosts have across edges and corners too.
+    fn offer_all_ghosts<S: TrackedSource<Number = A>>(&mut self, sources: &S) {
+        let valid = self.valid;
+        for z in 0..valid[2] + 2 {
+            for y in 0..valid[1] + 2 {
+                let inside = (1..=valid[1]).contains(&y) && (1..=valid[2]).contains(&z);
+                let step = if inside { valid[0] + 1 } else { 1 };
+                for x in (0..valid[0] + 2).step_by(step) {
+                    if has_source(self.source[(z * self.pitch + y) * self.pitch + x]) {
+                        self.offer_to_all(sources, [x, y, z]);
+                    }
+                }
+            }
+        }
+    }
+
     /// Offers what ghosts and fixed voxels have.
-    fn offer_fixed<S: TrackedSource<Number = A>>(&mut self, sources: &S, valid: [usize; 3]) {
+    fn offer_fixed<S: TrackedSource<Number = A>>(&mut self, sources: &S) {
+        let valid = self.valid;
         let strides = [1, self.pitch, self.pitch * self.pitch];
         for z in 1..=valid[2] {
             for y in 1..=valid[1] {
@@ -136,6 +175,9 @@ impl<A: Real> Work<A> {
                     }
                 }
             }
+        }
+        if self.neighbours == Neighbours::All {
+            return self.offer_all_ghosts(sources);
         }
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -200,7 +242,8 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
     fn settle(&self, tile: &mut HaloTile<u32>, work: &mut Self::Work, part: &Box3) -> bool {
         let valid = tile.valid();
         work.load(&self.sources, tile, part);
-        work.offer_fixed(&self.sources, valid);
+        work.neighbours = self.neighbours;
+        work.offer_fixed(&self.sources);
         let width = WIDTH * self.spacing.iter().copied().fold(f64::INFINITY, f64::min);
         let range = (0..3).map(|a| self.spacing[a] * valid[a] as f64).sum();
         let changed = work.march(&self.sources, width, range);
@@ -208,6 +251,10 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
             work.store(tile);
         }
         changed
+    }
+
+    fn neighbours(&self) -> Neighbours {
+        self.neighbours
     }
 
     fn entering(&self, beside: u32, state: u32, voxel: [i64; 3]) -> Option<f64> {

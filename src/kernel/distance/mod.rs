@@ -1,5 +1,6 @@
 //! Distance to point sources on one tile: where sources fix voxels, and how sweeps carry them outward.
 
+pub mod all_neighbours;
 mod buckets;
 mod diagonals;
 pub mod dijkstra_heap;

@@ -13,6 +13,8 @@ use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
 use crate::grid::{BrickSet, Slot};
+use crate::kernel::distance::Neighbours;
+use crate::kernel::distance::all_neighbours::AllNeighbours;
 use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
 use crate::kernel::distance::fast_marching::FastMarching;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
@@ -82,7 +84,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             name: "vdt",
             about: "vector distance transform, Euclidean to a tracked source",
             textbook: Textbook::Sweeps,
-            takes_all_neighbours: false,
+            takes_all_neighbours: true,
             keeps_sources: true,
             brick: 32,
             state_bytes: 4,
@@ -184,12 +186,12 @@ fn vector_distance<'a, P: Precision>(
     if let Some(sets) = sources.sets {
         let method = ShapeDistance::new(geometry, sets);
         return match schedule {
-            Schedule::Front => job.front(method),
+            Schedule::Front => job.front_vector(method),
             Schedule::Sweep { iterations } => job.sweeps(method, iterations),
         };
     }
     match schedule {
-        Schedule::Front => job.front(VectorDistance::<P::Fast>::new(geometry, positions)),
+        Schedule::Front => job.front_vector(VectorDistance::<P::Fast>::new(geometry, positions)),
         Schedule::Sweep { iterations } => job.sweeps(VectorDistance::<f64>::new(geometry, positions), iterations),
     }
 }
@@ -273,8 +275,15 @@ impl<'a> Job<'_, 'a> {
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
     }
 
+    fn front_vector<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+        match self.options.neighbours {
+            Neighbours::Faces => self.front(sources),
+            Neighbours::All => self.front(AllNeighbours::new(sources)),
+        }
+    }
+
     fn front_dijkstra<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
-        self.front(DijkstraPythagoras::new(self.sources.geometry, sources))
+        self.front(DijkstraPythagoras::new(self.sources.geometry, self.options.neighbours, sources))
     }
 
     fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {

@@ -72,7 +72,9 @@ impl BoxSource<u32> for SourceField {
 
     fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
         self.0.read_box(part, out)?;
-        out.iter_mut().for_each(|state| *state &= !FIXED);
+        for state in out {
+            *state &= !FIXED;
+        }
         Ok(())
     }
 }
