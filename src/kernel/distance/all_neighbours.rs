@@ -1,5 +1,4 @@
-//! VDT that looks at the sources of all 26 neighbours (Kósa & Mikula 2023, section 2.4; Danielsson 1980): it loses fewer of
-//! them than with six.
+//! VDT that looks at the sources of all 26 neighbours (Danielsson 1980; the papers went from 26 to 6: Kósa & Mikula 2023).
 //!
 //! State, distances and ties are those of `vector_distance`; of equally near sources the first counts, z slowest. Rows
 //! of a tile are swept one voxel after the other: what is beside a voxel across an edge may be ahead of it or behind,

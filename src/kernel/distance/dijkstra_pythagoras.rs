@@ -3,7 +3,9 @@
 //! State, distances and ties are those of VDT; only the order is another. What enters a tile, from ghosts and fixed
 //! voxels, is carried through it in order of exact distance: a voxel offers its source to its neighbours, which keep
 //! it where it is nearer than theirs. A voxel whose nearest source arrives late takes it up again: the march ends when
-//! no voxel knows a nearer source than its neighbour has. In and out: a grown tile of source indices, the top bit set
+//! no neighbour of a voxel has a nearer source. Over scattered points fewer than one voxel in 1000 is farther from its
+//! source than from the nearest point, by less than 0.1 h; in the textbook's heap (`dijkstra_heap`), which looks at a
+//! voxel once, by less than 0.25 h (tests: `wavefront`). In and out: a grown tile of source indices, the top bit set
 //! on voxels that a source fixed. Halo 1: faces, or all of it where sources are offered to all 26 neighbours. Scratch:
 //! about 20 bytes a voxel. A voxel asks for about five distances.
 
