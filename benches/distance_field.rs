@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use strandline::exec::{Budget, Cancel, Engine, Silent};
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
-use strandline::pipeline::distance::{Method, Schedule, Sources};
+use strandline::pipeline::distance::{Method, Options, Schedule, Sources};
 use strandline::store::Scratch;
 
 /// The grid points on the surface of the unit cube.
@@ -48,8 +48,8 @@ fn run(n: i64, method: Method, edge: i64, threads: usize) {
         let bins = PointBins::new(*set.grid(), &geometry, &cloud);
         let sources = Sources::cloud(&geometry, &cloud, &bins);
         let stage = engine.stage("distance", 0);
-        let solve = method.solver::<f32>().solve;
-        let solved = solve(&stage, &engine, &sources, &set, Schedule::Front, f64::INFINITY).expect("room");
+        let (solve, options) = (method.solver::<f32>().solve, Options::up_to(f64::INFINITY));
+        let solved = solve(&stage, &engine, &sources, &set, Schedule::Front, options).expect("room");
         let report = stage.finish();
         let solve = started.elapsed().as_secs_f64();
         let stage = engine.stage("measure", 0);

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::distance_args::DistanceJobArgs;
-use super::values::{Crop, Output, parse_crop, parse_method, parse_pair, parse_size, parse_triple, solvers_help};
+use super::values::{
+    Crop, Output, parse_crop, parse_pair, parse_size, parse_sweeping_method, parse_triple, sweeping_solvers_help,
+};
 use crate::pipeline::distance::Method;
 
 /// Finds surfaces in 3-D volumes larger than memory.
@@ -135,7 +137,7 @@ pub(super) struct LevelSetArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Distance")]
 pub(super) struct DistanceArgs {
-    #[arg(long, value_name = "NAME", value_parser = parse_method, default_value = "vdt", help = solvers_help())]
+    #[arg(long, value_name = "NAME", value_parser = parse_sweeping_method, default_value = "vdt", help = sweeping_solvers_help())]
     pub(super) method: Method,
 }
 

@@ -19,8 +19,9 @@ use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
 use crate::grid::{DataSets, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
+use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::precision::Precision;
-use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, Schedule, distance};
+use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, SOLVERS, Schedule, Textbook, distance};
 use crate::store::{Scratch, free_space};
 
 /// A distance that is ready to be computed: all inputs are read and checked.
@@ -113,7 +114,16 @@ impl Job {
 
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, needs: &Needs) -> Result<u64> {
-        let window = Budget { total: self.resources.memory }.window(needs.held)?;
+        let window = Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
+            if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {
+                return error;
+            }
+            Error::usage(format!(
+                "{error}, or leave --schedule out: in the textbook's order {} keeps one heap over all {} voxels in memory",
+                self.settings.method.name(),
+                grouped(self.geometry.domain().volume())
+            ))
+        })?;
         let on_disk = needs.scratch.saturating_sub(window / 2);
         match free_space(&self.resources.scratch) {
             Some(free) if free < on_disk => Err(Error::failed(format!(
@@ -176,16 +186,21 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     let field = &args.field;
     let row = field.method.solver::<f32>();
     let sweeps = field.schedule == ScheduleArg::Sweep;
-    if sweeps && !row.sweeps {
-        return Err(Error::usage(format!("--method {} has no ordered sweeps; leave --schedule out", row.name)));
+    if field.neighbours == Neighbours::All && !row.takes_all_neighbours {
+        return Err(Error::usage(format!("--method {} looks at 6 neighbours; leave --neighbours out", row.name)));
+    }
+    if sweeps && field.neighbours == Neighbours::All && row.textbook == Textbook::Sweeps {
+        return Err(Error::usage("sweeps by bricks cannot keep the order of 26 neighbours; leave --schedule out"));
     }
     if sweeps && field.max_distance.is_some() {
         return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
     }
     if !row.keeps_sources && (field.labels || field.closest_point) {
+        let keeping: Vec<&str> = SOLVERS.iter().filter(|row| row.keeps_sources).map(|row| row.name).collect();
         return Err(Error::usage(format!(
-            "--method {} keeps no sources, which --labels and --closest-point are made of; give --method vdt",
-            row.name
+            "--method {} keeps no sources, which --labels and --closest-point are made of; give one of {}",
+            row.name,
+            keeping.join(", ")
         )));
     }
     if field.iterations == 0 {
@@ -197,6 +212,7 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     Ok(DistanceSettings {
         method: field.method,
         schedule: if sweeps { Schedule::Sweep { iterations: field.iterations } } else { Schedule::Front },
+        neighbours: field.neighbours,
         init: match field.init {
             InitArg::Cell => Init::Cell,
             InitArg::Contiguous => Init::Contiguous,
@@ -277,6 +293,7 @@ struct Settings {
     output: Option<String>,
     method: &'static str,
     schedule: &'static str,
+    neighbours: u32,
     iterations: Option<u32>,
     init: &'static str,
     precision: &'static str,
@@ -299,6 +316,10 @@ impl Settings {
             output: args.output.output.path().map(|path| path.display().to_string()),
             method: settings.method.name(),
             schedule,
+            neighbours: match settings.neighbours {
+                Neighbours::Faces => 6,
+                Neighbours::All => 26,
+            },
             iterations,
             init: match settings.init {
                 Init::Cell => "cell",

@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::args::ResourceArgs;
-use super::values::{Output, parse_method, parse_spacing, parse_triple, parse_whole_triple, solvers_help};
+use super::values::{
+    Output, parse_method, parse_neighbours, parse_spacing, parse_triple, parse_whole_triple, solvers_help,
+};
+use crate::kernel::distance::Neighbours;
 use crate::pipeline::distance::Method;
 
 /// Compute the distance to point clouds and triangle meshes on a grid of any size.
@@ -51,9 +54,13 @@ pub(super) struct GridArgs {
 pub(super) struct FieldArgs {
     #[arg(long, value_name = "NAME", value_parser = parse_method, default_value = "vdt", help = solvers_help())]
     pub(super) method: Method,
-    /// Order of the bricks: as distance reaches them, or ordered passes over all of them, bit for bit the textbook's
+    /// Order of the bricks: as distance reaches them; or the textbook's order, bit for bit: passes over all bricks (fsm,
+    /// vdt), one heap over the whole volume in memory (fmm, dp)
     #[arg(long, value_enum, default_value_t = ScheduleArg::Front)]
     pub(super) schedule: ScheduleArg,
+    /// Whose sources a voxel is offered with vdt and dp: the 6 neighbours across its faces, or all 26, which loses fewer
+    #[arg(long, value_name = "6|26", value_parser = parse_neighbours, default_value = "6")]
+    pub(super) neighbours: Neighbours,
     /// Iterations of eight passes each with --schedule sweep; fewer when one changes nothing
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) iterations: u32,
@@ -107,7 +114,7 @@ pub(super) struct FieldOutputArgs {
 pub(super) enum ScheduleArg {
     /// As distance reaches them, each until nothing in it changes
     Front,
-    /// Ordered passes over all bricks
+    /// As a textbook does it
     Sweep,
 }
 

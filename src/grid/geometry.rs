@@ -28,6 +28,12 @@ impl Geometry {
         std::array::from_fn(|a| self.origin[a] + voxel[a] as f64 * self.spacing[a])
     }
 
+    /// The length of a step of that many voxels along each axis.
+    #[must_use]
+    pub fn length(&self, step: [i64; 3]) -> f64 {
+        (0..3).map(|a| (step[a] as f64 * self.spacing[a]).powi(2)).sum::<f64>().sqrt()
+    }
+
     /// A world position in voxel units, whole numbers at voxel centres.
     #[must_use]
     pub fn to_voxels(&self, position: [f64; 3]) -> [f64; 3] {

@@ -14,17 +14,17 @@ use crate::common::random::Random;
 /// One edge that makes a single brick of every domain here.
 const WHOLE: i64 = 128;
 
-fn position(geometry: &Geometry, v: [i64; 3]) -> [f64; 3] {
+pub(crate) fn position(geometry: &Geometry, v: [i64; 3]) -> [f64; 3] {
     std::array::from_fn(|a| geometry.origin[a] + v[a] as f64 * geometry.spacing[a])
 }
 
-fn squared(p: [f64; 3], q: [f64; 3]) -> f64 {
+pub(crate) fn squared(p: [f64; 3], q: [f64; 3]) -> f64 {
     let (x, y, z) = (p[0] - q[0], p[1] - q[1], p[2] - q[2]);
     x * x + y * y + z * z
 }
 
 /// Alg. 1: for each voxel the source that fixes it, if any. Points whose cell does not start in the grid are left out.
-fn fixing_sources(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<Option<usize>> {
+pub(crate) fn fixing_sources(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<Option<usize>> {
     let grid = PlainGrid { shape: geometry.shape };
     let mut fixing: Vec<Option<usize>> = vec![None; grid.len()];
     for (source, p) in cloud.iter().enumerate() {
@@ -55,7 +55,7 @@ fn sweep_order(shape: [i64; 3], sweep: usize) -> impl Iterator<Item = [i64; 3]> 
 }
 
 /// The upwind solution by the weighted mean m of the neighbours taken: `sum w (x - m)^2 = 1 - sum w (a - m)^2`.
-fn godunov(mut axes: [(f64, f64); 3]) -> f64 {
+pub(crate) fn godunov(mut axes: [(f64, f64); 3]) -> f64 {
     axes.sort_by(|p, q| p.0.total_cmp(&q.0));
     let mut x = f64::INFINITY;
     for taken in 1..=3 {
@@ -135,7 +135,7 @@ fn ours(
 }
 
 #[track_caller]
-fn assert_same_bits(found: &[f32], expected: &[f32], what: &str) {
+pub(crate) fn assert_same_bits(found: &[f32], expected: &[f32], what: &str) {
     assert_eq!(found.len(), expected.len());
     for (at, (f, e)) in found.iter().zip(expected).enumerate() {
         assert_eq!(f.to_bits(), e.to_bits(), "{what}: voxel {at} has {f} for {e}");
@@ -143,7 +143,7 @@ fn assert_same_bits(found: &[f32], expected: &[f32], what: &str) {
 }
 
 /// Random points: anywhere in the domain or a little outside, some on grid points, some given twice.
-fn random_cloud(geometry: &Geometry, count: usize, seed: u64) -> Vec<[f64; 3]> {
+pub(crate) fn random_cloud(geometry: &Geometry, count: usize, seed: u64) -> Vec<[f64; 3]> {
     let mut random = Random(seed);
     let mut cloud: Vec<[f64; 3]> = Vec::new();
     for n in 0..count {
@@ -158,7 +158,7 @@ fn random_cloud(geometry: &Geometry, count: usize, seed: u64) -> Vec<[f64; 3]> {
     cloud
 }
 
-fn grid(shape: [i64; 3], spacing: [f64; 3]) -> Geometry {
+pub(crate) fn grid(shape: [i64; 3], spacing: [f64; 3]) -> Geometry {
     Geometry { shape, spacing, origin: [-1.25, 0.5, 30.1], unit: None }
 }
 
@@ -207,7 +207,7 @@ fn without_a_point_in_the_grid_nothing_is_reached() {
 }
 
 /// Points at least four voxels apart along some axis: no voxel that one of them fixes is nearer to another.
-fn scattered(geometry: &Geometry, count: usize, seed: u64) -> Vec<[f64; 3]> {
+pub(crate) fn scattered(geometry: &Geometry, count: usize, seed: u64) -> Vec<[f64; 3]> {
     let mut random = Random(seed);
     let mut cloud: Vec<[f64; 3]> = Vec::new();
     while cloud.len() < count {

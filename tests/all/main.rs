@@ -14,6 +14,7 @@ mod mesh_sources;
 mod points;
 mod surfaces;
 mod triangle_distance;
+mod wavefront;
 
 mod cli;
 mod layering;

@@ -2,6 +2,7 @@
 //!
 //! A new method is one file that implements [`DistanceMethod`] and one row in `pipeline::distance`'s table.
 
+use super::Neighbours;
 use crate::grid::Box3;
 use crate::store::Element;
 use crate::tile::HaloTile;
@@ -24,9 +25,14 @@ pub trait DistanceMethod: Send + Sync {
     /// Buffers for tiles of `edge`^3 voxels.
     fn work(edge: usize) -> Self::Work;
 
-    /// Relaxes a tile, whose lowest voxel lies at `part.lo`, until no voxel of it can fall. Halo 1, faces.
+    /// Relaxes a tile, whose lowest voxel lies at `part.lo`, until no voxel of it can fall. Halo 1.
     /// Returns whether any voxel changed.
     fn settle(&self, tile: &mut HaloTile<Self::State>, work: &mut Self::Work, part: &Box3) -> bool;
+
+    /// Which neighbours a voxel's state is made of: what wakes a brick, and how wide its halo is.
+    fn neighbours(&self) -> Neighbours {
+        Neighbours::Faces
+    }
 
     /// Whether a voxel at `voxel`, whose state is `state`, may fall beside one in state `beside`; the value that would
     /// enter it: what the front schedule orders bricks by.

@@ -1,16 +1,27 @@
 //! Distance to point sources on one tile: where sources fix voxels, and how sweeps carry them outward.
 
+pub mod all_neighbours;
+mod buckets;
 mod diagonals;
+pub mod dijkstra_heap;
+pub mod dijkstra_pythagoras;
 mod directions;
 pub mod extent;
+pub mod fast_marching;
 pub mod fast_sweeping;
 pub mod initialise;
+pub mod marching_heap;
 pub mod method;
 pub mod precision;
 pub mod shape_distance;
+pub mod trace;
+pub mod tracked;
 pub mod triangles;
 pub mod vector_distance;
+mod wavefront;
 pub mod winding_number;
+
+use crate::grid::{FACES, NEIGHBOURS_26};
 
 /// The eight sweep orders: for each axis, whether it runs from low to high; x changes fastest.
 pub const SWEEPS: [[bool; 3]; 8] = {
@@ -22,3 +33,24 @@ pub const SWEEPS: [[bool; 3]; 8] = {
     }
     orders
 };
+
+/// The neighbours whose sources a voxel is offered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Neighbours {
+    /// The six that share a face with it.
+    #[default]
+    Faces,
+    /// All 26.
+    All,
+}
+
+impl Neighbours {
+    /// The steps to them: -x, +x, -y, +y, -z, +z, or all 26, z slowest.
+    #[must_use]
+    pub fn offsets(self) -> Vec<[i64; 3]> {
+        match self {
+            Self::Faces => FACES.iter().map(|face| face.offset()).collect(),
+            Self::All => NEIGHBOURS_26.to_vec(),
+        }
+    }
+}

@@ -44,6 +44,8 @@ pub trait Real:
     fn marked(self) -> Self;
     /// Whether the sign bit is set.
     fn is_marked(self) -> bool;
+    /// The whole number below, or 0 where that is negative; the largest there is for infinity.
+    fn whole(self) -> usize;
     /// The smaller of two values that are numbers.
     #[must_use]
     #[inline(always)]
@@ -90,6 +92,10 @@ macro_rules! real {
             #[inline(always)]
             fn is_marked(self) -> bool {
                 self.is_sign_negative()
+            }
+            #[inline(always)]
+            fn whole(self) -> usize {
+                self as usize
             }
         }
     };

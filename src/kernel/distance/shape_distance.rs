@@ -28,8 +28,13 @@ impl<'a> ShapeDistance<'a> {
         Self { geometry, positions: &sources.positions, triangles }
     }
 
+    /// The coordinate of a voxel's centre along an axis.
+    pub(super) fn coordinate(&self, axis: usize, index: i64) -> f64 {
+        self.geometry.origin[axis] + index as f64 * self.geometry.spacing[axis]
+    }
+
     /// The squared distance of a world position to a source; infinite to none.
-    fn squared(&self, here: [f64; 3], source: u32) -> f64 {
+    pub(super) fn squared(&self, here: [f64; 3], source: u32) -> f64 {
         let source = (source & !FIXED) as usize;
         if let Some(&point) = self.positions.get(source) {
             return squared_distance(here, point);

@@ -36,12 +36,12 @@ impl<'a, A: Real> VectorDistance<'a, A> {
     }
 
     /// The coordinate of a voxel's centre along an axis.
-    fn coordinate(&self, axis: usize, index: i64) -> A {
+    pub(super) fn coordinate(&self, axis: usize, index: i64) -> A {
         let step = index as f64 * self.geometry.spacing[axis];
         A::of(if A::KEEPS_WORLD { self.geometry.origin[axis] + step } else { step })
     }
 
-    fn point(&self, state: u32) -> [A; 3] {
+    pub(super) fn point(&self, state: u32) -> [A; 3] {
         self.points.get((state & !FIXED) as usize).copied().unwrap_or([A::INFINITY; 3])
     }
 }
@@ -65,7 +65,7 @@ struct Nearest<A> {
 }
 
 #[inline(always)]
-fn squared<A: Real>(here: [A; 3], point: [A; 3]) -> A {
+pub(super) fn squared<A: Real>(here: [A; 3], point: [A; 3]) -> A {
     let (dx, dy, dz) = (here[0] - point[0], here[1] - point[1], here[2] - point[2]);
     dx * dx + dy * dy + dz * dz
 }

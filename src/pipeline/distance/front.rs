@@ -2,13 +2,15 @@
 //! nothing in them changes (Chacon & Vladimirsky 2012; algorithms: section 3, "The `front` schedule").
 //!
 //! A round takes all bricks whose smallest entering value lies within a brick's width of the smallest of all, those of
-//! even and of odd parity by turns: no two that share a face at the same time. What a round takes depends on values
-//! alone, so results do not depend on threads, ranks or budget. Values only fall, so the end is the fixed point of
-//! the update: for another brick size it is the same within the rounding of the update.
+//! even and of odd parity by turns: no two that share a face at the same time (where a method looks at 26 neighbours,
+//! by eight turns: no two that share a corner). What a round takes depends on values alone, so results do
+//! not depend on threads, ranks or budget. Values only fall, so the end is the fixed point of the update: for another
+//! brick size it is the same within the rounding of the update.
 
 use crate::error::Result;
 use crate::exec::{Boundary, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{Box3, FACES, Face, Slot};
+use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::method::DistanceMethod;
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -27,11 +29,17 @@ pub(super) fn advance_front<M: DistanceMethod>(
 ) -> Result<()> {
     let set = array.set().clone();
     let grid = *set.grid();
-    let plan = HaloPlan::new(grid, Reach::Faces);
+    let all = method.neighbours() == Neighbours::All;
+    let plan = HaloPlan::new(grid, if all { Reach::All } else { Reach::Faces });
+    let offsets = method.neighbours().offsets();
     let edge = grid.edge() as usize;
     let workers = Workers::new(move || (HaloTile::new(edge), M::work(edge)));
     let width = ROUND_WIDTH * edge as f64 * spacing.iter().copied().fold(f64::INFINITY, f64::min);
-    let parity = |slot: Slot| grid.coords(set.id(slot)).iter().sum::<i64>() & 1;
+    // Bricks of one colour do not touch.
+    let colour_of = |slot: Slot| {
+        let at = grid.coords(set.id(slot)).map(|at| at & 1);
+        if all { at[0] | at[1] << 1 | at[2] << 2 } else { (at[0] + at[1] + at[2]) & 1 }
+    };
     let mut entering = vec![f64::INFINITY; set.len()];
     // Nobody was told of the fixed voxels on these bricks' faces yet.
     let mut untold = vec![false; set.len()];
@@ -45,20 +53,24 @@ pub(super) fn advance_front<M: DistanceMethod>(
         if least.is_infinite() || least > farthest {
             break;
         }
-        for colour in 0..2 {
-            let due = |slot: &Slot| entering[*slot as usize] <= least + width && parity(*slot) == colour;
+        for colour in 0..if all { 8 } else { 2 } {
+            let due = |slot: &Slot| entering[*slot as usize] <= least + width && colour_of(*slot) == colour;
             let wave: Vec<Slot> = (0..set.len() as Slot).filter(due).collect();
             let left = stage.run(&wave, &workers, |(tile, work), &slot| {
                 plan.gather(array, slot, Boundary::Constant(M::UNKNOWN), tile);
                 let part = grid.brick_box(set.id(slot));
                 let changed = method.settle(tile, work, &part);
                 if !changed && !untold[slot as usize] {
-                    return Ok([None; 6]);
+                    return Ok(Vec::new());
                 }
-                let leaving = if untold[slot as usize] || array.unwritten(slot).is_some() {
-                    FACES.map(|face| leaving(method, tile, &part, face, None))
+                let leaving: Vec<Option<f64>> = if all {
+                    offsets.iter().map(|&offset| leaving_anywhere(method, tile, &part, offset)).collect()
+                } else if untold[slot as usize] || array.unwritten(slot).is_some() {
+                    FACES.map(|face| leaving(method, tile, &part, face, None)).to_vec()
                 } else {
-                    FACES.map(|face| array.read_face(slot, face, |told| leaving(method, tile, &part, face, Some(told))))
+                    let told =
+                        |face| array.read_face(slot, face, |told| leaving(method, tile, &part, face, Some(told)));
+                    FACES.map(told).to_vec()
                 };
                 if changed {
                     plan.scatter(tile, array, slot);
@@ -70,8 +82,8 @@ pub(super) fn advance_front<M: DistanceMethod>(
                 untold[slot as usize] = false;
             }
             for (&slot, leaving) in wave.iter().zip(&left) {
-                for (face, value) in FACES.iter().zip(leaving) {
-                    if let (Some(n), Some(value)) = (set.neighbour(slot, face.offset()), value) {
+                for (&offset, value) in offsets.iter().zip(leaving) {
+                    if let (Some(n), Some(value)) = (set.neighbour(slot, offset), value) {
                         entering[n as usize] = entering[n as usize].min(*value);
                     }
                 }
@@ -113,6 +125,33 @@ fn leaving<M: DistanceMethod>(
             let beside = tile.data()[place.wrapping_add_signed(across)];
             if let Some(value) = method.entering(here, beside, voxel) {
                 least = least.min(value);
+            }
+        }
+    }
+    least.is_finite().then_some(least)
+}
+
+/// The smallest value that enters the ghosts in a direction from any of their 26 neighbours in the tile.
+fn leaving_anywhere<M: DistanceMethod>(
+    method: &M,
+    tile: &HaloTile<M::State>,
+    part: &Box3,
+    offset: [i64; 3],
+) -> Option<f64> {
+    let shape = part.shape();
+    let inside = Box3::from_shape(shape);
+    let ghosts = inside.translate(std::array::from_fn(|a| offset[a] * shape[a])).intersect(&inside.grow(1));
+    let at = |[x, y, z]: [i64; 3]| tile.data()[tile.at(x as isize, y as isize, z as isize)];
+    let mut least = f64::INFINITY;
+    for (z, y, x) in ghosts.rows().flat_map(|(y, z)| (ghosts.lo[0]..ghosts.hi[0]).map(move |x| (z, y, x))) {
+        let (ghost, state) = ([x, y, z], at([x, y, z]));
+        let beside = Box3::new(ghost, ghost.map(|v| v + 1)).grow(1).intersect(&inside);
+        for (j, k) in beside.rows() {
+            for i in beside.lo[0]..beside.hi[0] {
+                let voxel = std::array::from_fn(|a| part.lo[a] + ghost[a]);
+                if let Some(value) = method.entering(at([i, j, k]), state, voxel) {
+                    least = least.min(value);
+                }
             }
         }
     }

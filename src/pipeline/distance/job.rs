@@ -6,11 +6,12 @@ use std::sync::Arc;
 use super::contiguous::contiguous_margin;
 use super::output::write_fields;
 use super::sign::Signed;
-use super::{Method, Schedule, Solved, Sources};
+use super::{Method, Options, Schedule, Solved, Sources};
 use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::{BrickGrid, BrickSet, DataSets, Geometry, PointBins, TriangleBins};
 use crate::io::ome_zarr::StoreWriter;
+use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::initialise::Cube;
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::winding_number::WindingTree;
@@ -33,6 +34,8 @@ pub struct DistanceSettings {
     pub method: Method,
     /// In which order.
     pub schedule: Schedule,
+    /// Whose sources a voxel is offered.
+    pub neighbours: Neighbours,
     /// From which start.
     pub init: Init,
     /// As far as that, physical; voxels farther away hold this distance.
@@ -45,6 +48,14 @@ pub struct DistanceSettings {
     pub closest_point: bool,
     /// Edge of the bricks.
     pub brick: i64,
+}
+
+impl DistanceSettings {
+    /// Whether anything asked for is made of sources.
+    #[must_use]
+    pub fn keeps_sources(&self) -> bool {
+        self.labels || self.closest_point
+    }
 }
 
 /// What a job found.
@@ -88,9 +99,13 @@ pub fn distance<P: Precision>(
     stage.finish();
     let stage = engine.stage("distance", set.len() as u64);
     stage.voxels(geometry.domain().volume());
-    let farthest = settings.farthest.unwrap_or(f64::INFINITY);
+    let options = Options {
+        farthest: settings.farthest.unwrap_or(f64::INFINITY),
+        neighbours: settings.neighbours,
+        sources: settings.keeps_sources(),
+    };
     let solve = settings.method.solver::<P>().solve;
-    let mut solved = solve(&stage, engine, &sources, &set, settings.schedule, farthest)?;
+    let mut solved = solve(&stage, engine, &sources, &set, settings.schedule, options)?;
     stage.finish();
     if solved.fixed_voxels == 0 {
         return Err(Error::input(

@@ -15,18 +15,21 @@ mod sign;
 mod solvers;
 mod sources;
 mod sweep;
+mod textbook;
+mod trace;
 
 use std::sync::Arc;
 
 pub use field::{Measured, Solved};
 pub use job::{DistanceFound, DistanceSettings, Init, distance};
 pub use needs::Needs;
-pub use solvers::{Method, SOLVERS, Solver, solvers};
+pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};
 pub use sources::Sources;
 
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::BrickSet;
+use crate::kernel::distance::Neighbours;
 use crate::store::BrickArray;
 
 /// In which order bricks are computed.
@@ -34,11 +37,30 @@ use crate::store::BrickArray;
 pub enum Schedule {
     /// Bricks in the order in which distance reaches them, until nothing changes.
     Front,
-    /// Ordered passes over all bricks, bit for bit the textbook's loops.
+    /// The textbook's order, bit for bit: ordered passes over all bricks, or one heap over the whole volume.
     Sweep {
-        /// Of eight passes each; fewer when one changes nothing.
+        /// Of eight passes each; fewer when one changes nothing. A heap needs no second one.
         iterations: u32,
     },
+}
+
+/// What a method may do beside or instead of the usual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// As far as that, physical units; voxels farther away count as that far.
+    pub farthest: f64,
+    /// Whose sources a voxel is offered, with methods that take all 26.
+    pub neighbours: Neighbours,
+    /// Sources too, with methods that can do without.
+    pub sources: bool,
+}
+
+impl Options {
+    /// Distances up to that one, no more.
+    #[must_use]
+    pub fn up_to(farthest: f64) -> Self {
+        Self { farthest, neighbours: Neighbours::Faces, sources: false }
+    }
 }
 
 /// Distance to the nearest point in f32, physical units, on the bricks of `set`, no value above `farthest`; by one
@@ -54,8 +76,8 @@ pub fn cloud_distance(
     method: Method,
     farthest: f32,
 ) -> Result<BrickArray<f32>> {
-    let schedule = Schedule::Sweep { iterations: 1 };
-    let solved = (method.solver::<f32>().solve)(stage, engine, sources, set, schedule, f64::from(farthest))?;
+    let (schedule, options) = (Schedule::Sweep { iterations: 1 }, Options::up_to(f64::from(farthest)));
+    let solved = (method.solver::<f32>().solve)(stage, engine, sources, set, schedule, options)?;
     let mut distance = BrickArray::with_faces(engine.scratch(), set)?;
     let (edge, len) = (set.grid().edge(), set.grid().brick_len());
     let workers = Workers::new(move || vec![0.0; len]);

@@ -1,6 +1,6 @@
 //! What a distance will take: memory that must be held, temporary fields, time.
 
-use super::DistanceSettings;
+use super::{DistanceSettings, Schedule, Textbook};
 use crate::grid::{BrickGrid, DataSets, Geometry};
 use crate::kernel::distance::precision::Precision;
 
@@ -31,11 +31,22 @@ impl DistanceSettings {
         let grid = BrickGrid::new(geometry.shape, self.brick);
         let brick = grid.brick_len() as u64;
         let faces = 6 * (self.brick * self.brick) as u64;
-        let element = self.method.solver::<P>().state_bytes;
+        let row = self.method.solver::<P>();
+        let element = row.state_bytes + if self.keeps_sources() { row.source_bytes } else { 0 };
         let buffers = threads as u64 * brick * (TILE_BYTES + element + 12);
         let held = buffers + grid.len().saturating_mul(BRICK_BYTES) + sets.len() as u64 * SOURCE_BYTES;
+        let held = held.saturating_add(self.heap_bytes::<P>(geometry));
         let scratch = grid.len().saturating_mul((brick + faces) * element);
         let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
         Needs { held, scratch, seconds }
+    }
+
+    /// What one heap over the whole volume takes, where these settings call for one.
+    #[must_use]
+    pub fn heap_bytes<P: Precision>(&self, geometry: &Geometry) -> u64 {
+        match (self.schedule, self.method.solver::<P>().textbook) {
+            (Schedule::Sweep { .. }, Textbook::Heap { bytes }) => geometry.domain().volume().saturating_mul(bytes),
+            _ => 0,
+        }
     }
 }

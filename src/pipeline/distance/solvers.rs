@@ -7,20 +7,40 @@ use super::field::{Solved, Values};
 use super::front::advance_front;
 use super::initialise::initialise;
 use super::sweep::sweep_all;
-use super::{Schedule, Sources};
+use super::textbook::{heap_dijkstra, heap_marching};
+use super::trace::{SourceField, trace_sources};
+use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
-use crate::grid::BrickSet;
+use crate::grid::{BrickSet, Slot};
+use crate::kernel::distance::Neighbours;
+use crate::kernel::distance::all_neighbours::AllNeighbours;
+use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
+use crate::kernel::distance::fast_marching::FastMarching;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::shape_distance::ShapeDistance;
+use crate::kernel::distance::tracked::TrackedSource;
 use crate::kernel::distance::vector_distance::VectorDistance;
+use crate::kernel::distance::{dijkstra_heap, marching_heap};
 use crate::store::BrickArray;
 
-/// Solves on the bricks of a set, by a schedule, as far as a distance.
+/// Solves on the bricks of a set, by a schedule.
 pub(super) type Solve<P> =
-    for<'a> fn(&Stage<'_>, &Engine, &Sources<'a>, &Arc<BrickSet>, Schedule, f64) -> Result<Solved<'a, P>>;
+    for<'a> fn(&Stage<'_>, &Engine, &Sources<'a>, &Arc<BrickSet>, Schedule, Options) -> Result<Solved<'a, P>>;
+
+/// The order of `--schedule sweep`: that of the textbook.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Textbook {
+    /// Ordered sweeps, brick by brick.
+    Sweeps,
+    /// One heap over the whole volume in memory.
+    Heap {
+        /// Bytes of memory for each voxel.
+        bytes: u64,
+    },
+}
 
 /// One row of the table, for fields stored as `P`.
 #[derive(Clone, Copy, Debug)]
@@ -29,39 +49,69 @@ pub struct Solver<P> {
     pub name: &'static str,
     /// One line for the help.
     pub about: &'static str,
-    /// Whether it can be done by ordered sweeps.
-    pub sweeps: bool,
+    /// The order in which a textbook does it.
+    pub textbook: Textbook,
+    /// Whether it can look at all 26 neighbours.
+    pub takes_all_neighbours: bool,
     /// Whether it keeps the source of each voxel.
     pub keeps_sources: bool,
     /// Edge of bricks that it is fastest with.
     pub brick: i64,
     /// Bytes of a voxel's state.
     pub state_bytes: u64,
+    /// Bytes of a voxel's source, where sources are asked for and not part of the state.
+    pub source_bytes: u64,
     /// Does it.
     pub solve: Solve<P>,
 }
 
 /// The distance methods, in the order in which the help lists them.
 #[must_use]
-pub const fn solvers<P: Precision>() -> [Solver<P>; 2] {
+pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
     [
         Solver {
             name: "fsm",
             about: "fast sweeping, the Eikonal equation",
-            sweeps: true,
+            textbook: Textbook::Sweeps,
+            takes_all_neighbours: false,
             keeps_sources: false,
             brick: 64,
             state_bytes: size_of::<P>() as u64,
+            source_bytes: 0,
             solve: fast_sweeping::<P>,
         },
         Solver {
             name: "vdt",
             about: "vector distance transform, Euclidean to a tracked source",
-            sweeps: true,
+            textbook: Textbook::Sweeps,
+            takes_all_neighbours: true,
             keeps_sources: true,
             brick: 64,
             state_bytes: 4,
+            source_bytes: 0,
             solve: vector_distance::<P>,
+        },
+        Solver {
+            name: "fmm",
+            about: "fast marching, the Eikonal equation",
+            textbook: Textbook::Heap { bytes: size_of::<P>() as u64 + 4 + marching_heap::SCRATCH_BYTES },
+            takes_all_neighbours: false,
+            keeps_sources: true,
+            brick: 32,
+            state_bytes: size_of::<P>() as u64,
+            source_bytes: 4,
+            solve: fast_marching::<P>,
+        },
+        Solver {
+            name: "dp",
+            about: "Dijkstra-Pythagoras, Euclidean to a tracked source",
+            textbook: Textbook::Heap { bytes: 4 + dijkstra_heap::SCRATCH_BYTES },
+            takes_all_neighbours: true,
+            keeps_sources: true,
+            brick: 32,
+            state_bytes: 4,
+            source_bytes: 0,
+            solve: dijkstra_pythagoras::<P>,
         },
     ]
 }
@@ -78,6 +128,10 @@ impl Method {
     pub const FSM: Self = Self(0);
     /// The vector distance transform.
     pub const VDT: Self = Self(1);
+    /// Fast marching.
+    pub const FMM: Self = Self(2);
+    /// Dijkstra-Pythagoras.
+    pub const DP: Self = Self(3);
 
     /// What `--method` calls it.
     #[must_use]
@@ -109,9 +163,9 @@ fn fast_sweeping<'a, P: Precision>(
     sources: &Sources<'a>,
     set: &Arc<BrickSet>,
     schedule: Schedule,
-    farthest: f64,
+    options: Options,
 ) -> Result<Solved<'a, P>> {
-    let job = Job { stage, engine, sources, set, farthest };
+    let job = Job { stage, engine, sources, set, options };
     let spacing = sources.geometry.spacing;
     match schedule {
         Schedule::Front => job.front(FastSweeping::<P, P::Fast>::new(spacing)),
@@ -125,20 +179,56 @@ fn vector_distance<'a, P: Precision>(
     sources: &Sources<'a>,
     set: &Arc<BrickSet>,
     schedule: Schedule,
-    farthest: f64,
+    options: Options,
 ) -> Result<Solved<'a, P>> {
-    let job = Job { stage, engine, sources, set, farthest };
+    let job = Job { stage, engine, sources, set, options };
     let (geometry, positions) = (sources.geometry, sources.positions);
     if let Some(sets) = sources.sets {
         let method = ShapeDistance::new(geometry, sets);
         return match schedule {
-            Schedule::Front => job.front(method),
+            Schedule::Front => job.front_vector(method),
             Schedule::Sweep { iterations } => job.sweeps(method, iterations),
         };
     }
     match schedule {
-        Schedule::Front => job.front(VectorDistance::<P::Fast>::new(geometry, positions)),
+        Schedule::Front => job.front_vector(VectorDistance::<P::Fast>::new(geometry, positions)),
         Schedule::Sweep { iterations } => job.sweeps(VectorDistance::<f64>::new(geometry, positions), iterations),
+    }
+}
+
+fn fast_marching<'a, P: Precision>(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'a>,
+    set: &Arc<BrickSet>,
+    schedule: Schedule,
+    options: Options,
+) -> Result<Solved<'a, P>> {
+    let job = Job { stage, engine, sources, set, options };
+    let (geometry, positions) = (sources.geometry, sources.positions);
+    let method = FastMarching::<P, P::Fast>::new(geometry.spacing);
+    match (schedule, sources.sets) {
+        (Schedule::Front, _) => job.front_then_sources(method),
+        (_, Some(sets)) => job.heap_marching(method, &ShapeDistance::new(geometry, sets)),
+        (_, None) => job.heap_marching(method, &VectorDistance::<f64>::new(geometry, positions)),
+    }
+}
+
+fn dijkstra_pythagoras<'a, P: Precision>(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'a>,
+    set: &Arc<BrickSet>,
+    schedule: Schedule,
+    options: Options,
+) -> Result<Solved<'a, P>> {
+    let job = Job { stage, engine, sources, set, options };
+    let (geometry, positions) = (sources.geometry, sources.positions);
+    match (schedule, sources.sets) {
+        (Schedule::Front, Some(sets)) => job.front_dijkstra(ShapeDistance::new(geometry, sets)),
+        (Schedule::Front, None) => job.front_dijkstra(VectorDistance::<P::Fast>::new(geometry, positions)),
+        (_, Some(sets)) => job.heap_dijkstra(ShapeDistance::new(geometry, sets)),
+        (_, None) => job.heap_dijkstra(VectorDistance::<f64>::new(geometry, positions)),
     }
 }
 
@@ -148,22 +238,69 @@ struct Job<'j, 'a> {
     engine: &'j Engine,
     sources: &'j Sources<'a>,
     set: &'j Arc<BrickSet>,
-    farthest: f64,
+    options: Options,
 }
 
 impl<'a> Job<'_, 'a> {
-    fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+    /// A method's start: its state with the voxels that sources fix, the bricks that hold any, their number.
+    fn start<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, Vec<Slot>, u64)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
         let (start, fixed) = initialise::<M>(self.stage, self.sources, &state)?;
-        advance_front(self.stage, &method, &state, &start, self.sources.geometry.spacing, self.farthest)?;
+        Ok((state, start, fixed))
+    }
+
+    fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+        let (state, start, fixed) = self.start::<M>()?;
+        let spacing = self.sources.geometry.spacing;
+        advance_front(self.stage, &method, &state, &start, spacing, self.options.farthest)?;
         Ok(self.solved(method, state, fixed))
     }
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
-        let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state)?;
+        let (state, start, fixed) = self.start::<M>()?;
         sweep_all(self.stage, &method, &state, &start, iterations)?;
         Ok(self.solved(method, state, fixed))
+    }
+
+    /// Distances, and then their sources, where these are asked for.
+    fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+        let (state, start, fixed) = self.start::<M>()?;
+        let geometry = self.sources.geometry;
+        advance_front(self.stage, &method, &state, &start, geometry.spacing, self.options.farthest)?;
+        if !self.options.sources {
+            return Ok(self.solved(method, state, fixed));
+        }
+        let (sources, start, _) = self.start::<ShapeDistance<'_>>()?;
+        trace_sources(self.stage, geometry, &state, &sources, &start)?;
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
+    }
+
+    fn front_vector<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+        match self.options.neighbours {
+            Neighbours::Faces => self.front(sources),
+            Neighbours::All => self.front(AllNeighbours::new(sources)),
+        }
+    }
+
+    fn front_dijkstra<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+        self.front(DijkstraPythagoras::new(self.sources.geometry, self.options.neighbours, sources))
+    }
+
+    fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
+        let (state, _, fixed) = self.start::<S>()?;
+        heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
+        Ok(self.solved(method, state, fixed))
+    }
+
+    fn heap_marching<P: Precision, M: DistanceMethod<State = P> + 'a, S: TrackedSource>(
+        &self,
+        method: M,
+        start: &S,
+    ) -> Result<Solved<'a, P>> {
+        let (sources, _, fixed) = self.start::<S>()?;
+        let state = BrickArray::new(self.engine.scratch(), self.set)?;
+        heap_marching(self.engine, self.sources.geometry, start, self.options.sources, &state, &sources)?;
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
     }
 
     fn solved<P: Precision, M: DistanceMethod + 'a>(
@@ -172,7 +309,7 @@ impl<'a> Job<'_, 'a> {
         state: BrickArray<M::State>,
         fixed_voxels: u64,
     ) -> Solved<'a, P> {
-        let values = Arc::new(Values { method, state, farthest: self.farthest });
+        let values = Arc::new(Values { method, state, farthest: self.options.farthest });
         Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels }
     }
 }

@@ -1,0 +1,100 @@
+//! FMM over a whole volume in memory, in the textbook's order (Kósa & Mikula 2023, Alg. 4; with sources Alg. 8;
+//! algorithms: sections 3, 4 and 9).
+//!
+//! One heap: the smallest voxel is frozen and its six neighbours are updated from frozen ones by the upwind solution.
+//! Fixed voxels are on trial from the beginning. With sources, a voxel that freezes takes that of the frozen one of its
+//! 26 neighbours with the smallest sum of its distance and the way to it; of equal sums the first, z slowest. In and
+//! out: dense `[z][y][x]` arrays, distances in physical units, the sign bit set on fixed voxels. Computed in f64,
+//! rounded to `P` at every update. `fast_marching`, in a front of bricks, computes f32 fields in f32 and takes what a
+//! voxel's neighbours end with: the two differ by rounding alone.
+
+use super::fast_sweeping::{Axes, godunov};
+use super::initialise::NO_SOURCE;
+use super::precision::{Precision, Real};
+use super::tracked::source_of;
+use super::wavefront::Wavefront;
+use crate::grid::{FACES, Geometry, NEIGHBOURS_26};
+
+/// Bytes of a voxel beside its distance and source: whether it is frozen, and its entries in the heap.
+pub const SCRATCH_BYTES: u64 = 25;
+
+/// A march under way.
+#[derive(Debug)]
+pub struct MarchingHeap<'a, P> {
+    front: Wavefront,
+    axes: Axes<f64>,
+    values: &'a mut [P],
+    /// States of voxels: the source, the top bit set on fixed ones.
+    sources: Option<&'a mut [u32]>,
+    /// Lengths of the 26 steps.
+    steps: [f64; 26],
+}
+
+impl<'a, P: Precision> MarchingHeap<'a, P> {
+    /// Ready to start from the fixed voxels among `values`; everything else is infinite.
+    #[must_use]
+    pub fn new(geometry: &Geometry, values: &'a mut [P], sources: Option<&'a mut [u32]>) -> Self {
+        let mut front = Wavefront::new(geometry.shape);
+        for (place, value) in values.iter().map(|value| value.lane()).enumerate().filter(|(_, v)| v.is_marked()) {
+            front.push(place, value.f64());
+        }
+        let steps = NEIGHBOURS_26.map(|offset| geometry.length(offset));
+        Self { front, axes: Axes::new(geometry.spacing), values, sources, steps }
+    }
+
+    /// Freezes up to `count` voxels; false when all that can be reached are frozen.
+    pub fn advance(&mut self, count: usize) -> bool {
+        for _ in 0..count {
+            let Some(place) = self.front.freeze() else { return false };
+            let voxel = self.front.voxel(place);
+            for face in FACES {
+                if let Some(beside) = self.front.beside(voxel, face.offset()) {
+                    self.update(beside);
+                }
+            }
+            self.take_source(place, voxel);
+        }
+        true
+    }
+
+    /// The distance of a frozen voxel; infinite for any other.
+    fn frozen(&self, place: Option<usize>) -> f64 {
+        let value = |place: usize| self.values[place].lane().magnitude().f64();
+        place.filter(|&place| self.front.is_frozen(place)).map_or(f64::INFINITY, value)
+    }
+
+    fn update(&mut self, place: usize) {
+        let kept = self.values[place].lane();
+        if kept.is_marked() || self.front.is_frozen(place) {
+            return;
+        }
+        let voxel = self.front.voxel(place);
+        let near = std::array::from_fn(|a| {
+            let side = |upper: usize| self.frozen(self.front.beside(voxel, FACES[2 * a + upper].offset()));
+            side(0).min(side(1))
+        });
+        let value = P::round(godunov::<f64, false>(near, &self.axes));
+        if value < kept {
+            self.values[place] = P::of_lane(value);
+            self.front.push(place, value.f64());
+        }
+    }
+
+    fn take_source(&mut self, place: usize, voxel: [i64; 3]) {
+        if self.values[place].lane().is_marked() {
+            return;
+        }
+        let Some(sources) = &self.sources else { return };
+        let mut best = (f64::INFINITY, NO_SOURCE);
+        for (offset, step) in NEIGHBOURS_26.iter().zip(self.steps) {
+            let beside = self.front.beside(voxel, *offset);
+            let way = self.frozen(beside) + step;
+            if let Some(beside) = beside.filter(|_| way < best.0) {
+                best = (way, source_of(sources[beside]));
+            }
+        }
+        if let Some(sources) = &mut self.sources {
+            sources[place] = best.1;
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! What the methods that track sources share: how far a voxel is from one, in which arithmetic, and which source a state
+//! names. A method that carries sources in another order than VDT's is written once for points and for triangles.
+
+use super::initialise::NO_SOURCE;
+use super::method::DistanceMethod;
+use super::precision::Real;
+use super::shape_distance::ShapeDistance;
+use super::vector_distance::{FIXED, VectorDistance, squared};
+
+/// Sources, and the exact distances to them.
+pub trait TrackedSource: DistanceMethod<State = u32> {
+    /// What distances are compared in.
+    type Number: Real;
+
+    /// The coordinate of a voxel's centre along an axis, as distances are computed from.
+    fn coordinate(&self, axis: usize, index: i64) -> Self::Number;
+
+    /// The squared distance of a place to the source of a state; infinite to none.
+    fn squared(&self, here: [Self::Number; 3], state: u32) -> Self::Number;
+}
+
+/// The source of a state, [`NO_SOURCE`] where it has none.
+#[inline(always)]
+pub(super) fn source_of(state: u32) -> u32 {
+    state & !FIXED
+}
+
+/// Whether a state has a source.
+#[inline(always)]
+pub(super) fn has_source(state: u32) -> bool {
+    source_of(state) != NO_SOURCE
+}
+
+impl<A: Real> TrackedSource for VectorDistance<'_, A> {
+    type Number = A;
+
+    fn coordinate(&self, axis: usize, index: i64) -> A {
+        self.coordinate(axis, index)
+    }
+
+    #[inline(always)]
+    fn squared(&self, here: [A; 3], state: u32) -> A {
+        squared(here, self.point(state))
+    }
+}
+
+impl TrackedSource for ShapeDistance<'_> {
+    type Number = f64;
+
+    fn coordinate(&self, axis: usize, index: i64) -> f64 {
+        self.coordinate(axis, index)
+    }
+
+    fn squared(&self, here: [f64; 3], state: u32) -> f64 {
+        self.squared(here, state)
+    }
+}
