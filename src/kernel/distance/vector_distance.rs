@@ -119,7 +119,7 @@ struct Places<'a, A, const N: usize> {
 /// passed before and is nearer to the source taken than to its own.
 #[inline(always)]
 fn nearest<A: Real, const N: usize, const TURNED: bool>(
-    source: Lanes<'_, u32, N>,
+    Lanes { here: source, beside: sources }: Lanes<'_, u32, N>,
     point: [Lanes<'_, A, N>; 3],
     places: &Places<'_, A, N>,
     passed: [usize; 3],
@@ -132,9 +132,9 @@ fn nearest<A: Real, const N: usize, const TURNED: bool>(
     for i in 0..N {
         let here = [places.x[0][i], places.y[0][i], places.z[0]];
         let point = [px.here[i], py.here[i], pz.here[i]];
-        let free = (source.here[i] as i32) >= 0;
-        let at = |side: usize| (source.beside[side][i], [px.beside[side][i], py.beside[side][i], pz.beside[side][i]]);
-        let start = Nearest { squared: squared(here, point), source: source.here[i], point };
+        let free = (source[i] as i32) >= 0;
+        let at = |side: usize| (sources[side][i], [px.beside[side][i], py.beside[side][i], pz.beside[side][i]]);
+        let start = Nearest { squared: squared(here, point), source: source[i], point };
         let [(s0, p0), (s1, p1), (s2, p2)] = [at(0), at(1), at(yl)];
         let [(s3, p3), (s4, p4), (s5, p5)] = [at(yu), at(4), at(5)];
         let found = start.look(here, free, s0, p0).look(here, free, s1, p1).look(here, free, s2, p2);
@@ -153,12 +153,12 @@ fn nearest<A: Real, const N: usize, const TURNED: bool>(
         for i in 0..N {
             let there = [places.x[step(0)][i], places.y[step(1)][i], places.z[step(2)]];
             let own = squared(there, [px.beside[side][i], py.beside[side][i], pz.beside[side][i]]);
-            let free = u32::from((source.beside[side][i] as i32) >= 0);
+            let free = u32::from((sources[side][i] as i32) >= 0);
             back |= falls[i] & free & u32::from(squared(there, [points[0][i], points[1][i], points[2][i]]) < own);
         }
         swept |= back << axis;
     }
-    *source.here = kept;
+    *source = kept;
     (*px.here, *py.here, *pz.here) = (points[0], points[1], points[2]);
     swept
 }
