@@ -5,6 +5,7 @@
 mod common;
 mod covolume;
 mod distance;
+mod distance_front;
 mod flood;
 mod heat;
 mod level_set;
