@@ -113,7 +113,14 @@ impl Job {
 
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, needs: &Needs) -> Result<u64> {
-        let window = Budget { total: self.resources.memory }.window(needs.held)?;
+        let window = Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
+            Error::usage(format!(
+                "a grid of {} voxels needs {} of memory and {} of temporary fields; {error}, or a coarser grid",
+                grouped(self.geometry.domain().volume()),
+                bytes(needs.held),
+                bytes(needs.scratch)
+            ))
+        })?;
         let on_disk = needs.scratch.saturating_sub(window / 2);
         match free_space(&self.resources.scratch) {
             Some(free) if free < on_disk => Err(Error::failed(format!(
