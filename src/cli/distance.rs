@@ -16,7 +16,7 @@ use super::text::{bytes, duration, grouped, number, triple};
 use super::{print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
-use crate::grid::{DataSets, Geometry};
+use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
 use crate::kernel::distance::precision::Precision;
@@ -121,6 +121,7 @@ impl Job {
                 bytes(needs.scratch)
             ))
         })?;
+        self.refuse_too_many_bricks()?;
         let on_disk = needs.scratch.saturating_sub(window / 2);
         match free_space(&self.resources.scratch) {
             Some(free) if free < on_disk => Err(Error::failed(format!(
@@ -134,6 +135,19 @@ impl Job {
             .at(&self.resources.scratch)),
             _ => Ok(window),
         }
+    }
+
+    /// Refuses more bricks than there are numbers for.
+    fn refuse_too_many_bricks(&self) -> Result<()> {
+        let bricks = BrickGrid::new(self.geometry.shape, self.settings.brick).len();
+        if bricks < u64::from(Slot::MAX) {
+            return Ok(());
+        }
+        Err(Error::usage(format!(
+            "a grid of {} voxels falls into {} bricks, more than can be numbered; give a larger --brick or a coarser grid",
+            grouped(self.geometry.domain().volume()),
+            grouped(bricks)
+        )))
     }
 
     /// What the run will take, in a few lines.

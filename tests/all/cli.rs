@@ -41,7 +41,10 @@ fn help_and_version_are_complete() {
         // Each command has a table of its own.
         let table = readme.split(&format!("### Flags of `{command}`")).nth(1).unwrap().split("\n#").next().unwrap();
         for flag in flags {
-            assert!(table.contains(&format!("`{flag}")) || flag == "--output", "{command}: README does not name {flag}");
+            assert!(
+                table.contains(&format!("`{flag}")) || flag == "--output",
+                "{command}: README does not name {flag}"
+            );
         }
         assert!(help.lines().all(|line| line.chars().count() <= 100));
     }

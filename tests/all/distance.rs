@@ -11,7 +11,7 @@ use strandline::pipeline::distance::{Method, Schedule, Sources, cloud_distance};
 use crate::common::clouds::{grid_around, random_cloud, sphere, sponge};
 use crate::common::lab::{Lab, PlainGrid, dense, whole};
 use crate::common::random::Random;
-use crate::common::solve::{Equation, equation, solve, whole_edge};
+use crate::common::solve::{Equation, equation, solve, sweeps, whole_edge};
 use crate::common::textbook::{self, Stored, godunov, position, squared};
 
 /// Ours, on all bricks or on those within reach of the cloud only.
@@ -53,7 +53,7 @@ fn check_sweeps<P: Stored>(labs: &[Lab], geometry: &Geometry, cloud: &[[f64; 3]]
     let sources = textbook::vdt(geometry, cloud, iterations);
     let eikonal = textbook::fsm::<P>(geometry, cloud, iterations);
     let euclidean = textbook::distances::<P>(geometry, cloud, &sources);
-    for method in Method::all().filter(|method| method.solver::<P>().sweeps) {
+    for method in Method::all().filter(|method| sweeps(*method)) {
         for (lab, &edge) in labs.iter().flat_map(|lab| edges.iter().map(move |edge| (lab, edge))) {
             let found = solve::<P>(lab, geometry, cloud, edge, method, Schedule::Sweep { iterations });
             let threads = lab.engine.threads();
@@ -122,7 +122,7 @@ fn without_a_point_in_the_grid_nothing_is_reached() {
     let lab = Lab::new(2);
     let geometry = grid([20, 9, 7], [1.0; 3]);
     for cloud in [vec![], vec![[1e3, 0.0, -5.0]]] {
-        for method in Method::all().filter(|m| m.solver::<f32>().sweeps) {
+        for method in Method::all().filter(|method| sweeps(*method)) {
             let (found, _) = ours(&lab, &geometry, &cloud, 8, method, None);
             assert!(found.iter().all(|d| *d == f32::INFINITY));
         }

@@ -81,48 +81,42 @@ fn eikonal_methods_come_to_rest_where_sweeps_do() {
             let single = largest_difference::<f32>(&geometry, &cloud, &[8, 16, 32]);
             let half = largest_difference::<f16>(&geometry, &cloud, &[16]);
             println!("{shape:?}, {count} points: {wide}, {single}, {half} ulp in f64, f32, f16");
-            assert!(wide.max(single).max(half) <= bound(&geometry), "{shape:?}, {count} points: {wide}, {single}, {half}");
+            assert!(
+                wide.max(single).max(half) <= bound(&geometry),
+                "{shape:?}, {count} points: {wide}, {single}, {half}"
+            );
         }
     }
 }
 
-/// What is known of inexact voxels: shares of all voxels, and the largest excess.
-#[derive(Debug, Default)]
+/// How much of a field is not exact.
+#[derive(Clone, Copy, Debug)]
 struct Inexact {
-    /// Voxels that a source fixed though another is nearer (Alg. 1 as printed).
-    fixed: f64,
-    fixed_excess: f64,
-    /// Voxels that learnt of a source that is not the nearest.
-    learnt: f64,
-    excess: f64,
+    /// The share of voxels whose distance is not the least over all points.
+    share: f64,
+    /// By how much it is larger at most, in the smallest spacing.
+    most: f64,
 }
 
 /// Distances against the least over all points.
 fn inexact(geometry: &Geometry, cloud: &[[f64; 3]], values: &[f32]) -> Inexact {
     let tree = RTree::bulk_load(cloud.to_vec());
-    let fixing = textbook::fixing_sources(geometry, cloud);
-    let mut found = Inexact::default();
-    for ((v, &value), fixing) in (PlainGrid { shape: geometry.shape }).voxels().zip(values).zip(fixing) {
+    let (mut wrong, mut most) = (0, 0.0_f64);
+    for (v, &value) in (PlainGrid { shape: geometry.shape }).voxels().zip(values) {
         let here = position(geometry, v);
         let nearest = tree.nearest_neighbor(here).expect("a point");
         let exact = textbook::squared(here, *nearest).sqrt();
         let excess = f64::from(value) - exact;
         let rounding = 1e-6 * exact + 1e-9;
-        debug_assert!(excess > -rounding, "{v:?}: {value} is nearer than {exact}");
-        let one = f64::from(excess > rounding) / values.len() as f64;
-        let (share, most) = if fixing.is_some() {
-            (&mut found.fixed, &mut found.fixed_excess)
-        } else {
-            (&mut found.learnt, &mut found.excess)
-        };
-        *share += one;
-        *most = most.max(excess);
+        assert!(excess > -rounding, "{v:?}: {value} is nearer than {exact}");
+        most = most.max(excess);
+        wrong += u32::from(excess > rounding);
     }
-    found
+    Inexact { share: f64::from(wrong) / values.len() as f64, most: most / geometry.min_spacing() }
 }
 
-/// At the start a voxel of a cell that holds a point may be nearer to another point outside (Alg. 1 as printed): those
-/// voxels keep what fixed them, so they are left aside, and with them what they tell others.
+/// Points inside of the grid of which no two fix the same voxel. Where they do, a voxel may be fixed by a point that is
+/// not the nearest, and a point walled in by the voxels of others (Alg. 1 and 3 as printed).
 fn without_crowded(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let mut kept: Vec<[f64; 3]> = Vec::new();
     for p in cloud {
@@ -138,30 +132,30 @@ fn without_crowded(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
     kept
 }
 
+/// Nearly every voxel has its nearest source: all but 1 in 1000, by less than a tenth of a voxel; or, where the printed
+/// loops swept to the end miss more than that, no more than those. On Sponge & Sphere they do: one point of the sphere is
+/// walled in by the voxels that its neighbours fix.
 #[test]
 fn euclidean_methods_find_nearly_every_nearest_source() {
     let lab = Lab::new(2);
     let pair = sponge_and_sphere().concat();
     let mut cases = vec![("Sponge & Sphere".to_string(), grid_around(&pair, 0.05), pair)];
-    for (seed, spacing) in [[0.5; 3], [0.4, 0.4, 1.3]].into_iter().enumerate() {
+    for (seed, spacing) in [[0.5; 3], [0.4, 0.4, 1.3], [1.0; 3]].into_iter().enumerate() {
         let geometry = grid([70, 64, 50], spacing);
         let cloud = without_crowded(&geometry, &random_cloud(&geometry, 200, seed as u64));
         cases.push((format!("{} points, spacing {spacing:?}", cloud.len()), geometry, cloud));
     }
     for (name, geometry, cloud) in &cases {
+        let printed = textbook::distances::<f32>(geometry, cloud, &textbook::vdt(geometry, cloud, 4));
+        let printed = inexact(geometry, cloud, &printed);
         for method in methods_of(Equation::Euclidean) {
             for edge in [16, 32] {
                 let found = front::<f32>(&lab, geometry, cloud, edge, method);
-                let inexact = inexact(geometry, cloud, &found.values);
-                println!("{name}, {}, bricks of {edge}, spacing {:?}: {inexact:?}", method.name(), geometry.spacing);
-                let mut seeds: Vec<usize> = textbook::fixing_sources(geometry, cloud).into_iter().flatten().collect();
-                seeds.sort_unstable();
-                seeds.dedup();
-                let seeds: Vec<[f64; 3]> = seeds.into_iter().map(|s| cloud[s]).collect();
-                println!("{} of {} seed", seeds.len(), cloud.len());
-                let all = textbook::distances::<f32>(geometry, cloud, &textbook::vdt(geometry, cloud, 3));
-                println!("textbook: {:?}", self::inexact(geometry, cloud, &all));
-                println!("seeds: {:?}", self::inexact(geometry, &seeds, &found.values));
+                let found = inexact(geometry, cloud, &found.values);
+                let what = format!("{name}, {}, bricks of {edge}: {found:?}, as printed {printed:?}", method.name());
+                println!("{what}");
+                assert!(found.share < 1e-3_f64.max(1.1 * printed.share), "{what}");
+                assert!(found.most < 0.1_f64.max(1.1 * printed.most), "{what}");
             }
         }
     }

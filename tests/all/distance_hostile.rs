@@ -154,7 +154,8 @@ fn flat_triangles_are_sources() {
     bench.write("flat.obj", "v 0 0 0\nv 4 0 0\nv 2 0 0\nv 1 3 2\nf 4 4 4\nf 1 2 2\nf 1 2 3\n");
     bench.write("ends.xyz", "0 0 0\n4 0 0\n1 3 2\n");
     let report = |flags: &str| {
-        bench.succeed(&format!("distance {flags} --spacing 0.5 --padding 1 --overwrite -q -o none --report out/r.json"));
+        bench
+            .succeed(&format!("distance {flags} --spacing 0.5 --padding 1 --overwrite -q -o none --report out/r.json"));
         bench.json("out/r.json")["result"].clone()
     };
     let (flat, ends) = (report("flat.obj"), report("ends.xyz"));
@@ -170,7 +171,8 @@ fn sources_outside_the_grid() {
     bench.write("away.xyz", "-500 0 0\n-501 3 0\n");
     bench.write("some.xyz", "-500 0 0\n5 5 5\n");
     bench.write("across.obj", "v -900 5 5\nv 900 5 5\nv 0 900 5\nf 1 2 3\n");
-    for (grid, word) in [("--like image.tif", "no source lies in the grid"), ("--spacing 1 --origin 0,0,0 --shape 9,9,9", "--origin")]
+    for (grid, word) in
+        [("--like image.tif", "no source lies in the grid"), ("--spacing 1 --origin 0,0,0 --shape 9,9,9", "--origin")]
     {
         for output in ["none", "out/x.zarr"] {
             let complaint = refusal(&bench, &format!("distance away.xyz {grid} -q -o {output}"), 2);
@@ -202,14 +204,23 @@ fn grids_that_make_no_sense_are_refused() {
         (&format!("{exact} 4,-4,4"), 2, &["--shape is 4,-4,4"]),
         ("--spacing 0.1 --origin nan,0,0 --shape 4,4,4", 2, &["--origin is NaN"]),
         // 10^15 voxels, which no machine holds; what they would take is told.
-        (&format!("{exact} 100000,100000,100000"), 2, &["1,000,000,000,000,000 voxels", "TiB of memory", "TiB of temporary fields"]),
-        (&format!("{exact} 100000,100000,100000 --memory 9000TiB"), 1, &["1,000,000,000,000,000 voxels", "TiB of temporary fields", "are free"]),
+        (
+            &format!("{exact} 100000,100000,100000"),
+            2,
+            &["1 000 000 000 000 000 voxels", "TiB of memory", "TiB of temporary fields", "give at least --memory"],
+        ),
+        (&format!("{exact} 100000,100000,100000 --memory 9000TiB"), 2, &["bricks", "--brick"]),
+        (
+            &format!("{exact} 16000,16000,2000 --memory 4GiB"),
+            1,
+            &["512 000 000 000 voxels", "TiB of temporary fields", "are free", "--scratch"],
+        ),
         ("--spacing 1e-12", 2, &["voxels", "--spacing"]),
         (&format!("{exact} 9000000000000000000,9,9"), 2, &["voxels", "--shape"]),
         ("--spacing 0.1 --memory 64MiB", 2, &["--memory"]),
         ("--like out", 2, &["out"]),
         ("--like a.xyz", 2, &["a.xyz"]),
-        ("--spacing 0.1 --precision f16 --padding 1e6", 2, &["--precision float16"]),
+        ("--spacing 1000 --precision f16 --padding 1e5", 2, &["--precision float16"]),
         ("--spacing 0.1 --max-distance 0", 2, &["--max-distance is 0"]),
         ("--spacing 0.1 --max-distance nan", 2, &["--max-distance is NaN"]),
     ] {
@@ -238,7 +249,9 @@ fn settings_that_contradict_are_refused() {
         assert!(complaint.contains(word), "{flags}: {complaint}");
     }
     // The table of arguments itself says the rest, in more lines.
-    for flags in ["", "a.xyz", "a.xyz -o none --method xyz", "a.xyz -o none --spacing 1,2", "a.xyz -o none --shape 4,4,4"] {
+    for flags in
+        ["", "a.xyz", "a.xyz -o none --method xyz", "a.xyz -o none --spacing 1,2", "a.xyz -o none --shape 4,4,4"]
+    {
         assert!(bench.fail(&format!("distance {flags}"), 2).contains("help"), "{flags}");
     }
 }

@@ -6,11 +6,11 @@
 use crate::common::ball::Bench;
 use crate::common::{meshes, python, shared_data};
 
-/// File, `--spacing` (about 100 voxels along the longest side), whether it is closed.
+/// File, `--spacing` (about 120 voxels along the longest side), whether it is closed.
 const MESHES: [(&str, &str, bool); 3] = [
-    ("teddy-cgal-bear.off", "0.014", true),
-    ("pilot-whale-cranium.ply", "0.0065", true),
-    ("demosthenes-low-res.obj", "0.014", false),
+    ("teddy-cgal-bear.off", "0.018", true),
+    ("pilot-whale-cranium.ply", "0.0055", true),
+    ("demosthenes-low-res.obj", "0.03", false),
 ];
 
 #[test]

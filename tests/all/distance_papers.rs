@@ -9,7 +9,7 @@ use strandline::pipeline::distance::{
 
 use crate::common::clouds::{grid_around, sponge_and_sphere};
 use crate::common::lab::{Lab, PlainGrid, dense};
-use crate::common::solve::{Equation, equation};
+use crate::common::solve::{Equation, equation, sweeps};
 use crate::common::textbook::{Stored, position};
 
 /// Grid points of the Cube experiment along each axis, and the mean squared error of the Eikonal methods to five
@@ -38,8 +38,7 @@ fn to_cube(p: [f64; 3]) -> f64 {
 fn cube_error<P: Stored>(lab: &Lab, count: i64, method: Method, schedule: Schedule) -> f64 {
     let geometry = cube_grid(count);
     let grid = PlainGrid { shape: geometry.shape };
-    let cloud: Vec<[f64; 3]> =
-        grid.voxels().filter(|v| on_cube(count, *v)).map(|v| position(&geometry, v)).collect();
+    let cloud: Vec<[f64; 3]> = grid.voxels().filter(|v| on_cube(count, *v)).map(|v| position(&geometry, v)).collect();
     let set = dense(geometry.shape, 32);
     let bins = PointBins::new(*set.grid(), &geometry, &cloud);
     let cubes = [(cloud.len() as u32, Cube { snaps: true, ..Cube::CELL })];
@@ -57,8 +56,7 @@ fn cube_error<P: Stored>(lab: &Lab, count: i64, method: Method, schedule: Schedu
 
 /// The schedules that a row of the table has.
 fn schedules(method: Method) -> Vec<Schedule> {
-    let sweeps = method.solver::<f64>().sweeps;
-    [Schedule::Front].into_iter().chain(sweeps.then_some(Schedule::Sweep { iterations: 1 })).collect()
+    [Schedule::Front].into_iter().chain(sweeps(method).then_some(Schedule::Sweep { iterations: 1 })).collect()
 }
 
 #[test]

@@ -30,6 +30,11 @@ pub(crate) fn methods_of(wanted: Equation) -> impl Iterator<Item = Method> {
     Method::all().filter(move |&method| equation(method) == wanted)
 }
 
+/// Whether a row of the table can be done by ordered sweeps.
+pub(crate) fn sweeps(method: Method) -> bool {
+    method.solver::<f32>().sweeps
+}
+
 /// A solved field, `[z][y][x]` over the whole grid.
 pub(crate) struct Field<P> {
     pub(crate) values: Vec<P>,
