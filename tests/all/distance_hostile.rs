@@ -7,7 +7,10 @@ use std::fs;
 use std::process::{Command, Output};
 
 use crate::common::ball::{Ball, Bench};
+use crate::common::lab::PlainGrid;
 use crate::common::meshes::{self, Form};
+use crate::common::stores::volume;
+use crate::common::textbook::squared;
 
 /// Runs the program in the folder with at most 1 GiB of address space.
 fn run_limited(bench: &Bench, arguments: &str) -> Output {
@@ -77,8 +80,9 @@ fn files_without_content_are_refused() {
 #[test]
 fn counts_that_the_file_belies_take_no_memory() {
     const BILLION: u64 = 1_000_000_000;
-    let mut stl = [&[b' '; 80][..], &1_000_000_000_u32.to_le_bytes()].concat();
-    stl.extend([0; 50]);
+    let mut stl = Form::StlBinary.write(&meshes::cuboid([0.0; 3], [1.0; 3]));
+    stl.truncate(134);
+    stl[80..84].copy_from_slice(&1_000_000_000_u32.to_le_bytes());
     // A face that claims a billion corners, in text and in binary.
     let corners = [&[0; 36][..], &1_000_000_000_u32.to_le_bytes(), &[0; 12]].concat();
     let three = "0 0 0\n1 0 0\n0 1 0\n";
@@ -152,16 +156,17 @@ fn flat_triangles_are_sources() {
     let bench = Bench::bare();
     // A point, a segment, and a segment there and back.
     bench.write("flat.obj", "v 0 0 0\nv 4 0 0\nv 2 0 0\nv 1 3 2\nf 4 4 4\nf 1 2 2\nf 1 2 3\n");
-    bench.write("ends.xyz", "0 0 0\n4 0 0\n1 3 2\n");
-    let report = |flags: &str| {
-        bench
-            .succeed(&format!("distance {flags} --spacing 0.5 --padding 1 --overwrite -q -o none --report out/r.json"));
-        bench.json("out/r.json")["result"].clone()
-    };
-    let (flat, ends) = (report("flat.obj"), report("ends.xyz"));
-    assert_eq!(flat["unlabelled_voxels"], 0);
-    // The segment's middle is far from both its ends.
-    assert!(flat["max"].as_f64().unwrap() < ends["max"].as_f64().unwrap());
+    bench.succeed("distance flat.obj --spacing 0.5 --padding 1 -q -o out/x.zarr");
+    let report = bench.json("out/x.zarr/report.json");
+    assert_eq!(report["result"]["unlabelled_voxels"], 0);
+    let [z, y, x] = [0, 1, 2].map(|a| report["grid"]["shape_zyx"][a].as_i64().unwrap());
+    let found = volume(&bench.path("out/x.zarr"));
+    for (v, found) in (PlainGrid { shape: [x, y, z] }).voxels().zip(found) {
+        let here = v.map(|i| -1.0 + 0.5 * i as f64);
+        let along = [here[0].clamp(0.0, 4.0), 0.0, 0.0];
+        let exact = squared(here, along).min(squared(here, [1.0, 3.0, 2.0])).sqrt();
+        assert!((found - exact).abs() < 1e-5, "{v:?}: {found} for {exact}");
+    }
 }
 
 #[test]
