@@ -105,18 +105,18 @@ fn points(cloud: &PointCloud) -> (Value, Lines) {
 fn triangles(mesh: &TriangleMesh) -> (Value, Lines) {
     let (low, high) = mesh.bounds().unwrap_or_default();
     let edges = mesh.boundary_edges();
-    let mut closed = edges.is_closed().to_string();
+    let mut closed = vec![edges.is_closed().to_string()];
     if !edges.is_closed() {
-        closed += &format!(", {} boundary edges", grouped(edges.open));
+        closed.push(format!("{} boundary edges", grouped(edges.open)));
     }
     if !edges.is_oriented() {
-        closed += &format!(", {} edges whose triangles disagree on what is outside", grouped(edges.flipped));
+        closed.push(format!("{} edges whose triangles disagree on what is outside", grouped(edges.flipped)));
     }
     let lines = vec![
         line("kind", "triangle mesh"),
         line("vertices", grouped(mesh.vertices.len() as u64)),
         line("triangles", grouped(mesh.len() as u64)),
-        line("closed", closed),
+        line("closed", closed.join(", ")),
         line("lowest x, y, z", triple(low)),
         line("highest x, y, z", triple(high)),
     ];
