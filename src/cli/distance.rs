@@ -16,7 +16,7 @@ use super::text::{bytes, duration, grouped, number, triple};
 use super::{print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
-use crate::grid::{DataSets, Geometry};
+use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
 use crate::kernel::distance::Neighbours;
@@ -115,15 +115,20 @@ impl Job {
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, needs: &Needs) -> Result<u64> {
         let window = Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
-            if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {
-                return error;
-            }
+            let name = self.settings.method.name();
+            let textbook = if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {
+                String::new()
+            } else {
+                format!(", or leave --schedule out: in the textbook's order {name} keeps all voxels in one heap")
+            };
             Error::usage(format!(
-                "{error}, or leave --schedule out: in the textbook's order {} keeps one heap over all {} voxels in memory",
-                self.settings.method.name(),
-                grouped(self.geometry.domain().volume())
+                "a grid of {} voxels needs {} of memory and {} of temporary fields; {error}, or a coarser grid{textbook}",
+                grouped(self.geometry.domain().volume()),
+                bytes(needs.held),
+                bytes(needs.scratch)
             ))
         })?;
+        self.refuse_too_many_bricks()?;
         let on_disk = needs.scratch.saturating_sub(window / 2);
         match free_space(&self.resources.scratch) {
             Some(free) if free < on_disk => Err(Error::failed(format!(
@@ -137,6 +142,19 @@ impl Job {
             .at(&self.resources.scratch)),
             _ => Ok(window),
         }
+    }
+
+    /// Refuses more bricks than there are numbers for.
+    fn refuse_too_many_bricks(&self) -> Result<()> {
+        let bricks = BrickGrid::new(self.geometry.shape, self.settings.brick).len();
+        if bricks < u64::from(Slot::MAX) {
+            return Ok(());
+        }
+        Err(Error::usage(format!(
+            "a grid of {} voxels falls into {} bricks, more than can be numbered; give a larger --brick or a coarser grid",
+            grouped(self.geometry.domain().volume()),
+            grouped(bricks)
+        )))
     }
 
     /// What the run will take, in a few lines.

@@ -1,4 +1,4 @@
-//! `strandline info`: what a stack, a cloud of points or a store is, as lines or as JSON.
+//! `strandline info`: what a stack, a cloud of points, a mesh or a store is, as lines or as JSON.
 
 use std::path::Path;
 
@@ -8,8 +8,9 @@ use super::args::InfoArgs;
 use super::print;
 use super::text::{grouped, number, triple};
 use crate::error::{Error, Result};
+use crate::grid::{PointCloud, TriangleMesh};
 use crate::io::ome_zarr::{ImageReader, is_store};
-use crate::io::points::read_cloud;
+use crate::io::sources::{Source, read_source};
 use crate::io::stacks::{self, Select};
 use crate::pipeline::marks::split;
 
@@ -24,7 +25,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     } else if let Some(format) = stacks::format_of(path) {
         stack(path, format)?
     } else {
-        points(path)?
+        match read_source(path)? {
+            Source::Cloud(cloud) => points(&cloud),
+            Source::Mesh(mesh) => triangles(&mesh),
+        }
     };
     let text = if args.json { format!("{document:#}\n") } else { table(&lines) };
     print(&text);
@@ -67,8 +71,7 @@ fn stack(path: &Path, format: &stacks::Format) -> Result<(Value, Lines)> {
     Ok((document, lines))
 }
 
-fn points(path: &Path) -> Result<(Value, Lines)> {
-    let cloud = read_cloud(path)?;
+fn points(cloud: &PointCloud) -> (Value, Lines) {
     let (low, high) = cloud.bounds().unwrap_or_default();
     let mut lines = vec![
         line("kind", "points"),
@@ -77,7 +80,7 @@ fn points(path: &Path) -> Result<(Value, Lines)> {
         line("highest x, y, z", triple(high)),
     ];
     let mut objects = Vec::new();
-    for marks in split(&cloud) {
+    for marks in split(cloud) {
         let points: usize = marks.contours.iter().map(Vec::len).sum();
         let contours = if marks.drawn { marks.contours.len() } else { 0 };
         let on = if marks.drawn { format!(" on {contours} contours") } else { ", no contours".into() };
@@ -87,7 +90,32 @@ fn points(path: &Path) -> Result<(Value, Lines)> {
     let document = json!({
         "kind": "points", "points": cloud.len(), "lowest_xyz": low, "highest_xyz": high, "objects": objects,
     });
-    Ok((document, lines))
+    (document, lines)
+}
+
+fn triangles(mesh: &TriangleMesh) -> (Value, Lines) {
+    let (low, high) = mesh.bounds().unwrap_or_default();
+    let edges = mesh.boundary_edges();
+    let mut closed = vec![edges.is_closed().to_string()];
+    if !edges.is_closed() {
+        closed.push(format!("{} boundary edges", grouped(edges.open)));
+    }
+    if !edges.is_oriented() {
+        closed.push(format!("{} edges whose triangles disagree on what is outside", grouped(edges.flipped)));
+    }
+    let lines = vec![
+        line("kind", "triangle mesh"),
+        line("vertices", grouped(mesh.vertices.len() as u64)),
+        line("triangles", grouped(mesh.len() as u64)),
+        line("closed", closed.join(", ")),
+        line("lowest x, y, z", triple(low)),
+        line("highest x, y, z", triple(high)),
+    ];
+    let document = json!({
+        "kind": "mesh", "vertices": mesh.vertices.len(), "triangles": mesh.len(), "closed": edges.is_closed(),
+        "boundary_edges": edges.open, "flipped_edges": edges.flipped, "lowest_xyz": low, "highest_xyz": high,
+    });
+    (document, lines)
 }
 
 fn store(path: &Path) -> Result<(Value, Lines)> {
@@ -136,7 +164,15 @@ fn groups(store: &Path) -> Vec<String> {
     let mut groups = vec![String::new(), "levelset".into()];
     groups.extend(below("levelset"));
     groups.extend(below("labels"));
+    groups.extend(below("closest-point"));
     groups
+}
+
+/// The inputs that a report names: an image, or sources.
+fn made_from(settings: &Value) -> String {
+    let sources = settings["sources"].as_array().into_iter().flatten();
+    let names: Vec<&str> = settings["image"].as_str().into_iter().chain(sources.filter_map(Value::as_str)).collect();
+    names.join(", ")
 }
 
 /// A few lines out of a report.
@@ -145,7 +181,7 @@ fn summary(report: &Value) -> Lines {
     let unit = report["grid"]["unit"].as_str().unwrap_or("").to_owned();
     let mut lines = vec![
         line("made by", format!("strandline {} {}", text(&report["version"]), text(&report["command"]))),
-        line("from", text(&report["settings"]["image"])),
+        line("from", made_from(&report["settings"])),
         line("seconds", report["seconds"].as_f64().map_or("?".into(), number)),
     ];
     for object in report["result"]["objects"].as_array().into_iter().flatten() {

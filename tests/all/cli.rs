@@ -10,13 +10,8 @@ use strandline::io::ome_zarr::ImageReader;
 
 use crate::common::ball::{Ball, Bench, HEADER, write_stack};
 use crate::common::python;
+use crate::common::stores::{contents, same, volume};
 use crate::common::tiff_bytes::{Value, gray_page, tiff_file};
-
-/// The finest level of an image, x fastest.
-fn volume(group: &Path) -> Vec<f64> {
-    let image = ImageReader::open(group).unwrap();
-    image.read_box(0, &image.levels()[0].geometry.domain()).unwrap()
-}
 
 /// Twice the shared voxels over all voxels of both.
 fn dice(labels: &[f64], label: f64, shape: [i64; 3], truth: impl Fn([i64; 3]) -> bool) -> f64 {
@@ -34,21 +29,28 @@ fn dice(labels: &[f64], label: f64, shape: [i64; 3], truth: impl Fn([i64; 3]) ->
 fn help_and_version_are_complete() {
     let bench = Bench::new(&Ball::small());
     assert_eq!(bench.succeed("-V"), format!("strandline {}\n", env!("CARGO_PKG_VERSION")));
-    let help = bench.succeed("help segment");
     let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
-    let flags: Vec<&str> = help
-        .lines()
-        .filter_map(|line| line.trim().split([' ', ',']).find(|word| word.starts_with("--")))
-        .filter(|flag| !matches!(*flag, "--help"))
-        .collect();
-    assert!(flags.len() > 30, "{flags:?}");
-    for flag in flags {
-        assert!(readme.contains(&format!("`{flag}")) || flag == "--output", "README does not name {flag}");
+    for (command, at_least) in [("segment", 30), ("distance", 20)] {
+        let help = bench.succeed(&format!("help {command}"));
+        let flags: Vec<&str> = help
+            .lines()
+            .filter_map(|line| line.trim().split([' ', ',']).find(|word| word.starts_with("--")))
+            .filter(|flag| !matches!(*flag, "--help"))
+            .collect();
+        assert!(flags.len() > at_least, "{flags:?}");
+        // Each command has a table of its own.
+        let table = readme.split(&format!("### Flags of `{command}`")).nth(1).unwrap().split("\n#").next().unwrap();
+        for flag in flags {
+            assert!(
+                table.contains(&format!("`{flag}")) || flag == "--output",
+                "{command}: README does not name {flag}"
+            );
+        }
+        assert!(help.lines().all(|line| line.chars().count() <= 100));
     }
-    for command in ["segment", "demo", "info"] {
-        assert!(bench.succeed("help").contains(command));
+    for command in ["segment", "distance", "demo", "info"] {
+        assert!(bench.succeed("help").contains(command) && readme.contains(&format!("\n| `{command}` |")), "{command}");
     }
-    assert!(help.lines().all(|line| line.chars().count() <= 100));
 }
 
 #[test]
@@ -248,33 +250,6 @@ fn check_report(bench: &Bench, ball: &Ball, labels: &[f64]) {
     }
     // The file of its own was written later; what was found is the same.
     assert_eq!(bench.json("out/r.json")["result"], *result);
-}
-
-/// All files of a store but the report, with their contents.
-fn contents(store: &Path) -> Vec<(String, Vec<u8>)> {
-    fn walk(folder: &Path, root: &Path, found: &mut Vec<(String, Vec<u8>)>) {
-        for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                walk(&path, root, found);
-            } else if !path.ends_with("report.json") {
-                let name = path.strip_prefix(root).unwrap().to_str().unwrap().to_owned();
-                found.push((name, fs::read(&path).unwrap()));
-            }
-        }
-    }
-    let mut found = Vec::new();
-    walk(store, store, &mut found);
-    found.sort();
-    found
-}
-
-fn same(a: &[(String, Vec<u8>)], b: &[(String, Vec<u8>)], what: &str) {
-    let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    assert_eq!(names(a), names(b), "{what}");
-    for ((name, a), (_, b)) in a.iter().zip(b) {
-        assert!(a == b, "{what}: {name} differs");
-    }
 }
 
 #[test]

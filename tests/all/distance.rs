@@ -3,114 +3,16 @@
 
 use std::sync::Arc;
 
+use half::f16;
 use proptest::prelude::*;
 use strandline::grid::{BrickSet, Geometry, PointBins};
-use strandline::pipeline::distance::{Method, Sources, cloud_distance};
+use strandline::pipeline::distance::{Method, Schedule, Sources, cloud_distance};
 
-use crate::common::clouds::{grid_around, sphere, sponge};
+use crate::common::clouds::{grid_around, random_cloud, sphere, sponge};
 use crate::common::lab::{Lab, PlainGrid, dense, whole};
 use crate::common::random::Random;
-
-/// One edge that makes a single brick of every domain here.
-const WHOLE: i64 = 128;
-
-pub(crate) fn position(geometry: &Geometry, v: [i64; 3]) -> [f64; 3] {
-    std::array::from_fn(|a| geometry.origin[a] + v[a] as f64 * geometry.spacing[a])
-}
-
-pub(crate) fn squared(p: [f64; 3], q: [f64; 3]) -> f64 {
-    let (x, y, z) = (p[0] - q[0], p[1] - q[1], p[2] - q[2]);
-    x * x + y * y + z * z
-}
-
-/// Alg. 1: for each voxel the source that fixes it, if any. Points whose cell does not start in the grid are left out.
-pub(crate) fn fixing_sources(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<Option<usize>> {
-    let grid = PlainGrid { shape: geometry.shape };
-    let mut fixing: Vec<Option<usize>> = vec![None; grid.len()];
-    for (source, p) in cloud.iter().enumerate() {
-        let base: [i64; 3] =
-            std::array::from_fn(|a| ((p[a] - geometry.origin[a]) / geometry.spacing[a]).floor() as i64);
-        if !grid.contains(base) {
-            continue;
-        }
-        for corner in (PlainGrid { shape: [2; 3] }).voxels() {
-            let v: [i64; 3] = std::array::from_fn(|a| base[a] + corner[a]);
-            if grid.contains(v) {
-                let here = position(geometry, v);
-                let kept = fixing[grid.at(v)].map_or(f64::INFINITY, |s| squared(here, cloud[s]));
-                if squared(here, *p) < kept {
-                    fixing[grid.at(v)] = Some(source);
-                }
-            }
-        }
-    }
-    fixing
-}
-
-/// The voxels of one sweep; of eight, x turns round every time, y every second, z every fourth.
-fn sweep_order(shape: [i64; 3], sweep: usize) -> impl Iterator<Item = [i64; 3]> {
-    PlainGrid { shape }
-        .voxels()
-        .map(move |v| std::array::from_fn(|a| if sweep >> a & 1 == 0 { v[a] } else { shape[a] - 1 - v[a] }))
-}
-
-/// The upwind solution by the weighted mean m of the neighbours taken: `sum w (x - m)^2 = 1 - sum w (a - m)^2`.
-pub(crate) fn godunov(mut axes: [(f64, f64); 3]) -> f64 {
-    axes.sort_by(|p, q| p.0.total_cmp(&q.0));
-    let mut x = f64::INFINITY;
-    for taken in 1..=3 {
-        let w: f64 = axes[..taken].iter().map(|(_, h)| 1.0 / (h * h)).sum();
-        let m = axes[..taken].iter().map(|(a, h)| a / (h * h)).sum::<f64>() / w;
-        let spread: f64 = axes[..taken].iter().map(|(a, h)| ((a - m) / h).powi(2)).sum();
-        x = m + ((1.0 - spread).max(0.0) / w).sqrt();
-        if taken == 3 || x <= axes[taken].0 {
-            break;
-        }
-    }
-    x
-}
-
-/// Alg. 2, one iteration, stored in f32.
-fn textbook_fsm(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<f32> {
-    let grid = PlainGrid { shape: geometry.shape };
-    let fixing = fixing_sources(geometry, cloud);
-    let start = |v: [i64; 3]| match fixing[grid.at(v)] {
-        Some(s) => squared(position(geometry, v), cloud[s]).sqrt() as f32,
-        None => f32::INFINITY,
-    };
-    let mut d: Vec<f32> = grid.voxels().map(start).collect();
-    for sweep in 0..8 {
-        for v in sweep_order(geometry.shape, sweep).filter(|v| fixing[grid.at(*v)].is_none()) {
-            let value = |q: [i64; 3]| if grid.contains(q) { f64::from(d[grid.at(q)]) } else { f64::INFINITY };
-            let n = PlainGrid::around(v).map(value);
-            let axes: [(f64, f64); 3] = std::array::from_fn(|a| (n[2 * a].min(n[2 * a + 1]), geometry.spacing[a]));
-            if axes.iter().any(|(a, _)| a.is_finite()) {
-                let lower = godunov(axes) as f32;
-                let kept = &mut d[grid.at(v)];
-                *kept = kept.min(lower);
-            }
-        }
-    }
-    d
-}
-
-/// Alg. 3: distances to the sources that the sweeps leave with each voxel.
-fn textbook_vdt(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<f32> {
-    let grid = PlainGrid { shape: geometry.shape };
-    let fixing = fixing_sources(geometry, cloud);
-    let mut source = fixing.clone();
-    let distance = |v, s: Option<usize>| s.map_or(f64::INFINITY, |s: usize| squared(position(geometry, v), cloud[s]));
-    for sweep in 0..8 {
-        for v in sweep_order(geometry.shape, sweep).filter(|v| fixing[grid.at(*v)].is_none()) {
-            for q in PlainGrid::around(v).into_iter().filter(|q| grid.contains(*q)) {
-                if distance(v, source[grid.at(q)]) < distance(v, source[grid.at(v)]) {
-                    source[grid.at(v)] = source[grid.at(q)];
-                }
-            }
-        }
-    }
-    grid.voxels().map(|v| distance(v, source[grid.at(v)]).sqrt() as f32).collect()
-}
+use crate::common::solve::{Equation, equation, solve, sweeps, whole_edge};
+use crate::common::textbook::{self, Stored, godunov, position, squared};
 
 /// Ours, on all bricks or on those within reach of the cloud only.
 fn ours(
@@ -135,55 +37,57 @@ fn ours(
 }
 
 #[track_caller]
-pub(crate) fn assert_same_bits(found: &[f32], expected: &[f32], what: &str) {
+pub(crate) fn assert_same_bits<P: Stored>(found: &[P], expected: &[P], what: &str) {
     assert_eq!(found.len(), expected.len());
     for (at, (f, e)) in found.iter().zip(expected).enumerate() {
-        assert_eq!(f.to_bits(), e.to_bits(), "{what}: voxel {at} has {f} for {e}");
+        assert_eq!(f.rank(), e.rank(), "{what}: voxel {at} has {f:?} for {e:?}");
     }
-}
-
-/// Random points: anywhere in the domain or a little outside, some on grid points, some given twice.
-pub(crate) fn random_cloud(geometry: &Geometry, count: usize, seed: u64) -> Vec<[f64; 3]> {
-    let mut random = Random(seed);
-    let mut cloud: Vec<[f64; 3]> = Vec::new();
-    for n in 0..count {
-        let snap = random.below(3) == 0;
-        let p = std::array::from_fn(|a| {
-            let place = random.unit() * (geometry.shape[a] as f64 + 1.0) - 1.0;
-            geometry.origin[a] + geometry.spacing[a] * if snap { place.round() } else { place }
-        });
-        let twice = n > 0 && random.below(8) == 0;
-        cloud.push(if twice { cloud[random.below(n)] } else { p });
-    }
-    cloud
 }
 
 pub(crate) fn grid(shape: [i64; 3], spacing: [f64; 3]) -> Geometry {
     Geometry { shape, spacing, origin: [-1.25, 0.5, 30.1], unit: None }
 }
 
-fn check_both(labs: &[Lab], geometry: &Geometry, cloud: &[[f64; 3]], edges: &[i64]) {
-    let expected = [(Method::FSM, textbook_fsm(geometry, cloud)), (Method::VDT, textbook_vdt(geometry, cloud))];
-    for (method, expected) in &expected {
-        for lab in labs {
-            for &edge in edges {
-                let (found, _) = ours(lab, geometry, cloud, edge, *method, None);
-                let what = format!("{method:?}, {geometry:?}, bricks of {edge}, {} threads", lab.engine.threads());
-                assert_same_bits(&found, expected, &what);
+/// All rows of the table that sweep, stored as `P`, against the printed loops: values and, of the Euclidean ones, sources.
+fn check_sweeps<P: Stored>(labs: &[Lab], geometry: &Geometry, cloud: &[[f64; 3]], edges: &[i64], iterations: u32) {
+    let sources = textbook::vdt(geometry, cloud, iterations);
+    let eikonal = textbook::fsm::<P>(geometry, cloud, iterations);
+    let euclidean = textbook::distances::<P>(geometry, cloud, &sources);
+    for method in Method::all().filter(|method| sweeps(*method)) {
+        for (lab, &edge) in labs.iter().flat_map(|lab| edges.iter().map(move |edge| (lab, edge))) {
+            let found = solve::<P>(lab, geometry, cloud, edge, method, Schedule::Sweep { iterations });
+            let threads = lab.engine.threads();
+            let what = format!(
+                "{}, {:?}, {geometry:?}, bricks of {edge}, {threads} threads, {iterations} iterations",
+                method.name(),
+                P::TYPE
+            );
+            if equation(method) == Equation::Euclidean {
+                assert_same_bits(&found.values, &euclidean, &what);
+                assert!(found.sources == sources, "{what}: sources differ");
+            } else {
+                assert_same_bits(&found.values, &eikonal, &what);
             }
         }
     }
 }
 
+/// Every stored type.
+fn check_all_types(labs: &[Lab], geometry: &Geometry, cloud: &[[f64; 3]], edges: &[i64], iterations: u32) {
+    check_sweeps::<f64>(labs, geometry, cloud, edges, iterations);
+    check_sweeps::<f32>(labs, geometry, cloud, edges, iterations);
+    check_sweeps::<f16>(labs, geometry, cloud, edges, iterations);
+}
+
 #[test]
 fn bricks_and_threads_give_the_bits_of_the_triple_loop() {
-    let labs = [Lab::new(1), Lab::new(2)];
-    let shapes = [[33, 29, 21], [1, 40, 17], [50, 1, 1], [18, 23, 1], [16, 16, 16], [1, 1, 1]];
+    let labs = [1, 2, 4].map(Lab::new);
+    let shapes = [[33, 29, 21], [1, 40, 17], [70, 1, 1], [18, 66, 1], [16, 16, 16], [1, 1, 1]];
     for (seed, shape) in shapes.into_iter().enumerate() {
-        for spacing in [[0.1; 3], [0.3, 0.17, 0.9]] {
+        for (spacing, iterations) in [([0.1; 3], 1), ([0.3, 0.17, 0.9], 1), ([0.3, 0.17, 0.9], 3)] {
             let geometry = grid(shape, spacing);
             let cloud = random_cloud(&geometry, 25, seed as u64);
-            check_both(&labs, &geometry, &cloud, &[4, 8, 16, WHOLE]);
+            check_all_types(&labs, &geometry, &cloud, &[8, 16, 32, 64, whole_edge(shape)], iterations);
         }
     }
 }
@@ -191,7 +95,26 @@ fn bricks_and_threads_give_the_bits_of_the_triple_loop() {
 #[test]
 fn the_sponge_gives_the_bits_of_the_triple_loop() {
     let cloud = sponge();
-    check_both(&[Lab::new(2)], &grid_around(&cloud, 0.05), &cloud, &[16, WHOLE]);
+    let geometry = grid_around(&cloud, 0.05);
+    let edges = [64, whole_edge(geometry.shape)];
+    check_sweeps::<f32>(&[Lab::new(2)], &geometry, &cloud, &edges, 1);
+}
+
+/// The update of the printed loop solves its equation: the sum over the axes below the solution is 1, and leaving an
+/// axis out or taking one more in would break the order.
+#[test]
+fn the_update_solves_its_equation() {
+    let mut random = Random(7);
+    for _ in 0..10_000 {
+        let spacing: [f64; 3] = std::array::from_fn(|_| 0.05 + random.unit());
+        let near: [f64; 3] = std::array::from_fn(|_| if random.below(5) == 0 { f64::INFINITY } else { random.unit() });
+        if near.iter().all(|a| a.is_infinite()) {
+            continue;
+        }
+        let x = godunov(near, spacing);
+        let sum: f64 = (0..3).map(|a| ((x - near[a]).max(0.0) / spacing[a]).powi(2)).sum();
+        assert!((sum - 1.0).abs() < 1e-11, "{near:?} {spacing:?}: {x} gives {sum}");
+    }
 }
 
 #[test]
@@ -199,7 +122,7 @@ fn without_a_point_in_the_grid_nothing_is_reached() {
     let lab = Lab::new(2);
     let geometry = grid([20, 9, 7], [1.0; 3]);
     for cloud in [vec![], vec![[1e3, 0.0, -5.0]]] {
-        for method in [Method::FSM, Method::VDT] {
+        for method in Method::all().filter(|method| sweeps(*method)) {
             let (found, _) = ours(&lab, &geometry, &cloud, 8, method, None);
             assert!(found.iter().all(|d| *d == f32::INFINITY));
         }
@@ -267,13 +190,14 @@ proptest! {
         shape in prop::array::uniform3(1_i64..24),
         spacing in prop::sample::select(vec![[1.0; 3], [0.1; 3], [0.25, 0.5, 1.0], [0.31, 0.7, 0.113]]),
         count in 1_usize..30,
-        edge in prop::sample::select(vec![4, 8, 16, WHOLE]),
-        threads in 1_usize..3,
+        edge in prop::sample::select(vec![8, 16, 32]),
+        threads in prop::sample::select(vec![1_usize, 2, 4]),
+        iterations in 1_u32..4,
         seed: u64,
     ) {
         let geometry = grid(shape, spacing);
         let cloud = random_cloud(&geometry, count, seed);
-        check_both(&[Lab::new(threads)], &geometry, &cloud, &[edge]);
+        check_all_types(&[Lab::new(threads)], &geometry, &cloud, &[edge], iterations);
     }
 
     /// Bricks that are left out because they are far change nothing near, and count as farthest themselves.

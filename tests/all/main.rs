@@ -5,6 +5,11 @@
 mod common;
 mod covolume;
 mod distance;
+mod distance_cli;
+mod distance_front;
+mod distance_hostile;
+mod distance_meshes;
+mod distance_papers;
 mod flood;
 mod heat;
 mod level_set;

@@ -11,10 +11,11 @@ use strandline::kernel::distance::initialise::Cube;
 use strandline::kernel::distance::precision::Precision;
 use strandline::pipeline::distance::{Method, Options, Schedule, Sources};
 
-use crate::common::clouds::{grid_around, sponge};
+use crate::common::clouds::{grid_around, random_cloud, sponge};
 use crate::common::lab::{Lab, PlainGrid, dense};
 use crate::common::meshes;
-use crate::distance::{assert_same_bits, fixing_sources, godunov, grid, position, random_cloud, scattered, squared};
+use crate::common::textbook::{fixing_sources, godunov, position, squared};
+use crate::distance::{assert_same_bits, grid, scattered};
 
 const TEXTBOOK: Schedule = Schedule::Sweep { iterations: 1 };
 
@@ -73,13 +74,11 @@ fn textbook_fmm(geometry: &Geometry, cloud: &[[f64; 3]]) -> Field<f32> {
             if frozen[q] || fixing[q].is_some() {
                 continue;
             }
-            let value = |r: [i64; 3]| match plain.contains(r) && frozen[plain.at(r)] {
-                true => f64::from(d[plain.at(r)]),
-                false => f64::INFINITY,
-            };
+            let known = |r: [i64; 3]| plain.contains(r) && frozen[plain.at(r)];
+            let value = |r| if known(r) { f64::from(d[plain.at(r)]) } else { f64::INFINITY };
             let n = PlainGrid::around(voxels[q]).map(value);
-            let axes = std::array::from_fn(|a| (n[2 * a].min(n[2 * a + 1]), geometry.spacing[a]));
-            let lower = godunov(axes) as f32;
+            let near = std::array::from_fn(|a| n[2 * a].min(n[2 * a + 1]));
+            let lower = godunov(near, geometry.spacing) as f32;
             if lower < d[q] {
                 heap.remove(&(d[q].to_bits(), q));
                 d[q] = lower;

@@ -103,11 +103,17 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(crate) fn new(ball: &Ball) -> Self {
+        let bench = Self::bare();
+        write_stack(&bench.path("image.tif"), &ball.geometry, &[&ball.voxels()]);
+        bench.write("marks.csv", &format!("{HEADER}{}", ball.marks(1)));
+        bench
+    }
+
+    /// Without a ball.
+    pub(crate) fn bare() -> Self {
         let bench = Self { folder: tempfile::tempdir().unwrap() };
         fs::create_dir(bench.path("out")).unwrap();
         fs::create_dir(bench.path("scratch")).unwrap();
-        write_stack(&bench.path("image.tif"), &ball.geometry, &[&ball.voxels()]);
-        bench.write("marks.csv", &format!("{HEADER}{}", ball.marks(1)));
         bench
     }
 

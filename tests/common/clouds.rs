@@ -4,6 +4,8 @@ use std::f64::consts::PI;
 
 use strandline::grid::Geometry;
 
+use super::random::Random;
+
 /// The papers' Sponge with r = 1 about the origin, both ends of both angles in, duplicates kept: 231 points at a step
 /// of pi / 10 (Kósa & Mikula 2023, eq. 11, with y = r cos p cos t).
 pub(crate) fn sponge() -> Vec<[f64; 3]> {
@@ -37,4 +39,30 @@ pub(crate) fn grid_around(cloud: &[[f64; 3]], h: f64) -> Geometry {
         origin: low.map(|v| v - padding),
         unit: None,
     }
+}
+
+/// The papers' pair (algorithms: section 10): the Sponge, and a sphere of radius 1/2 with the same parametrisation two
+/// to its negative x side.
+pub(crate) fn sponge_and_sphere() -> [Vec<[f64; 3]>; 2] {
+    let step = PI / 10.0;
+    let point = |p: f64, t: f64| [0.5 * p.cos() * t.sin() - 2.0, 0.5 * p.cos() * t.cos(), 0.5 * p.sin()];
+    let angles = (0..=20).flat_map(|p| (0..=10).map(move |t| (f64::from(p) * step, f64::from(t) * step)));
+    [sponge(), angles.map(|(p, t)| point(p, t)).collect()]
+}
+
+/// Random points: anywhere in the domain or up to two voxels outside, some on grid points, some given twice.
+pub(crate) fn random_cloud(geometry: &Geometry, count: usize, seed: u64) -> Vec<[f64; 3]> {
+    let mut random = Random(seed);
+    let mut cloud: Vec<[f64; 3]> = Vec::new();
+    for n in 0..count {
+        let snap = random.below(3) == 0;
+        let margin = if random.below(4) == 0 { 2.0 } else { 0.0 };
+        let p = std::array::from_fn(|a| {
+            let place = random.unit() * (geometry.shape[a] as f64 - 1.0 + 2.0 * margin) - margin;
+            geometry.origin[a] + geometry.spacing[a] * if snap { place.round() } else { place }
+        });
+        let twice = n > 0 && random.below(8) == 0;
+        cloud.push(if twice { cloud[random.below(n)] } else { p });
+    }
+    cloud
 }

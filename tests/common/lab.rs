@@ -16,8 +16,13 @@ pub(crate) struct Lab {
 
 impl Lab {
     pub(crate) fn new(threads: usize) -> Self {
+        Self::with_window(threads, 1 << 30)
+    }
+
+    /// At most so many bytes of fields are resident.
+    pub(crate) fn with_window(threads: usize, window: u64) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let scratch = Scratch::new(folder.path(), 1 << 30);
+        let scratch = Scratch::new(folder.path(), window);
         let budget = Budget { total: 2 << 30 };
         let engine = Engine::new(threads, scratch, budget, Cancel::default(), Arc::new(Silent)).expect("threads start");
         Self { engine, _folder: folder }

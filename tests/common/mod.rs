@@ -9,6 +9,9 @@ pub(crate) mod meshes;
 pub(crate) mod npy;
 pub(crate) mod plain_scheme;
 pub(crate) mod random;
+pub(crate) mod solve;
+pub(crate) mod stores;
+pub(crate) mod textbook;
 pub(crate) mod tiff_bytes;
 pub(crate) mod tiff_planes;
 

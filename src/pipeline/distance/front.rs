@@ -3,9 +3,10 @@
 //!
 //! A round takes all bricks whose smallest entering value lies within a brick's width of the smallest of all, those of
 //! even and of odd parity by turns: no two that share a face at the same time (where a method looks at 26 neighbours,
-//! by eight turns: no two that share a corner). What a round takes depends on values alone, so results do
-//! not depend on threads, ranks or budget. Values only fall, so the end is the fixed point of the update: for another
-//! brick size it is the same within the rounding of the update.
+//! by eight turns: no two that share a corner). What a round takes depends on values alone, so results do not depend
+//! on threads, ranks or budget. Values only fall, so the end is the fixed point of the update: for any brick size that
+//! of sweeps to convergence, within 10 units in the last place times the ratio of the largest to the smallest spacing
+//! (rounding; over 420 random clouds 3 units were the most for equal spacings, 10 at a ratio of 4, 32 at 6.2).
 
 use crate::error::Result;
 use crate::exec::{Boundary, HaloPlan, Reach, Stage, Workers};

@@ -1,0 +1,205 @@
+//! The `front` schedule: what it leaves does not depend on threads or memory, is the fixed point that sweeping comes to,
+//! and has nearly always the truly nearest source.
+
+use half::f16;
+use proptest::prelude::*;
+use rstar::RTree;
+use strandline::grid::Geometry;
+use strandline::pipeline::distance::{Method, Schedule};
+
+use crate::common::clouds::{grid_around, random_cloud, sponge_and_sphere};
+use crate::common::lab::{Lab, PlainGrid};
+use crate::common::solve::{Equation, Field, methods_of, solve};
+use crate::common::textbook::{self, Stored, position};
+
+fn grid(shape: [i64; 3], spacing: [f64; 3]) -> Geometry {
+    Geometry { shape, spacing, origin: [-1.25, 0.5, 30.1], unit: None }
+}
+
+fn front<P: Stored>(lab: &Lab, geometry: &Geometry, cloud: &[[f64; 3]], edge: i64, method: Method) -> Field<P> {
+    solve(lab, geometry, cloud, edge, method, Schedule::Front)
+}
+
+fn ranks<P: Stored>(values: &[P]) -> Vec<u64> {
+    values.iter().map(|v| v.rank()).collect()
+}
+
+/// With a window of 2 MiB the bricks of these fields are dropped and loaded again and again.
+#[test]
+fn threads_and_memory_change_no_bit() {
+    let geometry = grid([150, 130, 140], [0.5, 0.4, 0.7]);
+    let bricks = geometry.shape.map(|n| n.unsigned_abs().div_ceil(16)).iter().product::<u64>();
+    let cloud = random_cloud(&geometry, 40, 3);
+    for method in Method::all() {
+        let first = front::<f32>(&Lab::new(1), &geometry, &cloud, 16, method);
+        for (threads, window) in [(1, 2 << 20), (2, 2 << 20), (2, 1 << 30), (4, 1 << 30), (4, 2 << 20)] {
+            let found = front::<f32>(&Lab::with_window(threads, window), &geometry, &cloud, 16, method);
+            let what = format!("{}, {threads} threads, a window of {window} bytes", method.name());
+            assert!(ranks(&found.values) == ranks(&first.values), "{what}: values differ");
+            assert!(found.sources == first.sources, "{what}: sources differ");
+            if window < 1 << 30 {
+                assert!(found.loads > bricks, "{what}: {} loads of {bricks} bricks: nothing was dropped", found.loads);
+            }
+        }
+    }
+}
+
+/// How far the schedule may be from sweeps to convergence, in units of the last place: the more the spacings differ, the
+/// more digits of an update cancel (the head of `pipeline::distance::front` says the same). Over 420 random clouds the
+/// largest were 3 for equal spacings, 10 at a ratio of 4, 32 at a ratio of 6.2, all in f32.
+fn bound(geometry: &Geometry) -> u64 {
+    (10.0 * geometry.max_spacing() / geometry.min_spacing()) as u64
+}
+
+/// The largest difference between the Eikonal methods and the printed loops swept until nothing changes.
+fn largest_difference<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], edges: &[i64]) -> u64 {
+    let lab = Lab::new(2);
+    let expected = textbook::fsm::<P>(geometry, cloud, u32::MAX);
+    let mut largest = 0;
+    for method in methods_of(Equation::Eikonal) {
+        for &edge in edges {
+            let found = front::<P>(&lab, geometry, cloud, edge, method);
+            let apart = found.values.iter().zip(&expected).map(|(f, e)| f.rank().abs_diff(e.rank()));
+            largest = largest.max(apart.max().unwrap_or(0));
+        }
+    }
+    largest
+}
+
+#[test]
+fn eikonal_methods_come_to_rest_where_sweeps_do() {
+    for (seed, shape, spacing) in [
+        (1, [90, 70, 50], [0.1; 3]),
+        (2, [50, 60, 70], [0.3, 0.17, 0.9]),
+        (3, [120, 1, 90], [1.0; 3]),
+        (4, [200, 1, 1], [0.7; 3]),
+    ] {
+        let geometry = grid(shape, spacing);
+        for count in [1, 12, 100] {
+            let cloud = random_cloud(&geometry, count, seed);
+            let wide = largest_difference::<f64>(&geometry, &cloud, &[8, 16, 32]);
+            let single = largest_difference::<f32>(&geometry, &cloud, &[8, 16, 32]);
+            let half = largest_difference::<f16>(&geometry, &cloud, &[16]);
+            println!("{shape:?}, {count} points: {wide}, {single}, {half} ulp in f64, f32, f16");
+            assert!(
+                wide.max(single).max(half) <= bound(&geometry),
+                "{shape:?}, {count} points: {wide}, {single}, {half}"
+            );
+        }
+    }
+}
+
+/// How much of a field is not exact.
+#[derive(Clone, Copy, Debug)]
+struct Inexact {
+    /// The share of voxels whose distance is not the least over all points.
+    share: f64,
+    /// By how much it is larger at most, in the smallest spacing.
+    most: f64,
+}
+
+/// Distances against the least over all points.
+fn inexact(geometry: &Geometry, cloud: &[[f64; 3]], values: &[f32]) -> Inexact {
+    let tree = RTree::bulk_load(cloud.to_vec());
+    let (mut wrong, mut most) = (0, 0.0_f64);
+    for (v, &value) in (PlainGrid { shape: geometry.shape }).voxels().zip(values) {
+        let here = position(geometry, v);
+        let nearest = tree.nearest_neighbor(here).expect("a point");
+        let exact = textbook::squared(here, *nearest).sqrt();
+        let excess = f64::from(value) - exact;
+        let rounding = 1e-6 * exact + 1e-9;
+        assert!(excess > -rounding, "{v:?}: {value} is nearer than {exact}");
+        most = most.max(excess);
+        wrong += u32::from(excess > rounding);
+    }
+    Inexact { share: f64::from(wrong) / values.len() as f64, most: most / geometry.min_spacing() }
+}
+
+/// Points inside of the grid of which no two fix the same voxel. Where they do, a voxel may be fixed by a point that is
+/// not the nearest, and a point walled in by the voxels of others (Alg. 1 and 3 as printed).
+fn without_crowded(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut kept: Vec<[f64; 3]> = Vec::new();
+    for p in cloud {
+        let apart = |q: &[f64; 3]| (0..3).any(|a| (p[a] - q[a]).abs() > 4.0 * geometry.spacing[a]);
+        let inside = (0..3).all(|a| {
+            let at = (p[a] - geometry.origin[a]) / geometry.spacing[a];
+            at >= 0.0 && at < geometry.shape[a] as f64
+        });
+        if inside && kept.iter().all(apart) {
+            kept.push(*p);
+        }
+    }
+    kept
+}
+
+/// Nearly every voxel has its nearest source: all but 1 in 1000 of scattered points. Not so on Sponge & Sphere, where one
+/// point of the sphere is walled in by the voxels that its neighbours fix: the printed loops, swept to the end, miss
+/// 0.6 in 1000 by 0.23 voxels at most, this schedule 1.5 in 1000 by 0.42; the figures are held here as they are.
+#[test]
+fn euclidean_methods_find_nearly_every_nearest_source() {
+    let lab = Lab::new(2);
+    let pair = sponge_and_sphere().concat();
+    let mut cases = vec![("Sponge & Sphere".to_string(), grid_around(&pair, 0.05), pair, [1.5e-3, 0.43])];
+    for (seed, spacing) in [[0.5; 3], [0.4, 0.4, 1.3], [1.0; 3]].into_iter().enumerate() {
+        let geometry = grid([70, 64, 50], spacing);
+        let cloud = without_crowded(&geometry, &random_cloud(&geometry, 200, seed as u64));
+        cases.push((format!("{} points, spacing {spacing:?}", cloud.len()), geometry, cloud, [1e-3, 0.3]));
+    }
+    for (name, geometry, cloud, [share, most]) in &cases {
+        let printed = textbook::distances::<f32>(geometry, cloud, &textbook::vdt(geometry, cloud, 4));
+        let printed = inexact(geometry, cloud, &printed);
+        for method in methods_of(Equation::Euclidean) {
+            for edge in [16, 32] {
+                let found = front::<f32>(&lab, geometry, cloud, edge, method);
+                let found = inexact(geometry, cloud, &found.values);
+                let what = format!("{name}, {}, bricks of {edge}: {found:?}, as printed {printed:?}", method.name());
+                println!("{what}");
+                assert!(found.share < *share && found.most < *most, "{what}");
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn random_clouds_come_to_rest_where_sweeps_do(
+        shape in prop::array::uniform3(1_i64..48),
+        spacing in prop::sample::select(vec![[1.0; 3], [0.1; 3], [0.25, 0.5, 1.0], [0.31, 0.7, 0.113]]),
+        count in 1_usize..60,
+        edge in prop::sample::select(vec![8, 16, 32]),
+        seed: u64,
+    ) {
+        let geometry = grid(shape, spacing);
+        let cloud = random_cloud(&geometry, count, seed);
+        let apart = [
+            largest_difference::<f64>(&geometry, &cloud, &[edge]),
+            largest_difference::<f32>(&geometry, &cloud, &[edge]),
+            largest_difference::<f16>(&geometry, &cloud, &[edge]),
+        ];
+        prop_assert!(apart.iter().all(|&ulps| ulps <= bound(&geometry)), "{:?} ulp in f64, f32, f16", apart);
+    }
+
+    /// A Euclidean method never tells less than the exact distance, and each voxel's value is that to its source.
+    #[test]
+    fn values_are_those_of_the_sources(
+        shape in prop::array::uniform3(1_i64..40),
+        spacing in prop::sample::select(vec![[1.0; 3], [0.25, 0.5, 1.0]]),
+        count in 1_usize..40,
+        edge in prop::sample::select(vec![8, 16, 32]),
+        seed: u64,
+    ) {
+        let geometry = grid(shape, spacing);
+        let cloud = random_cloud(&geometry, count, seed);
+        let lab = Lab::new(2);
+        for method in methods_of(Equation::Euclidean) {
+            let found = front::<f32>(&lab, &geometry, &cloud, edge, method);
+            let expected = textbook::distances::<f32>(&geometry, &cloud, &found.sources);
+            prop_assert!(ranks(&found.values) == ranks(&expected), "{}", method.name());
+            let fixing = textbook::fixing_sources(&geometry, &cloud);
+            let kept = fixing.iter().zip(&found.sources).all(|(fixing, found)| fixing.is_none() || fixing == found);
+            prop_assert!(kept, "{}: a fixed voxel changed", method.name());
+        }
+    }
+}

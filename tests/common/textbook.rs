@@ -1,0 +1,168 @@
+//! The printed loops over a whole volume (Kósa & Mikula 2023, Alg. 1-3, errata of the descending loops), plain and in
+//! the printed order: nothing is shared with the program.
+//!
+//! Bits follow from the order of operations, so the arithmetic of one update is stated here as the program states it in
+//! its documentation: in f64, counted from the smallest neighbour, rounded once to the stored type.
+
+use half::f16;
+use strandline::grid::Geometry;
+use strandline::kernel::distance::precision::Precision;
+
+use super::lab::PlainGrid;
+
+/// A type that distances are stored as.
+pub(crate) trait Stored: Precision {
+    /// The value as stored.
+    fn store(value: f64) -> Self;
+    /// The place of a value that is not negative among all values of its type.
+    fn rank(self) -> u64;
+}
+
+impl Stored for f64 {
+    fn store(value: f64) -> Self {
+        value
+    }
+    fn rank(self) -> u64 {
+        self.to_bits()
+    }
+}
+
+impl Stored for f32 {
+    fn store(value: f64) -> Self {
+        value as Self
+    }
+    fn rank(self) -> u64 {
+        self.to_bits().into()
+    }
+}
+
+impl Stored for f16 {
+    fn store(value: f64) -> Self {
+        Self::from_f32(value as f32)
+    }
+    fn rank(self) -> u64 {
+        self.to_bits().into()
+    }
+}
+
+/// World position of a voxel's centre.
+pub(crate) fn position(geometry: &Geometry, v: [i64; 3]) -> [f64; 3] {
+    std::array::from_fn(|a| geometry.origin[a] + v[a] as f64 * geometry.spacing[a])
+}
+
+/// The squared distance of two positions.
+pub(crate) fn squared(p: [f64; 3], q: [f64; 3]) -> f64 {
+    let (x, y, z) = (p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+    x * x + y * y + z * z
+}
+
+/// Alg. 1: for each voxel the source that fixes it, if any. Points whose cell does not start in the grid are left out.
+pub(crate) fn fixing_sources(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<Option<usize>> {
+    let grid = PlainGrid { shape: geometry.shape };
+    let mut fixing: Vec<Option<usize>> = vec![None; grid.len()];
+    for (source, p) in cloud.iter().enumerate() {
+        let base: [i64; 3] =
+            std::array::from_fn(|a| ((p[a] - geometry.origin[a]) / geometry.spacing[a]).floor() as i64);
+        if !grid.contains(base) {
+            continue;
+        }
+        for corner in (PlainGrid { shape: [2; 3] }).voxels() {
+            let v: [i64; 3] = std::array::from_fn(|a| base[a] + corner[a]);
+            if grid.contains(v) {
+                let here = position(geometry, v);
+                let kept = fixing[grid.at(v)].map_or(f64::INFINITY, |s| squared(here, cloud[s]));
+                if squared(here, *p) < kept {
+                    fixing[grid.at(v)] = Some(source);
+                }
+            }
+        }
+    }
+    fixing
+}
+
+/// The voxels of one sweep; of eight, x turns round every time, y every second, z every fourth.
+fn sweep_order(shape: [i64; 3], sweep: usize) -> impl Iterator<Item = [i64; 3]> {
+    PlainGrid { shape }
+        .voxels()
+        .map(move |v| std::array::from_fn(|a| if sweep >> a & 1 == 0 { v[a] } else { shape[a] - 1 - v[a] }))
+}
+
+/// The x with `sum (((x - a) / h)^+)^2 = 1` for the smaller neighbours `a` and spacings `h` along x, y, z (eq. 9).
+pub(crate) fn godunov(near: [f64; 3], spacing: [f64; 3]) -> f64 {
+    let weight = spacing.map(|h| 1.0 / (h * h));
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|&i: &usize, &j| near[i].total_cmp(&near[j]));
+    let [i, j, k] = axes;
+    let (b, c) = (near[j] - near[i], near[k] - near[i]);
+    if spacing[i] <= b {
+        return near[i] + spacing[i];
+    }
+    let mean = weight[j] * b;
+    let two = weight[i] + weight[j];
+    let root = (mean * mean - two * (mean * b - 1.0)).max(0.0).sqrt();
+    let x = (mean + root) * (1.0 / two);
+    if x <= c {
+        return near[i] + x;
+    }
+    let three = weight[0] + weight[1] + weight[2];
+    let mean_of_three = mean + weight[k] * c;
+    let rest = mean * b + weight[k] * c * c - 1.0;
+    let root = (mean_of_three * mean_of_three - three * rest).max(0.0).sqrt();
+    near[i] + (mean_of_three + root) * (1.0 / three)
+}
+
+/// Alg. 2: distances after so many iterations, or once one changes nothing.
+pub(crate) fn fsm<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], iterations: u32) -> Vec<P> {
+    let grid = PlainGrid { shape: geometry.shape };
+    let fixing = fixing_sources(geometry, cloud);
+    let start = |v: [i64; 3]| match fixing[grid.at(v)] {
+        Some(s) => P::store(squared(position(geometry, v), cloud[s]).sqrt()),
+        None => P::UNKNOWN,
+    };
+    let mut d: Vec<P> = grid.voxels().map(start).collect();
+    for _ in 0..iterations {
+        let before = d.clone();
+        for sweep in 0..8 {
+            for v in sweep_order(geometry.shape, sweep).filter(|v| fixing[grid.at(*v)].is_none()) {
+                let value = |q: [i64; 3]| if grid.contains(q) { d[grid.at(q)].to_f64() } else { f64::INFINITY };
+                let n = PlainGrid::around(v).map(value);
+                let near: [f64; 3] = std::array::from_fn(|a| n[2 * a].min(n[2 * a + 1]));
+                if near.iter().any(|a| a.is_finite()) {
+                    let lower = P::store(godunov(near, geometry.spacing));
+                    let kept = &mut d[grid.at(v)];
+                    *kept = if lower < *kept { lower } else { *kept };
+                }
+            }
+        }
+        if d == before {
+            break;
+        }
+    }
+    d
+}
+
+/// Alg. 3: the sources that the sweeps leave with each voxel.
+pub(crate) fn vdt(geometry: &Geometry, cloud: &[[f64; 3]], iterations: u32) -> Vec<Option<usize>> {
+    let grid = PlainGrid { shape: geometry.shape };
+    let fixing = fixing_sources(geometry, cloud);
+    let mut source = fixing.clone();
+    let distance = |v, s: Option<usize>| s.map_or(f64::INFINITY, |s: usize| squared(position(geometry, v), cloud[s]));
+    for sweep in (0..iterations).flat_map(|_| 0..8) {
+        for v in sweep_order(geometry.shape, sweep).filter(|v| fixing[grid.at(*v)].is_none()) {
+            for q in PlainGrid::around(v).into_iter().filter(|q| grid.contains(*q)) {
+                if distance(v, source[grid.at(q)]) < distance(v, source[grid.at(v)]) {
+                    source[grid.at(v)] = source[grid.at(q)];
+                }
+            }
+        }
+    }
+    source
+}
+
+/// The distances to sources.
+pub(crate) fn distances<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], sources: &[Option<usize>]) -> Vec<P> {
+    let to = |(v, s): ([i64; 3], &Option<usize>)| {
+        s.map_or(P::UNKNOWN, |s| P::from_f64(squared(position(geometry, v), cloud[s]).sqrt()))
+    };
+    PlainGrid { shape: geometry.shape }.voxels().zip(sources).map(to).collect()
+}
