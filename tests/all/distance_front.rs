@@ -132,9 +132,9 @@ fn without_crowded(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
     kept
 }
 
-/// Nearly every voxel has its nearest source: all but 1 in 1000 of scattered points. Not so on Sponge & Sphere, where one
-/// point of the sphere is walled in by the voxels that its neighbours fix: the printed loops, swept to the end, miss
-/// 0.6 in 1000 by 0.23 voxels at most, this schedule 1.5 in 1000 by 0.42; the figures are held here as they are.
+/// Nearly every voxel has its nearest source: all but 1 in 1000 of scattered points, none farther off than three tenths of
+/// a voxel or than the printed loops, swept to the end, leave it. Not so on Sponge & Sphere, where one
+/// point of the sphere is walled in by the voxels that its neighbours fix: the printed loops miss 0.6 in 1000 by 0.23 voxels at most, this schedule 1.5 in 1000 by 0.42; the figures are held here as they are.
 #[test]
 fn euclidean_methods_find_nearly_every_nearest_source() {
     let lab = Lab::new(2);
@@ -154,7 +154,7 @@ fn euclidean_methods_find_nearly_every_nearest_source() {
                 let found = inexact(geometry, cloud, &found.values);
                 let what = format!("{name}, {}, bricks of {edge}: {found:?}, as printed {printed:?}", method.name());
                 println!("{what}");
-                assert!(found.share < *share && found.most < *most, "{what}");
+                assert!(found.share < *share && found.most < most.max(1.01 * printed.most), "{what}");
             }
         }
     }
