@@ -12,6 +12,7 @@ mod maximum_principle;
 mod mesh_ply;
 mod mesh_sources;
 mod points;
+mod ranks;
 mod surfaces;
 mod triangle_distance;
 

@@ -7,7 +7,7 @@
 //! the update: for another brick size it is the same within the rounding of the update.
 
 use crate::error::Result;
-use crate::exec::{Boundary, HaloPlan, Reach, Stage, Workers};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{Box3, FACES, Face, Slot};
 use crate::kernel::distance::method::DistanceMethod;
 use crate::store::BrickArray;
@@ -16,7 +16,7 @@ use crate::tile::HaloTile;
 /// How far beyond the smallest entering value a round reaches, in brick edges.
 const ROUND_WIDTH: f64 = 0.5;
 
-/// Carries distance from the bricks in `start`, which hold fixed voxels, as far as `farthest`.
+/// Carries distance from this rank's bricks in `start`, which hold fixed voxels, as far as `farthest`.
 pub(super) fn advance_front<M: DistanceMethod>(
     stage: &Stage<'_>,
     method: &M,
@@ -39,15 +39,17 @@ pub(super) fn advance_front<M: DistanceMethod>(
         entering[slot as usize] = 0.0;
         untold[slot as usize] = true;
     }
+    let exchange = Exchange::new(stage.comm(), &set, &plan)?;
+    exchange.faces(array, start)?;
     let mut rounds = 0;
     loop {
-        let least = entering.iter().copied().fold(f64::INFINITY, f64::min);
+        let least = stage.comm().least(entering.iter().copied().fold(f64::INFINITY, f64::min))?;
         if least.is_infinite() || least > farthest {
             break;
         }
         for colour in 0..2 {
             let due = |slot: &Slot| entering[*slot as usize] <= least + width && parity(*slot) == colour;
-            let wave: Vec<Slot> = (0..set.len() as Slot).filter(due).collect();
+            let wave: Vec<Slot> = set.owned().filter(due).collect();
             let left = stage.run(&wave, &workers, |(tile, work), &slot| {
                 plan.gather(array, slot, Boundary::Constant(M::UNKNOWN), tile);
                 let part = grid.brick_box(set.id(slot));
@@ -76,6 +78,8 @@ pub(super) fn advance_front<M: DistanceMethod>(
                     }
                 }
             }
+            exchange.faces(array, &wave)?;
+            exchange.lowest(&mut entering)?;
         }
         rounds += 1;
     }

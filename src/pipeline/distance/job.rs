@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::contiguous::contiguous_margin;
 use super::output::write_fields;
 use super::sign::Signed;
-use super::{Method, Schedule, Solved, Sources};
+use super::{Method, Schedule, Solved, Sources, solve};
 use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::{BrickGrid, BrickSet, DataSets, Geometry, PointBins, TriangleBins};
@@ -89,8 +89,7 @@ pub fn distance<P: Precision>(
     let stage = engine.stage("distance", set.len() as u64);
     stage.voxels(geometry.domain().volume());
     let farthest = settings.farthest.unwrap_or(f64::INFINITY);
-    let solve = settings.method.solver::<P>().solve;
-    let mut solved = solve(&stage, engine, &sources, &set, settings.schedule, farthest)?;
+    let mut solved = solve::<P>(&stage, &sources, &set, settings.method, settings.schedule, farthest)?;
     stage.finish();
     if solved.fixed_voxels == 0 {
         return Err(Error::input(
