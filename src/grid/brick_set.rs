@@ -121,12 +121,12 @@ impl BrickSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::{FACES, NEIGHBOURS_26};
+    use crate::grid::{FACES, Face, NEIGHBOURS_26};
 
     #[test]
     fn a_part_holds_its_bricks_and_those_beside_them() {
         let whole = BrickSet::from_fn(BrickGrid::new([5, 4, 3], 1), |id| id % 7 != 3);
-        let faces = FACES.map(|face| face.offset());
+        let faces = FACES.map(Face::offset);
         for offsets in [&faces[..], &NEIGHBOURS_26[..]] {
             for owned in [0..60, 0..0, 11..26, 33..34, 40..60] {
                 let part = whole.part(&owned, offsets);

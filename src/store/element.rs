@@ -83,7 +83,9 @@ macro_rules! element {
                 ($from)(value)
             }
             fn append_bytes(values: &[Self], out: &mut Vec<u8>) {
-                values.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
+                for value in values {
+                    out.extend_from_slice(&value.to_le_bytes());
+                }
             }
             fn fill_from_bytes(values: &mut [Self], bytes: &[u8]) {
                 let words = bytes.as_chunks().0;

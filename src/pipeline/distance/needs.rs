@@ -18,7 +18,7 @@ pub struct Needs {
 /// Bytes of a voxel of the tiles of one thread: the tile, its layout along diagonals (twice as long), coordinates.
 const TILE_BYTES: u64 = 48;
 /// Bytes kept of each brick: its lock, its state, its places in tables.
-const BRICK_BYTES: u64 = 80;
+const BRICK_BYTES: u64 = 96;
 /// Bytes that every further rank keeps of each brick of the grid: its slot, its value where it is not stored.
 const RANK_BYTES: u64 = 16;
 /// Bytes kept of each source: its position, twice, its place in a brick's list, its corners.
