@@ -24,6 +24,9 @@ use crate::kernel::distance::precision::Precision;
 use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, SOLVERS, Schedule, Textbook, distance};
 use crate::store::{Scratch, free_space};
 
+/// More ranks than this are no use in one process.
+const MOST_RANKS: usize = 64;
+
 /// A distance that is ready to be computed: all inputs are read and checked.
 struct Job {
     args: DistanceJobArgs,
@@ -73,7 +76,7 @@ impl Job {
 
     fn run<P: Precision>(&self) -> Result<()> {
         check_range::<P>(&self.geometry)?;
-        let needs = self.settings.needs::<P>(&self.geometry, &self.sets, self.resources.threads);
+        let needs = self.settings.needs::<P>(&self.geometry, &self.sets, self.resources.threads, self.args.ranks);
         let plan = self.plan(&needs);
         if self.args.output.dry_run {
             print(&format!("{plan}\n"));
@@ -87,6 +90,7 @@ impl Job {
         let budget = Budget { total: self.resources.memory };
         let progress: Arc<dyn Progress> = self.console.clone();
         let engine = Engine::new(self.resources.threads, scratch, budget, self.cancel.clone(), progress)?;
+        let engine = engine.with_ranks(self.args.ranks);
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
         let found = result?;
@@ -188,7 +192,7 @@ impl Job {
             settings: Settings::new(&self.args, &self.settings, &self.resources),
             grid: Grid::new(&self.geometry),
             threads: engine.threads(),
-            ranks: engine.comm().ranks(),
+            ranks: engine.ranks(),
             memory_budget_bytes: self.resources.memory,
             peak_rss_bytes: peak_resident(),
             seconds: self.started.elapsed().as_secs_f64(),
@@ -220,6 +224,9 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
             row.name,
             keeping.join(", ")
         )));
+    }
+    if !(1..=MOST_RANKS).contains(&args.ranks) {
+        return Err(Error::usage(format!("--ranks is {}; give 1 to {MOST_RANKS}", args.ranks)));
     }
     if field.iterations == 0 {
         return Err(Error::usage("--iterations is 0; give 1 or more"));

@@ -1,12 +1,15 @@
 //! `Comm`: what ranks say to each other. One rank is a case of many: [`SelfComm`] is all there is to say to oneself.
 //!
-//! The engine calls these at the points where ranks must agree: after each wave of bricks (neighbours on other ranks
-//! need the faces that changed), for each sum that decides something, and before a shared decision.
+//! Every rank runs the same program on its own bricks. All of them make the same calls in the same order: after each wave
+//! of bricks (neighbours on other ranks need the faces that changed), for each sum that decides something, and before a
+//! shared decision. Messages are bytes, little-endian, so that they may leave the process.
 
 use crate::error::Result;
-use crate::grid::Slot;
 
 /// The ranks of a run.
+///
+/// A kind of ranks is [`Comm::exchange`]; what all ranks agree on is made of it, and may be replaced where there is
+/// something better.
 pub trait Comm: Send + Sync {
     /// This rank's number, from 0.
     fn rank(&self) -> usize;
@@ -14,17 +17,54 @@ pub trait Comm: Send + Sync {
     /// Number of ranks.
     fn ranks(&self) -> usize;
 
-    /// Hands the faces of the bricks of a finished wave to the ranks that read them.
+    /// Sends to each rank of `with` the message at the same place, and returns the message that it sends here. Each of
+    /// them must call this too, naming this rank; messages of one rank arrive in the order in which it sent them.
     ///
     /// # Errors
     /// When another rank is gone.
-    fn publish_faces(&self, wave: &[Slot]) -> Result<()>;
+    fn exchange(&self, with: &[usize], messages: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>>;
 
-    /// The sum of all ranks' partial sums, given per cell in grid order and added in that order in f64.
+    /// What all ranks give, in order of their numbers.
     ///
     /// # Errors
     /// When another rank is gone.
-    fn sum(&self, partial: &[f64]) -> Result<f64>;
+    fn gather(&self, own: Vec<u8>) -> Result<Vec<Vec<u8>>> {
+        let others: Vec<usize> = (0..self.ranks()).filter(|&rank| rank != self.rank()).collect();
+        let mut all = self.exchange(&others, vec![own.clone(); others.len()])?;
+        all.insert(self.rank(), own);
+        Ok(all)
+    }
+
+    /// The smallest of all ranks' values, none of them NaN.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    fn least(&self, value: f64) -> Result<f64> {
+        let all = self.gather(value.to_le_bytes().to_vec())?;
+        Ok(all.iter().flat_map(|bytes| numbers(bytes)).fold(f64::INFINITY, f64::min))
+    }
+
+    /// Whether any rank says yes.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    fn any(&self, value: bool) -> Result<bool> {
+        Ok(self.gather(vec![u8::from(value)])?.concat().contains(&1))
+    }
+
+    /// The sum of all ranks' partial sums, given per cell in grid order and added in that order in f64: a rank's cells come
+    /// after those of the ranks before it, so the bits are those of one rank that has them all.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    fn sum(&self, partial: &[f64]) -> Result<f64> {
+        let all = self.gather(partial.iter().flat_map(|value| value.to_le_bytes()).collect())?;
+        Ok(all.iter().flat_map(|bytes| numbers(bytes)).sum())
+    }
+}
+
+fn numbers(bytes: &[u8]) -> impl Iterator<Item = f64> {
+    bytes.as_chunks().0.iter().map(|word| f64::from_le_bytes(*word))
 }
 
 /// One rank that owns every brick: its neighbours' faces are already in its own arena.
@@ -40,11 +80,8 @@ impl Comm for SelfComm {
         1
     }
 
-    fn publish_faces(&self, _wave: &[Slot]) -> Result<()> {
-        Ok(())
-    }
-
-    fn sum(&self, partial: &[f64]) -> Result<f64> {
-        Ok(partial.iter().sum())
+    fn exchange(&self, with: &[usize], _messages: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
+        debug_assert!(with.is_empty(), "one rank has nobody to talk to");
+        Ok(Vec::new())
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::budget::{Budget, machine_memory, peak_resident};
 use super::cancel::Cancel;
 use super::comm::{Comm, SelfComm};
-use super::progress::Progress;
+use super::progress::{OfRank, Progress};
 use crate::error::{Error, Result};
 use crate::store::{Scratch, Traffic};
 
@@ -42,7 +42,8 @@ pub struct Engine {
     pool: rayon::ThreadPool,
     cancel: Cancel,
     progress: Arc<dyn Progress>,
-    comm: Box<dyn Comm>,
+    comm: Arc<dyn Comm>,
+    ranks: usize,
     scratch: Scratch,
     budget: Budget,
     reports: Mutex<Vec<StageReport>>,
@@ -61,12 +62,29 @@ impl Engine {
         progress: Arc<dyn Progress>,
     ) -> Result<Self> {
         scratch.set_page_cache(machine_memory().saturating_sub(budget.total) / 2);
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|n| format!("strandline-{n}"))
-            .build()
-            .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")))?;
-        Ok(Self { pool, cancel, progress, comm: Box::new(SelfComm), scratch, budget, reports: Mutex::default() })
+        let pool = pool(threads)?;
+        let comm = Arc::new(SelfComm);
+        Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, reports: Mutex::default() })
+    }
+
+    /// The engine with so many ranks, 1 or more, for stages that can be shared out: see [`Stage::on_ranks`].
+    #[must_use]
+    pub fn with_ranks(self, ranks: usize) -> Self {
+        Self { ranks: ranks.max(1), ..self }
+    }
+
+    /// The engine of one of this engine's ranks: its share of the threads, at least one; the same window.
+    pub(super) fn of_rank(&self, comm: Arc<dyn Comm>) -> Result<Self> {
+        Ok(Self {
+            pool: pool((self.threads() / self.ranks).max(1))?,
+            cancel: self.cancel.clone(),
+            progress: Arc::new(OfRank(self.progress.clone())),
+            comm,
+            ranks: 1,
+            scratch: self.scratch.clone(),
+            budget: self.budget,
+            reports: Mutex::default(),
+        })
     }
 
     /// Number of threads.
@@ -87,10 +105,16 @@ impl Engine {
         self.budget
     }
 
-    /// The ranks of the run.
+    /// The ranks that run the same program as this engine, each on its own bricks.
     #[must_use]
     pub fn comm(&self) -> &dyn Comm {
         self.comm.as_ref()
+    }
+
+    /// Number of ranks that stages are shared out to.
+    #[must_use]
+    pub fn ranks(&self) -> usize {
+        self.ranks
     }
 
     /// Leaves `held` bytes of the budget to what is kept in memory, the rest to mapped pages.
@@ -134,6 +158,14 @@ impl Engine {
     }
 }
 
+fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|n| format!("strandline-{n}"))
+        .build()
+        .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")))
+}
+
 /// A stage under way.
 pub struct Stage<'a> {
     engine: &'a Engine,
@@ -142,7 +174,23 @@ pub struct Stage<'a> {
     report: Mutex<StageReport>,
 }
 
-impl Stage<'_> {
+impl<'a> Stage<'a> {
+    pub(super) fn engine(&self) -> &'a Engine {
+        self.engine
+    }
+
+    /// The ranks that take part in this stage.
+    #[must_use]
+    pub fn comm(&self) -> &'a dyn Comm {
+        self.engine.comm()
+    }
+
+    /// Number of ranks that the stage can be shared out to: see [`Stage::on_ranks`].
+    #[must_use]
+    pub fn ranks(&self) -> usize {
+        self.engine.ranks
+    }
+
     /// The one loop over bricks: `work` for each item of a wave, in parallel; results in the wave's order.
     ///
     /// An item is a brick's slot, a shard's box, a plane of a stack: whatever one thread computes in one go.
@@ -161,6 +209,10 @@ impl Stage<'_> {
         R: Send,
     {
         let engine = self.engine;
+        if wave.is_empty() {
+            engine.cancel.check()?;
+            return Ok(Vec::new());
+        }
         let results = engine.pool.install(|| {
             wave.par_iter()
                 .map(|item| {
@@ -180,6 +232,18 @@ impl Stage<'_> {
         let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
         report.iterations += iterations;
         report.residual = residual;
+    }
+
+    /// Adds what ranks did in this stage, all of them as often. What they moved is counted by the window they share.
+    pub(super) fn add_ranks(&self, ranks: &[StageReport]) {
+        let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        for rank in ranks {
+            report.bricks += rank.bricks;
+        }
+        if let Some(rank) = ranks.first() {
+            report.iterations += rank.iterations;
+            report.residual = rank.residual;
+        }
     }
 
     /// Says how many voxels the stage works on.

@@ -56,6 +56,11 @@ impl HaloPlan {
         Self { grid, links }
     }
 
+    /// For each direction that ghosts come from, the step to that neighbour and the face of it that is read.
+    pub(super) fn reads(&self) -> impl Iterator<Item = ([i64; 3], Face)> {
+        self.links.iter().map(|link| (link.offset, link.face))
+    }
+
     /// Fills `tile` with the brick in `slot`, its halo from the neighbours' faces, and beyond the domain by `boundary`.
     pub fn gather<T: Element>(&self, array: &BrickArray<T>, slot: Slot, boundary: Boundary<T>, tile: &mut HaloTile<T>) {
         let id = array.set().id(slot);

@@ -1,4 +1,9 @@
 //! `BrickSet`: the bricks of a grid that exist. A dense field holds all of them, a band only those near the surface.
+//!
+//! One rank of many has a set of its own: the bricks that it owns, and around them *ghost* bricks that others own and
+//! of which it knows the faces only. Slots are the rank's own count; those of owned bricks follow each other.
+
+use std::ops::Range;
 
 use super::{BrickGrid, BrickId};
 
@@ -13,6 +18,7 @@ pub struct BrickSet {
     grid: BrickGrid,
     ids: Vec<BrickId>,
     slots: Vec<Slot>,
+    owned: Range<Slot>,
 }
 
 impl BrickSet {
@@ -37,7 +43,36 @@ impl BrickSet {
                 ids.push(id);
             }
         }
-        Self { grid, ids, slots }
+        let owned = 0..ids.len() as Slot;
+        Self { grid, ids, slots, owned }
+    }
+
+    /// The part of a rank that owns the bricks numbered `owned`: those of them that are in this set, and as ghosts the
+    /// set's bricks that lie beside them at one of `offsets`.
+    #[must_use]
+    pub fn part(&self, owned: &Range<BrickId>, offsets: &[[i64; 3]]) -> Self {
+        let slots = |at: &BrickId| self.ids.partition_point(|id| id < at);
+        let mut kept = vec![false; self.ids.len()];
+        for slot in slots(&owned.start)..slots(&owned.end) {
+            kept[slot] = true;
+            let beside = offsets.iter().filter_map(|&offset| self.neighbour(slot as Slot, offset));
+            beside.for_each(|ghost| kept[ghost as usize] = true);
+        }
+        let mut part = Self::from_fn(self.grid, |id| self.slot(id).is_some_and(|slot| kept[slot as usize]));
+        let first = |at: &BrickId| part.ids.partition_point(|id| id < at) as Slot;
+        part.owned = first(&owned.start)..first(&owned.end);
+        part
+    }
+
+    /// The slots of owned bricks; all of them where there is one rank.
+    #[must_use]
+    pub fn owned(&self) -> Range<Slot> {
+        self.owned.clone()
+    }
+
+    /// The slots of ghost bricks.
+    pub fn ghosts(&self) -> impl Iterator<Item = Slot> + use<> {
+        (0..self.owned.start).chain(self.owned.end..self.ids.len() as Slot)
     }
 
     /// The grid the bricks belong to.
@@ -46,7 +81,7 @@ impl BrickSet {
         &self.grid
     }
 
-    /// Number of bricks in the set.
+    /// Number of bricks in the set, ghosts too.
     #[must_use]
     pub fn len(&self) -> usize {
         self.ids.len()
@@ -80,5 +115,31 @@ impl BrickSet {
     #[must_use]
     pub fn neighbour(&self, slot: Slot, offset: [i64; 3]) -> Option<Slot> {
         self.grid.neighbour(self.id(slot), offset).and_then(|id| self.slot(id))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::{FACES, Face, NEIGHBOURS_26};
+
+    #[test]
+    fn a_part_holds_its_bricks_and_those_beside_them() {
+        let whole = BrickSet::from_fn(BrickGrid::new([5, 4, 3], 1), |id| id % 7 != 3);
+        let faces = FACES.map(Face::offset);
+        for offsets in [&faces[..], &NEIGHBOURS_26[..]] {
+            for owned in [0..60, 0..0, 11..26, 33..34, 40..60] {
+                let part = whole.part(&owned, offsets);
+                let here = |id: BrickId| whole.slot(id).is_some();
+                let is_owned = |id: &BrickId| here(*id) && owned.contains(id);
+                let is_ghost = |id: &BrickId| {
+                    let touches = |offset: &[i64; 3]| whole.grid.neighbour(*id, *offset).is_some_and(|n| is_owned(&n));
+                    here(*id) && !owned.contains(id) && offsets.iter().any(touches)
+                };
+                let ids = |slots: &mut dyn Iterator<Item = Slot>| slots.map(|slot| part.id(slot)).collect::<Vec<_>>();
+                assert_eq!(ids(&mut part.owned()), (0..60).filter(is_owned).collect::<Vec<_>>());
+                assert_eq!(ids(&mut part.ghosts()), (0..60).filter(is_ghost).collect::<Vec<_>>());
+            }
+        }
     }
 }

@@ -7,7 +7,7 @@
 
 use super::band::{Band, read_mask};
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard};
+use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Stage, Workers, checkerboard};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::level_set::border::Border;
 use crate::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
@@ -143,6 +143,7 @@ struct Solver<'a> {
     first: bool,
     workers: &'a Workers<Worker>,
     cells: &'a Cells,
+    exchange: &'a Exchange<'a>,
 }
 
 /// Moves the surface until it rests. The result is in `band.u[0]`.
@@ -163,12 +164,14 @@ pub fn evolve(
     let workers = &Workers::new(Worker::new);
     let kept = room_to_keep(engine, band)?;
     let cells = &Cells::new(band.solved.set());
+    let exchange = &Exchange::new(engine.comm(), band.solved.set(), all)?;
     let mut cell_iterations = 0;
     // Cells without a solved voxel never change: both time levels hold their start.
     copy_start(stage, band)?;
     while done.steps < settings.max_steps {
         let (kept, first) = (kept.as_ref(), done.steps == 0);
-        let solver = Solver { engine, stage, band, edges, settings, spacing, all, faces, kept, first, workers, cells };
+        let solver =
+            Solver { engine, stage, band, edges, settings, spacing, all, faces, kept, first, workers, cells, exchange };
         let (step, visits) = solver.step()?;
         band.u.swap(0, 1);
         done.steps += 1;
@@ -242,7 +245,7 @@ impl Solver<'_> {
                 let wave: Vec<Slot> = cells.iter().copied().filter(due).collect();
                 let results =
                     self.stage.run(&wave, self.workers, |worker, &slot| Ok(self.visit(worker, slot, round, colour)))?;
-                self.engine.comm().publish_faces(&wave)?;
+                self.exchange.faces(&self.band.u[1], &wave)?;
                 for (&slot, visit) in wave.iter().zip(results) {
                     visits[slot as usize] = visit;
                     unknown[slot as usize] = 0.0;

@@ -8,6 +8,7 @@
 //! faces of one brick | -x [z][y] | +x [z][y] | -y [z][x] | +y [z][x] | -z [y][x] | +z [y][x] |    edge^2 each
 //! ```
 //!
+//! Of ghost bricks, which another rank owns, only the faces are stored.
 //! Bricks outside of the set are not stored: each has one constant value for all its voxels. So have, where an array is
 //! made for it, bricks that nothing was written to yet.
 
@@ -97,7 +98,7 @@ impl<T: Element> BrickArray<T> {
     /// When the scratch folder cannot hold it.
     pub fn with_layers(scratch: &Scratch, set: &Arc<BrickSet>, layers: usize) -> Result<Self> {
         let brick_len = layers * set.grid().brick_len();
-        let bricks = SlotFile::create(&scratch.dir, &scratch.window, brick_len, set.len())?;
+        let bricks = SlotFile::create(&scratch.dir, &scratch.window, brick_len, set.owned().len())?;
         let absent = vec![T::default(); set.grid().len() as usize];
         Ok(Self { set: set.clone(), brick_len, bricks, faces: None, absent, blank: None })
     }
@@ -148,17 +149,32 @@ impl<T: Element> BrickArray<T> {
         self.absent[id as usize]
     }
 
+    /// The place of a brick in the file of bricks.
+    fn place(&self, slot: Slot) -> usize {
+        slot.checked_sub(self.set.owned().start).expect("a rank reads and writes its own bricks only") as usize
+    }
+
     /// Lends out a brick's voxels, `edge`^3 for each layer, for reading.
+    ///
+    /// # Panics
+    /// When the brick is another rank's.
     pub fn read<R>(&self, slot: Slot, f: impl FnOnce(&[T]) -> R) -> R {
-        self.bricks.read(slot as usize, 0..self.brick_len, f)
+        self.bricks.read(self.place(slot), 0..self.brick_len, f)
     }
 
     /// Lends out a brick's voxels for writing. The faces follow with [`BrickArray::write_faces`].
+    ///
+    /// # Panics
+    /// When the brick is another rank's.
     pub fn write<R>(&self, slot: Slot, f: impl FnOnce(&mut [T]) -> R) -> R {
+        self.mark_written(slot);
+        self.bricks.write(self.place(slot), f)
+    }
+
+    fn mark_written(&self, slot: Slot) {
         if let Some(blank) = &self.blank {
             blank.written[slot as usize].store(true, Relaxed);
         }
-        self.bricks.write(slot as usize, f)
     }
 
     /// Lends out one face of a brick, `edge`^2 voxels.
@@ -171,11 +187,12 @@ impl<T: Element> BrickArray<T> {
         faces.read(slot as usize, face.index() * area..(face.index() + 1) * area, f)
     }
 
-    /// Lends out the six faces of a brick for writing.
+    /// Lends out the six faces of a brick, `edge`^2 voxels each, for writing.
     ///
     /// # Panics
     /// When the array was made without faces.
     pub fn write_faces<R>(&self, slot: Slot, f: impl FnOnce(&mut [T]) -> R) -> R {
+        self.mark_written(slot);
         self.faces.as_ref().expect("halos are read from arrays made with faces").write(slot as usize, f)
     }
 

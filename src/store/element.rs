@@ -61,6 +61,12 @@ pub trait Element:
 
     /// The nearest value of this type; integers round half away from zero and saturate.
     fn from_f64(value: f64) -> Self;
+
+    /// Appends the values to `out`, little-endian.
+    fn append_bytes(values: &[Self], out: &mut Vec<u8>);
+
+    /// Fills `values` from as many little-endian ones.
+    fn fill_from_bytes(values: &mut [Self], bytes: &[u8]);
 }
 
 macro_rules! element {
@@ -75,6 +81,15 @@ macro_rules! element {
             #[inline]
             fn from_f64(value: f64) -> Self {
                 ($from)(value)
+            }
+            fn append_bytes(values: &[Self], out: &mut Vec<u8>) {
+                for value in values {
+                    out.extend_from_slice(&value.to_le_bytes());
+                }
+            }
+            fn fill_from_bytes(values: &mut [Self], bytes: &[u8]) {
+                let words = bytes.as_chunks().0;
+                values.iter_mut().zip(words).for_each(|(value, word)| *value = Self::from_le_bytes(*word));
             }
         }
     };
@@ -100,4 +115,29 @@ pub enum SamplesMut<'a> {
     F32(&'a mut [f32]),
     /// Double precision.
     F64(&'a mut [f64]),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn there_and_back<T: Element>(values: &[T], bytes: &[u8]) {
+        let mut out = vec![7];
+        T::append_bytes(values, &mut out);
+        assert_eq!(out[1..], *bytes, "{:?}", T::TYPE);
+        let mut back = vec![T::default(); values.len()];
+        T::fill_from_bytes(&mut back, bytes);
+        assert_eq!(back, values);
+    }
+
+    #[test]
+    fn values_are_little_endian_bytes() {
+        there_and_back(&[1_u8, 255], &[1, 255]);
+        there_and_back(&[0x1234_u16, 1], &[0x34, 0x12, 1, 0]);
+        there_and_back(&[0x8000_0001_u32], &[1, 0, 0, 0x80]);
+        // 1 and infinity of IEEE 754 binary16, -2 of binary32, 1 of binary64.
+        there_and_back(&[f16::ONE, f16::INFINITY], &[0, 0x3c, 0, 0x7c]);
+        there_and_back(&[-2.0_f32], &[0, 0, 0, 0xc0]);
+        there_and_back(&[1.0_f64], &[0, 0, 0, 0, 0, 0, 0xf0, 0x3f]);
+    }
 }

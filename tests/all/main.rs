@@ -17,6 +17,7 @@ mod maximum_principle;
 mod mesh_ply;
 mod mesh_sources;
 mod points;
+mod ranks;
 mod surfaces;
 mod triangle_distance;
 mod wavefront;

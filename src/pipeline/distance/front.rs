@@ -9,7 +9,7 @@
 //! (rounding; over 420 random clouds 3 units were the most for equal spacings, 10 at a ratio of 4, 32 at 6.2).
 
 use crate::error::Result;
-use crate::exec::{Boundary, HaloPlan, Reach, Stage, Workers};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{Box3, FACES, Face, Slot};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::method::DistanceMethod;
@@ -19,7 +19,7 @@ use crate::tile::HaloTile;
 /// How far beyond the smallest entering value a round reaches, in brick edges.
 const ROUND_WIDTH: f64 = 0.5;
 
-/// Carries distance from the bricks in `start`, which hold fixed voxels, as far as `farthest`.
+/// Carries distance from this rank's bricks in `start`, which hold fixed voxels, as far as `farthest`.
 pub(super) fn advance_front<M: DistanceMethod>(
     stage: &Stage<'_>,
     method: &M,
@@ -48,15 +48,17 @@ pub(super) fn advance_front<M: DistanceMethod>(
         entering[slot as usize] = 0.0;
         untold[slot as usize] = true;
     }
+    let exchange = Exchange::new(stage.comm(), &set, &plan)?;
+    exchange.faces(array, start)?;
     let mut rounds = 0;
     loop {
-        let least = entering.iter().copied().fold(f64::INFINITY, f64::min);
+        let least = stage.comm().least(entering.iter().copied().fold(f64::INFINITY, f64::min))?;
         if least.is_infinite() || least > farthest {
             break;
         }
         for colour in 0..if all { 8 } else { 2 } {
             let due = |slot: &Slot| entering[*slot as usize] <= least + width && colour_of(*slot) == colour;
-            let wave: Vec<Slot> = (0..set.len() as Slot).filter(due).collect();
+            let wave: Vec<Slot> = set.owned().filter(due).collect();
             let left = stage.run(&wave, &workers, |(tile, work), &slot| {
                 plan.gather(array, slot, Boundary::Constant(M::UNKNOWN), tile);
                 let part = grid.brick_box(set.id(slot));
@@ -89,6 +91,8 @@ pub(super) fn advance_front<M: DistanceMethod>(
                     }
                 }
             }
+            exchange.faces(array, &wave)?;
+            exchange.lowest(&mut entering)?;
         }
         rounds += 1;
     }

@@ -10,7 +10,8 @@ use crate::kernel::distance::method::DistanceMethod;
 use crate::kernel::distance::triangles;
 use crate::store::BrickArray;
 
-/// Fixes voxels; returns the bricks that hold any, in order of their slots, and the number of fixed voxels.
+/// Fixes voxels of this rank's bricks; returns the bricks that hold any, in order of their slots, and the number of
+/// fixed voxels.
 pub(super) fn initialise<M: DistanceMethod>(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
@@ -18,7 +19,7 @@ pub(super) fn initialise<M: DistanceMethod>(
 ) -> Result<(Vec<Slot>, u64)> {
     let set = array.set();
     let (grid, len) = (*set.grid(), set.grid().brick_len());
-    let near: Vec<Slot> = (0..set.len() as Slot).filter(|&slot| sources.may_fix(set.id(slot))).collect();
+    let near: Vec<Slot> = set.owned().filter(|&slot| sources.may_fix(set.id(slot))).collect();
     let workers = Workers::new(move || (vec![0.0; len], vec![0; len]));
     let fixed = stage.run(&near, &workers, |(squared, source), &slot| {
         let id = set.id(slot);

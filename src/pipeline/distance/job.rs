@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::contiguous::contiguous_margin;
 use super::output::write_fields;
 use super::sign::Signed;
-use super::{Method, Options, Schedule, Solved, Sources};
+use super::{Method, Options, Schedule, Solved, Sources, solve};
 use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::{BrickGrid, BrickSet, DataSets, Geometry, PointBins, TriangleBins};
@@ -104,8 +104,7 @@ pub fn distance<P: Precision>(
         neighbours: settings.neighbours,
         sources: settings.keeps_sources(),
     };
-    let solve = settings.method.solver::<P>().solve;
-    let mut solved = solve(&stage, engine, &sources, &set, settings.schedule, options)?;
+    let mut solved = solve::<P>(&stage, &sources, &set, settings.method, settings.schedule, options)?;
     stage.finish();
     if solved.fixed_voxels == 0 {
         return Err(Error::input(

@@ -11,6 +11,7 @@ mod initialise;
 mod job;
 mod needs;
 mod output;
+mod ranks;
 mod sign;
 mod solvers;
 mod sources;
@@ -23,6 +24,7 @@ use std::sync::Arc;
 pub use field::{Measured, Solved};
 pub use job::{DistanceFound, DistanceSettings, Init, distance};
 pub use needs::Needs;
+pub use ranks::solve;
 pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};
 pub use sources::Sources;
 

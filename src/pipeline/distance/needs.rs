@@ -18,25 +18,32 @@ pub struct Needs {
 /// Bytes of a voxel of the tiles of one thread: the tile, its layout along diagonals (twice as long), coordinates.
 const TILE_BYTES: u64 = 48;
 /// Bytes kept of each brick: its lock, its state, its places in tables.
-const BRICK_BYTES: u64 = 80;
+const BRICK_BYTES: u64 = 96;
+/// Bytes that every further rank keeps of each brick of the grid: its slot, its value where it is not stored.
+const RANK_BYTES: u64 = 16;
 /// Bytes kept of each source: its position, twice, its place in a brick's list, its corners.
 const SOURCE_BYTES: u64 = 160;
 /// Seconds for a voxel on one thread.
 const VOXEL_SECONDS: f64 = 30e-9;
 
 impl DistanceSettings {
-    /// What these settings take on a grid.
+    /// What these settings take on a grid, on so many threads that so many ranks share; each rank has one at least.
     #[must_use]
-    pub fn needs<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize) -> Needs {
+    pub fn needs<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize, ranks: usize) -> Needs {
         let grid = BrickGrid::new(geometry.shape, self.brick);
         let brick = grid.brick_len() as u64;
         let faces = 6 * (self.brick * self.brick) as u64;
         let row = self.method.solver::<P>();
         let element = row.state_bytes + if self.keeps_sources() { row.source_bytes } else { 0 };
-        let buffers = threads as u64 * brick * (TILE_BYTES + element + 12);
-        let held = buffers + grid.len().saturating_mul(BRICK_BYTES) + sets.len() as u64 * SOURCE_BYTES;
+        let buffers = threads.max(ranks) as u64 * brick * (TILE_BYTES + element + 12);
+        let cuts = ranks.saturating_sub(1) as u64;
+        let of_brick = BRICK_BYTES + cuts * RANK_BYTES;
+        let held = buffers + grid.len().saturating_mul(of_brick) + sets.len() as u64 * SOURCE_BYTES;
         let held = held.saturating_add(self.heap_bytes::<P>(geometry));
-        let scratch = grid.len().saturating_mul((brick + faces) * element);
+        // On either side of a cut lie ghosts, a plane of bricks at most, of which only faces are stored.
+        let plane = grid.counts()[0].unsigned_abs().saturating_mul(grid.counts()[1].unsigned_abs());
+        let ghosts = plane.saturating_mul(2 * cuts).saturating_mul(faces * element);
+        let scratch = grid.len().saturating_mul((brick + faces) * element).saturating_add(ghosts);
         let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
         Needs { held, scratch, seconds }
     }

@@ -1,8 +1,8 @@
 //! The `sweep` schedule: ordered passes over all bricks, bit for bit the textbook's triple loops for any brick size and
-//! number of threads (algorithms: section 3, "Sweeping brick by brick changes nothing").
+//! number of threads and ranks (algorithms: section 3, "Sweeping brick by brick changes nothing").
 
 use crate::error::Result;
-use crate::exec::{Boundary, HaloPlan, Reach, Stage, Workers, sweep_waves};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers, sweep_waves};
 use crate::grid::{FACES, Slot};
 use crate::kernel::distance::SWEEPS;
 use crate::kernel::distance::method::OrderedSweeps;
@@ -11,7 +11,7 @@ use crate::tile::HaloTile;
 
 /// Sweeps up to `iterations` times in all eight directions, or until an iteration changes nothing.
 ///
-/// `start` are the bricks that hold fixed voxels. A brick in which a sweep changed nothing is passed over until one
+/// `start` are this rank's bricks that hold fixed voxels. A brick in which a sweep changed nothing is passed over until one
 /// beside it changes: no sweep of any direction could change it.
 pub(super) fn sweep_all<M: OrderedSweeps>(
     stage: &Stage<'_>,
@@ -30,7 +30,9 @@ pub(super) fn sweep_all<M: OrderedSweeps>(
         let beside = FACES.iter().filter_map(|face| set.neighbour(slot, face.offset()));
         beside.for_each(|n| quiet[n as usize] = false);
     };
-    for &slot in start {
+    let exchange = Exchange::new(stage.comm(), &set, &plan)?;
+    let started_elsewhere = exchange.faces(array, start)?;
+    for &slot in start.iter().chain(&started_elsewhere) {
         quiet[slot as usize] = false;
         wake(&mut quiet, slot);
     }
@@ -49,15 +51,16 @@ pub(super) fn sweep_all<M: OrderedSweeps>(
                 })?;
                 for (&slot, &changed) in wave.iter().zip(&changed) {
                     quiet[slot as usize] = !changed;
-                    if changed {
-                        wake(&mut quiet, slot);
-                        resting = false;
-                    }
                 }
+                let changed: Vec<Slot> =
+                    wave.iter().zip(&changed).filter(|(_, c)| **c).map(|(slot, _)| *slot).collect();
+                let changed_elsewhere = exchange.faces(array, &changed)?;
+                resting &= changed.is_empty();
+                changed.iter().chain(&changed_elsewhere).for_each(|&slot| wake(&mut quiet, slot));
             }
         }
         stage.iterated(1, 0.0);
-        if resting {
+        if !stage.comm().any(!resting)? {
             break;
         }
     }

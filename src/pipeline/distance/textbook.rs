@@ -1,5 +1,5 @@
 //! FMM and DP in the textbook's order: the bricks of a field are gathered into one dense array, one heap marches over it
-//! (`kernel::distance::{marching_heap, dijkstra_heap}`), the bricks get their voxels back. On one thread.
+//! (`kernel::distance::{marching_heap, dijkstra_heap}`), the bricks get their voxels back. On one thread of one rank.
 
 use crate::error::Result;
 use crate::exec::Engine;
@@ -23,6 +23,9 @@ pub(super) fn heap_dijkstra<S: TrackedSource<Number = f64>>(
     neighbours: Neighbours,
     states: &BrickArray<u32>,
 ) -> Result<()> {
+    if states.set().owned().is_empty() {
+        return Ok(());
+    }
     let domain = geometry.domain();
     let mut dense = vec![NO_SOURCE; domain.len()];
     states.read_box(&domain, &mut dense)?;
@@ -43,6 +46,9 @@ pub(super) fn heap_marching<P: Precision, S: TrackedSource>(
     distances: &BrickArray<P>,
     states: &BrickArray<u32>,
 ) -> Result<()> {
+    if states.set().owned().is_empty() {
+        return Ok(());
+    }
     let domain = geometry.domain();
     let mut dense = vec![NO_SOURCE; domain.len()];
     states.read_box(&domain, &mut dense)?;

@@ -5,7 +5,7 @@
 //! depend on threads; what is found does not even depend on the rounds.
 
 use crate::error::Result;
-use crate::exec::{Boundary, HaloPlan, Reach, Stage, Workers};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{Box3, Geometry, NEIGHBOURS_26, Slot};
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::precision::Precision;
@@ -29,17 +29,21 @@ pub(super) fn trace_sources<P: Precision>(
     let tracer = Tracer::new(geometry, edge);
     let workers = Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), tracer.clone()));
     let colour = |slot: Slot| grid.coords(set.id(slot)).iter().fold(0, |colour, at| colour << 1 | (at & 1));
-    let mut due = vec![false; set.len()];
+    // 0 for bricks that are due, else infinite: what ranks tell each other.
+    let mut due = vec![f64::INFINITY; set.len()];
     // Nobody was told of their fixed voxels yet.
     let mut untold = vec![false; set.len()];
     let mut complete: Vec<bool> = (0..set.len() as Slot).map(|slot| distances.unwritten(slot).is_some()).collect();
     for &slot in start {
-        (due[slot as usize], untold[slot as usize]) = (true, true);
+        (due[slot as usize], untold[slot as usize]) = (0.0, true);
     }
-    while due.contains(&true) {
+    let exchange = Exchange::new(stage.comm(), &set, &plan)?;
+    exchange.faces(distances, &set.owned().collect::<Vec<_>>())?;
+    exchange.faces(states, start)?;
+    while stage.comm().any(due.contains(&0.0))? {
         for turn in 0..8 {
-            let wave: Vec<Slot> =
-                (0..set.len() as Slot).filter(|&slot| due[slot as usize] && colour(slot) == turn).collect();
+            let is_due = |slot: &Slot| due[*slot as usize] == 0.0 && colour(*slot) == turn;
+            let wave: Vec<Slot> = set.owned().filter(is_due).collect();
             let traced = stage.run(&wave, &workers, |(distance, state, tracer), &slot| {
                 plan.gather(distances, slot, Boundary::Constant(P::UNKNOWN), distance);
                 plan.gather(states, slot, Boundary::Constant(NO_SOURCE), state);
@@ -50,12 +54,17 @@ pub(super) fn trace_sources<P: Precision>(
                 Ok((found, left))
             })?;
             for (&slot, (found, left)) in wave.iter().zip(traced) {
-                due[slot as usize] = false;
+                due[slot as usize] = f64::INFINITY;
                 complete[slot as usize] = !left;
                 if found || std::mem::take(&mut untold[slot as usize]) {
                     let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
-                    beside.filter(|&n| !complete[n as usize]).for_each(|n| due[n as usize] = true);
+                    beside.for_each(|n| due[n as usize] = 0.0);
                 }
+            }
+            exchange.faces(states, &wave)?;
+            exchange.lowest(&mut due)?;
+            for slot in set.owned().filter(|&slot| complete[slot as usize]) {
+                due[slot as usize] = f64::INFINITY;
             }
         }
     }

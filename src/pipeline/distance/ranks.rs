@@ -1,0 +1,92 @@
+//! A distance solved by the ranks of a run, each on its own bricks, and read as one field: whoever reads a brick reads it
+//! from the rank that owns it.
+
+use std::sync::Arc;
+
+use super::{Method, Options, Schedule, Solved, Sources, Textbook};
+use crate::error::Result;
+use crate::exec::{HaloPlan, Ownership, Reach, Stage};
+use crate::grid::{Box3, BrickGrid, BrickSet};
+use crate::kernel::distance::precision::Precision;
+use crate::store::{BoxSource, Element};
+
+/// Computes the distance to `sources` on the bricks of `set`, by a schedule; on all ranks of the stage's engine, of which
+/// the first alone keeps the one heap of a method that has one. Distances and sources do not depend on how many these are.
+///
+/// # Errors
+/// When scratch runs out, the run is interrupted, or a rank ends early.
+pub fn solve<'a, P: Precision>(
+    stage: &Stage<'_>,
+    sources: &Sources<'a>,
+    set: &BrickSet,
+    method: Method,
+    schedule: Schedule,
+    options: Options,
+) -> Result<Solved<'a, P>> {
+    let solver = method.solver::<P>();
+    let one_heap = schedule != Schedule::Front && solver.textbook != Textbook::Sweeps;
+    let ownership =
+        if one_heap { Ownership::first(set, stage.ranks()) } else { Ownership::balanced(set, stage.ranks()) };
+    // Sources are found by all 26 neighbours even where distances are not.
+    let plan = HaloPlan::new(*set.grid(), Reach::All);
+    let parts = stage.on_ranks(|stage, engine| {
+        let own = Arc::new(ownership.part(set, engine.comm().rank(), &plan));
+        (solver.solve)(stage, engine, sources, &own, schedule, options)
+    })?;
+    let joined = Cut { grid: *set.grid(), ownership };
+    let fixed_voxels = parts.iter().map(|part| part.fixed_voxels).sum();
+    Ok(Solved {
+        values: joined.join(parts.iter().map(|part| part.values.clone()).collect()),
+        sources: joined.join(parts.iter().map(|part| part.sources.clone()).collect()),
+        fixed: joined.join(parts.iter().map(|part| part.fixed.clone()).collect()),
+        fixed_voxels,
+    })
+}
+
+/// How a field is cut.
+#[derive(Clone)]
+struct Cut {
+    grid: BrickGrid,
+    ownership: Ownership,
+}
+
+impl Cut {
+    fn join<'a, T: Element>(&self, parts: Vec<Part<'a, T>>) -> Part<'a, T> {
+        Arc::new(Joined { cut: self.clone(), parts })
+    }
+}
+
+/// What one rank has of a field.
+type Part<'a, T> = Arc<dyn BoxSource<T> + Send + 'a>;
+
+/// A field of which each rank has its own bricks.
+struct Joined<'a, T> {
+    cut: Cut,
+    parts: Vec<Part<'a, T>>,
+}
+
+impl<T: Element> BoxSource<T> for Joined<'_, T> {
+    fn shape(&self) -> [i64; 3] {
+        self.cut.grid.shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
+        let Cut { grid, ownership } = &self.cut;
+        let mut owners = grid.bricks_in(part).map(|id| ownership.owner(id));
+        let first = owners.next().unwrap_or(0);
+        if owners.all(|owner| owner == first) {
+            return self.parts[first].read_box(part, out);
+        }
+        let mut values = Vec::new();
+        for id in grid.bricks_in(part) {
+            let shared = grid.brick_box(id).intersect(part);
+            values.resize(shared.len(), T::default());
+            self.parts[ownership.owner(id)].read_box(&shared, &mut values)?;
+            let width = shared.shape()[0] as usize;
+            for ((y, z), row) in shared.rows().zip(values.chunks_exact(width)) {
+                out[part.offset_of([shared.lo[0], y, z])..][..width].copy_from_slice(row);
+            }
+        }
+        Ok(())
+    }
+}
