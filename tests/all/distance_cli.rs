@@ -19,7 +19,8 @@ use crate::common::textbook::{position, squared};
 fn bench() -> Bench {
     let bench = Bench::bare();
     for (name, cloud) in ["sponge.xyz", "sphere.xyz"].into_iter().zip(sponge_and_sphere()) {
-        bench.write(name, &cloud.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect::<String>());
+        let lines: Vec<String> = cloud.iter().map(|[x, y, z]| format!("{x} {y} {z}")).collect();
+        bench.write(name, &lines.join("\n"));
     }
     let ball = meshes::sphere([0.5, 0.5, 0.0], 1.0, 20, std::f64::consts::PI);
     fs::write(bench.path("ball.off"), Form::Off.write(&ball)).unwrap();

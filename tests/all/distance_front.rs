@@ -133,8 +133,9 @@ fn without_crowded(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
 }
 
 /// Nearly every voxel has its nearest source: all but 1 in 1000 of scattered points, none farther off than three tenths of
-/// a voxel or than the printed loops, swept to the end, leave it. Not so on Sponge & Sphere, where one
-/// point of the sphere is walled in by the voxels that its neighbours fix: the printed loops miss 0.6 in 1000 by 0.23 voxels at most, this schedule 1.5 in 1000 by 0.42; the figures are held here as they are.
+/// a voxel or than the printed loops, swept to the end, leave it. Not so on Sponge & Sphere, where one point of the
+/// sphere is walled in by the voxels that its neighbours fix: the printed loops miss 0.6 in 1000 by 0.23 voxels at most,
+/// this schedule 1.5 in 1000 by 0.42; the figures are held here as they are.
 #[test]
 fn euclidean_methods_find_nearly_every_nearest_source() {
     let lab = Lab::new(2);

@@ -90,7 +90,9 @@ fn the_cube_has_the_errors_of_table_2() {
 fn pair(lab: &Lab, h: f64, method: Method, schedule: Schedule, init: Init, labels: bool) -> Result<DistanceFound> {
     let clouds = sponge_and_sphere();
     let mut sets = DataSets::default();
-    clouds.iter().for_each(|cloud| sets.add_cloud(cloud));
+    for cloud in &clouds {
+        sets.add_cloud(cloud);
+    }
     let settings = DistanceSettings {
         method,
         schedule,
