@@ -24,7 +24,9 @@ def circumstances(version):
 
 def machine():
     """Processor, how many of it, memory, kernel, of this machine."""
-    cpu = next((line for line in _lines("/proc/cpuinfo") if line.startswith("model name")), "model name: unknown processor")
+    cpu = next(
+        (line for line in _lines("/proc/cpuinfo") if line.startswith("model name")), "model name: unknown processor"
+    )
     vector = "AVX-512" if any("avx512f" in line for line in _lines("/proc/cpuinfo")) else "no AVX-512"
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     name = cpu.partition(":")[2].strip()

@@ -73,7 +73,17 @@ class Program:
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.json"
             output = store or "none"
-            command = [self.path, "distance", *map(str, sources), *flags, "-o", str(output), "--report", str(report), "-q"]
+            command = [
+                self.path,
+                "distance",
+                *map(str, sources),
+                *flags,
+                "-o",
+                str(output),
+                "--report",
+                str(report),
+                "-q",
+            ]
             pin = (lambda: os.sched_setaffinity(0, cpus)) if cpus else None
             done = subprocess.run(command, capture_output=True, text=True, preexec_fn=pin)
             if done.returncode != 0:

@@ -18,8 +18,9 @@ from .measure import measure
 MESHES = {"teddy": "teddy-cgal-bear.off", "whale cranium": "pilot-whale-cranium.ply"}
 TITLE = """# Performance
 
-Distance fields: other programs and this one on the same inputs, in one run, on one machine. `scripts/bench_peers` installs the others, measures, and
-writes this page; [reproduction.md](reproduction.md) has the times of the papers' experiments.
+Distance fields: other programs and this one on the same inputs, in one run, on one machine. `scripts/bench_peers`
+installs the others, measures, and writes this page; [reproduction.md](reproduction.md) has the times of the papers'
+experiments.
 
     scripts/bench_peers                                    # the Cube experiment at 145^3, 289^3, 577^3
     scripts/bench_peers --sizes --data FOLDER              # the meshes alone; FOLDER holds their files
@@ -29,15 +30,23 @@ writes this page; [reproduction.md](reproduction.md) has the times of the papers
 
 def arguments():
     parser = argparse.ArgumentParser(prog="scripts/bench_peers", description=__doc__.splitlines()[0])
-    parser.add_argument("--sizes", type=int, nargs="*", default=[145, 289, 577], metavar="N", help="Cube experiments (145 289 577)")
+    parser.add_argument(
+        "--sizes", type=int, nargs="*", default=[145, 289, 577], metavar="N", help="Cube experiments (145 289 577)"
+    )
     data = os.environ.get("STRANDLINE_DATA")
-    parser.add_argument("--data", type=Path, default=data and Path(data), help="folder with the meshes ($STRANDLINE_DATA)")
+    parser.add_argument(
+        "--data", type=Path, default=data and Path(data), help="folder with the meshes ($STRANDLINE_DATA)"
+    )
     parser.add_argument("--mesh-size", type=int, default=256, metavar="N", help="edge of the meshes' grid (256)")
     parser.add_argument("--large", action="store_true", help="also 1024^3 with --memory 1GiB; 20 GB of --scratch")
-    parser.add_argument("--huge", action="store_true", help="also 2048 x 2048 x 1024 with --memory 2GiB; 60 GB of --scratch")
+    parser.add_argument(
+        "--huge", action="store_true", help="also 2048 x 2048 x 1024 with --memory 2GiB; 60 GB of --scratch"
+    )
     parser.add_argument("--repeats", type=int, default=3, metavar="N", help="runs of each entry (3)")
     parser.add_argument("--scratch", type=Path, help="folder for temporary files (the system's)")
-    parser.add_argument("--out", type=Path, default=page.ROOT / "docs" / "performance.md", help="page to write (docs/performance.md)")
+    parser.add_argument(
+        "--out", type=Path, default=page.ROOT / "docs" / "performance.md", help="page to write (docs/performance.md)"
+    )
     return parser.parse_args()
 
 
@@ -69,8 +78,9 @@ def run_meshes(settings, program, pythons, failures, scratch):
         case = cases.mesh(name, path, scratch, pythons["numpy2"], settings.mesh_size)
         chosen = [*entries.ours_on_meshes(program), *entries.peers(case.table, pythons, failures)]
         remark = (
-            "Errors at 20,000 random voxels against libigl's exact distances; those of a band at the voxels in it. OpenVDB's fields are signed; of ours, "
-            "those named so, whose time is the unsigned one's and what the whole run takes longer with `--signed`."
+            "Errors at 20,000 random voxels against libigl's exact distances; those of a band at the voxels in it. "
+            "OpenVDB's fields are signed; of ours, those named so, whose time is the unsigned one's and what the "
+            "whole run takes longer with `--signed`."
         )
         yield section(case, measure(case, chosen, settings.repeats, scratch), program, [remark])
 

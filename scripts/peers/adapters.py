@@ -1,14 +1,14 @@
-"""How each program is called. `prepare` brings the input into the program's own form and is not timed; what it returns is.
+"""How each program is called.
 
-The sign of a distance is left
-to whoever compares.
+`prepare` brings the input into the program's own form and is not timed; what it returns is. The sign of a distance is
+left to whoever compares. The programs' modules are imported where they are used: no environment has all of them.
 
-Input of a case on a grid: `mask` (True at sources), `spacing`; arrays are `[z, y, x]`. Input of a mesh case: `vertices`,
-`faces`, `shape`, `spacing`, `origin` (the last three x, y, z; of numpy alone, the peers' modules are imported when asked for).
+Input of a case on a grid: `mask` (True at sources) and `spacing`; arrays are `[z, y, x]`. Input of a mesh case:
+`vertices`, `faces`, `shape`, `spacing`, `origin`, of which `shape` and `origin` are x, y, z.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 
@@ -22,8 +22,8 @@ class Peer:
     prepare: Callable  # (case, threads) -> function without arguments that returns the distances
     group: str = "numpy2"
     threads: tuple = (1,)
-    exact: bool = False  # Euclidean, not a solution of the Eikonal equation
     note: str = ""
+    band: float | None = None  # voxels around the surface that get a distance; None: all
 
 
 def edt(case, threads):
@@ -157,7 +157,9 @@ def openvdb(half_width):
         width = half_width or float(np.linalg.norm(shape))
 
         def run():
-            grid = vdb.FloatGrid.createLevelSetFromPolygons(points, triangles=faces, transform=transform, halfWidth=width)
+            grid = vdb.FloatGrid.createLevelSetFromPolygons(
+                points, triangles=faces, transform=transform, halfWidth=width
+            )
             field = np.empty(shape, dtype=np.float32)
             grid.copyToArray(field)
             return field.T
@@ -167,22 +169,28 @@ def openvdb(half_width):
     return prepare
 
 
-EXACT = {"exact": True}
 GRID_PEERS = (
-    Peer("edt", "exact transform", edt, threads=(1, 2), **EXACT),
-    Peer("bioimage-cpp", "exact transform", bioimage_edt, threads=(1, 2), **EXACT),
-    Peer("bioimage-cpp", "exact transform, indices", bioimage_indices, threads=(1, 2), **EXACT, note="keeps the nearest source"),
-    Peer("itk", "Maurer", itk_maurer, threads=(1, 2), **EXACT),
-    Peer("scipy", "exact transform", scipy_edt, **EXACT),
-    Peer("scipy", "exact transform, indices", scipy_indices, **EXACT, note="keeps the nearest source"),
+    Peer("edt", "exact transform", edt, threads=(1, 2)),
+    Peer("bioimage-cpp", "exact transform", bioimage_edt, threads=(1, 2)),
+    Peer("bioimage-cpp", "exact transform, indices", bioimage_indices, threads=(1, 2), note="keeps the nearest source"),
+    Peer("itk", "Maurer", itk_maurer, threads=(1, 2)),
+    Peer("scipy", "exact transform", scipy_edt),
+    Peer("scipy", "exact transform, indices", scipy_indices, note="keeps the nearest source"),
     Peer("itk", "fast marching", itk_fast_marching),
     Peer("scikit-fmm", "fast marching", skfmm(1)),
     Peer("scikit-fmm", "fast marching, order 2", skfmm(2)),
     Peer("bioimage-cpp", "fast marching", bioimage_geodesic),
     Peer("pyfmm-kit", "fast marching", pyfmm(False), group="numpy1"),
-    Peer("pyfmm-kit", "fast sweeping", pyfmm(True), group="numpy1", threads=(1, 2), note="two iterations with 2 threads, its least"),
+    Peer(
+        "pyfmm-kit",
+        "fast sweeping",
+        pyfmm(True),
+        group="numpy1",
+        threads=(1, 2),
+        note="two iterations with 2 threads, its least",
+    ),
 )
 MESH_PEERS = (
-    Peer("openvdb", "band of 3 voxels", openvdb(3.0), threads=(1, 2), note="signed"),
+    Peer("openvdb", "band of 3 voxels", openvdb(3.0), threads=(1, 2), band=3.0, note="signed"),
     Peer("openvdb", "whole grid", openvdb(None), note="signed"),
 )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from common import shapes
 from common.grids import Grid
 
@@ -22,7 +23,7 @@ class Case:
     flags: list
 
     def errors(self, layers, band=None):
-        """Mean squared and largest error of a field given as an iterable of (first plane, planes)."""
+        """Mean squared and largest error of a field, given as (first plane, planes); `band`: within so many voxels."""
         raise NotImplementedError
 
 
@@ -39,7 +40,7 @@ class CubeCase(Case):
 
 
 class MeshCase(Case):
-    """A triangle mesh; 20,000 random voxels are compared with libigl. `band`: only those nearer than that."""
+    """A triangle mesh; 20,000 random voxels are compared with libigl."""
 
     def errors(self, layers, band=None):
         chosen, exact = self.truth
@@ -49,7 +50,7 @@ class MeshCase(Case):
             here = (chosen >= z * nx * ny) & (chosen < (z + len(planes)) * nx * ny)
             local = chosen[here] - z * nx * ny
             found[here] = np.abs(planes[local // (nx * ny), local // nx % ny, local % nx])
-        difference = (found - exact)[exact < band] if band else found - exact
+        difference = (found - exact)[exact < band * self.grid.spacing] if band else found - exact
         return float((difference**2).mean()), float(np.abs(difference).max())
 
 
@@ -72,7 +73,9 @@ def mesh(name, path, scratch, python, longest=256):
     origin = tuple(float(c) for c in (low + high) / 2 - spacing * (longest - 1) / 2)
     grid = Grid((longest,) * 3, spacing, origin)
     stored, source = scratch / f"{name}.npz", scratch / f"{name}.ply"
-    np.savez(stored, vertices=positions, faces=faces, shape=np.array(grid.shape), spacing=spacing, origin=np.array(origin))
+    np.savez(
+        stored, vertices=positions, faces=faces, shape=np.array(grid.shape), spacing=spacing, origin=np.array(origin)
+    )
     shapes.write_mesh(source, positions, faces)
     case = MeshCase(name, f"{name}, {len(faces):,} triangles, {grid}", grid, "MESH_PEERS", stored, source, grid.flags())
     case.truth = truth(case, scratch / f"{name}-truth.npy", python)
@@ -102,9 +105,12 @@ def read_mesh(path):
         return shapes.read_off(path)
     data = path.read_bytes()
     header, _, body = data.partition(b"end_header\n")
-    counts = {words[1]: int(words[2]) for words in map(str.split, header.decode().splitlines()) if words[0] == "element"}
+    counts = {
+        words[1]: int(words[2]) for words in map(str.split, header.decode().splitlines()) if words[0] == "element"
+    }
     properties = header.decode().partition("element face")[0].count("property float")
     vertices = np.frombuffer(body, dtype="<f4", count=counts["vertex"] * properties).reshape(-1, properties)
-    faces = np.frombuffer(body, dtype=[("n", "u1"), ("corners", "<i4", 3)], count=counts["face"], offset=vertices.nbytes)
+    faces = np.frombuffer(
+        body, dtype=[("n", "u1"), ("corners", "<i4", 3)], count=counts["face"], offset=vertices.nbytes
+    )
     return vertices[:, :3].astype(float), faces["corners"].astype(np.int64)
-

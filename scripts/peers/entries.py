@@ -8,12 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import zarr
+
 from common.program import RunFailed
 
 from . import adapters
 
 LAYER = 64  # planes compared at a time
-NAMES = {"fsm": "fast sweeping", "vdt": "vector distance transform", "fmm": "fast marching", "dp": "Dijkstra-Pythagoras"}
+NAMES = {
+    "fsm": "fast sweeping",
+    "vdt": "vector distance transform",
+    "fmm": "fast marching",
+    "dp": "Dijkstra-Pythagoras",
+}
 
 
 @dataclass
@@ -74,14 +80,14 @@ class PeerEntry:
         self.version = found["version"]
         return Sample(found["seconds"], found["bytes"])
 
-    def errors(self, case, scratch):
-        """Mean squared and largest error, from a call of its own that is not timed."""
+    def first(self, case, threads, scratch):
+        """A sample whose field is compared: mean squared and largest error beside it."""
         kept = scratch / "field.npy"
-        sample = self.run(case, max(self.threads()), keep=kept)
+        sample = self.run(case, threads, keep=kept)
         field = np.load(kept, mmap_mode="r")
-        found = case.errors((z, field[z : z + LAYER]) for z in range(0, len(field), LAYER))
+        found = case.errors(((z, field[z : z + LAYER]) for z in range(0, len(field), LAYER)), self.peer.band)
         kept.unlink()
-        return found, sample
+        return sample, found
 
 
 @dataclass
@@ -130,18 +136,19 @@ class OwnEntry:
             self.baseline = self.program_object.distance([case.source], tiny).stage("sort sources")["peak_rss_bytes"]
         return self.baseline
 
-    def errors(self, case, scratch):
+    def first(self, case, threads, scratch):
+        """A sample, and the errors from a run that writes the field; a signed row has none, its unsigned one has."""
+        sample = self.run(case, threads)
+        if self.signed:
+            return sample, (None, None)
         store = scratch / "field.zarr"
         try:
-            sample = OwnEntry.run(self, case, 2, keep=store) if not self.signed else None
-            if sample is None:
-                return (None, None), None
+            self.run(case, threads, keep=store)
             field = zarr.open_array(str(store), path="0", mode="r")
-            band = self.band and self.band * case.grid.spacing
-            found = case.errors(((z, field[z : z + LAYER]) for z in range(0, field.shape[0], LAYER)), band)
+            layers = ((z, field[z : z + LAYER]) for z in range(0, field.shape[0], LAYER))
+            return sample, case.errors(layers, self.band)
         finally:
             shutil.rmtree(store, ignore_errors=True)
-        return found, sample
 
 
 def peers(table, pythons, failures):

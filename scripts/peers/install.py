@@ -24,7 +24,7 @@ def environments(target):
         for line in done.read_text().partition("\n--\n")[2].split():
             name = line.partition("==")[0]
             hint = "; Debian has it as python3-openvdb" if name == "openvdb" else ""
-            failures[name] = f"not run: no wheel on PyPI that installs here{hint}"
+            failures[name] = f"not run: pip could not install it{hint}"
     if "openvdb" in failures and debian_has_openvdb():
         pythons["openvdb"] = DEBIAN
         del failures["openvdb"]
@@ -32,7 +32,7 @@ def environments(target):
 
 
 def debian_has_openvdb():
-    """True when the system's own Python has Debian's python3-openvdb: PyPI has no wheel of OpenVDB."""
+    """True when the system's own Python has Debian's python3-openvdb: PyPI has no OpenVDB."""
     command = [str(DEBIAN), "-c", "import pyopenvdb, numpy"]
     return DEBIAN.exists() and subprocess.run(command, capture_output=True).returncode == 0
 
@@ -42,9 +42,9 @@ def requirements(path):
 
 
 def install(python, line):
-    """True when pip could install it; wheels only, nothing is compiled."""
+    """True when pip could install it; wheels where there are any."""
     print(f"installing {line}", flush=True)
-    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary=:all:", line]
+    command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--prefer-binary", line]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         print(f"  {(done.stderr.strip().splitlines() or ['failed'])[-1]}", flush=True)

@@ -1,20 +1,33 @@
-"""Out of core: Sponge & Sphere on grids larger than the memory allowed, against all memory and against the exact distance."""
+"""Out of core: Sponge & Sphere on grids larger than the memory, against all memory and the exact distance."""
 
 import shutil
 
 import numpy as np
 import zarr
+
 from common import page, shapes
 from common.grids import Grid
 from common.program import RunFailed
 
 SHAPES = {"large": (1024, 1024, 1024), "huge": (2048, 2048, 1024)}
 MEMORY = {"large": "1GiB", "huge": "2GiB"}
-HEADER = ["grid", "method", "--memory", "seconds", "ns/voxel", "peak MiB, whole run", "loads per brick", "bits", "excess share", "largest excess / h"]
-EXPLAINED = """Sources: the 462 points of Sponge & Sphere. Seconds are those of the field, as above; the peak is that of the whole run, in which the field is
-also written. A load is a brick that was not resident. Bits: whether all values equal those of the run with all memory. Excess: how many of a million random voxels
-lie more than rounding above the exact distance to the nearest of the initial voxels' sources, and by how much at most (VDT and DP; FSM and FMM solve the Eikonal
-equation, whose first order error is the largest there)."""
+HEADER = [
+    "grid",
+    "method",
+    "--memory",
+    "seconds",
+    "ns/voxel",
+    "peak MiB, whole run",
+    "loads per brick",
+    "bits",
+    "excess share",
+    "largest excess / h",
+]
+EXPLAINED = """Sources: the 462 points of Sponge & Sphere. Seconds are those of the field, as above; the peak is that of
+the whole run, in which the field is also written. A load is a brick that was not resident. Bits: whether all values
+equal those of the run with all memory. Excess: the share of a million random voxels that lie more than rounding above
+the exact distance to the nearest point, and the most that one does. FSM and FMM solve the Eikonal equation: their
+excess is the error of a first order scheme."""
 
 
 def measure(program, size, methods, scratch):
@@ -27,7 +40,10 @@ def measure(program, size, methods, scratch):
     sample = voxels_and_distances(grid, np.unique(np.concatenate(clouds), axis=0))
     rows = []
     for method in methods:
-        stores = {memory: scratch / f"{method}-{memory}.zarr" for memory in [MEMORY[size], *(["all"] if size == "large" else [])]}
+        stores = {
+            memory: scratch / f"{method}-{memory}.zarr"
+            for memory in [MEMORY[size], *(["all"] if size == "large" else [])]
+        }
         for memory, store in stores.items():
             rows.append(one(program, files, grid, method, memory, store, scratch, sample))
             print(f"  {rows[-1]}", flush=True)
@@ -50,10 +66,17 @@ def one(program, files, grid, method, memory, store, scratch, sample):
     limit = [] if memory == "all" else ["--memory", memory]
     row = {"grid": str(grid), "method": method, "memory": memory}
     try:
-        run = program.distance(files, [*grid.flags(), "--method", method, "--scratch", str(scratch), *limit], store=store)
+        run = program.distance(
+            files, [*grid.flags(), "--method", method, "--scratch", str(scratch), *limit], store=store
+        )
     except RunFailed as error:
         return {**row, "failed": str(error)}
-    values = {"seconds": run.seconds, "voxels": grid.voxels, "peak": run.report["peak_rss_bytes"], "loads": run.loads_per_brick}
+    values = {
+        "seconds": run.seconds,
+        "voxels": grid.voxels,
+        "peak": run.report["peak_rss_bytes"],
+        "loads": run.loads_per_brick,
+    }
     return {**row, **values, **excess(store, grid, sample)}
 
 
@@ -89,7 +112,9 @@ def same(a, b):
     first, second = (zarr.open_array(str(path), path="0", mode="r") for path in (a, b))
     layer = first.chunks[0]
     bits = np.dtype(f"u{first.dtype.itemsize}")
-    pairs = ((first[z : z + layer].view(bits), second[z : z + layer].view(bits)) for z in range(0, first.shape[0], layer))
+    pairs = (
+        (first[z : z + layer].view(bits), second[z : z + layer].view(bits)) for z in range(0, first.shape[0], layer)
+    )
     return all(np.array_equal(one, other) for one, other in pairs)
 
 

@@ -11,29 +11,27 @@ PATIENCE = 20.0  # seconds: an entry that has taken so long in all is not run ag
 def measure(case, entries, repeats, scratch):
     """One row per entry: a dict of plain values, ready for JSON."""
     samples, failed, errors = defaultdict(list), {}, {}
-    for number in range(repeats):
+    for _ in range(repeats):
         for threads in (1, 2):
             for place, entry in enumerate(entries):
                 spent = sum(sample.seconds for sample in samples[place, threads])
                 if threads not in entry.threads() or place in failed or spent > PATIENCE:
                     continue
                 try:
-                    samples[place, threads].append(entry.run(case, threads))
-                    tell(case, entry, threads, samples[place, threads][-1].seconds)
+                    if place in errors:
+                        sample = entry.run(case, threads)
+                    else:
+                        sample, errors[place] = entry.first(case, threads, scratch)
                 except Failed as error:
                     failed[place] = str(error)
                     print(f"  {entry.program} {entry.method}: {error}", flush=True)
-    for place, entry in enumerate(entries):
-        if place not in failed:
-            try:
-                errors[place] = entry.errors(case, scratch)[0]
-            except Failed as error:
-                failed[place] = str(error)
+                    continue
+                samples[place, threads].append(sample)
+                print(
+                    f"  {case.name}, {threads} thread(s): {entry.program} {entry.method}: {sample.seconds:.3f} s",
+                    flush=True,
+                )
     return [row(case, entry, place, samples, failed, errors) for place, entry in enumerate(entries)]
-
-
-def tell(case, entry, threads, seconds):
-    print(f"  {case.name}, {threads} thread(s): {entry.program} {entry.method}: {seconds:.3f} s", flush=True)
 
 
 def row(case, entry, place, samples, failed, errors):

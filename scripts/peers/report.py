@@ -2,26 +2,45 @@
 
 from common import page
 
-HEADER = ["program", "method", "1 thread, s", "2 threads, s", "speed-up", "ns/voxel", "B/voxel", "MSE", "max error / h", "runs"]
-EXPLAINED = """Seconds are medians; *runs* says of how many, with one and with two threads (an entry that took more than 20 s in all is not run again). Each run is
-a process of its own, held on one processor or two; every program has its turn before any has its second. Ours is everything from the
-sources in memory to the finished field, initialisation included: the stages `sort sources` and `distance` of the report. The others' is the
-call, after imports and a first call on a small input, with the input in memory in the form that the program wants. B/voxel is the largest
-resident set during the call less that before the input was read: input and result count. ns/voxel is that of the faster column. Fields of ours
-and of edt, bioimage-cpp and ITK are f32, those of scipy, scikit-fmm and pyfmm-kit f64."""
+HEADER = [
+    "program",
+    "method",
+    "1 thread, s",
+    "2 threads, s",
+    "speed-up",
+    "ns/voxel",
+    "B/voxel",
+    "MSE",
+    "max error / h",
+    "runs",
+]
+EXPLAINED = """Seconds are medians; *runs* says of how many, with one and with two threads (an entry that took more than
+20 s in all is not run again). Each run is a process of its own, held on one processor or two; every program has its
+turn before any has its second. Ours is everything from the sources in memory to the finished field, initialisation included:
+the stages `sort sources` and `distance` of the report. The others' is the call, after imports and a first call on a
+small input, with the input in memory in the form that the program wants. B/voxel is the largest resident set during
+the call less that before the input was read: input and result count. ns/voxel is that of the faster column. Fields of ours
+and of edt, bioimage-cpp (fast marching: f64) and ITK are f32, those of scipy, scikit-fmm and pyfmm-kit f64. Ours without
+a word about the schedule are those of the default, `front`."""
 
 
 def tables(sections):
     """All cases: the sections in the order of their names' sizes."""
     parts = [EXPLAINED]
     for section in ordered(sections):
-        parts.append(f"## {section['title']}\n\n{section['when']}\n\n" + page.table(HEADER, [line(r, section) for r in by_time(section["rows"])]))
+        parts.append(
+            f"## {section['title']}\n\n{section['when']}\n\n"
+            + page.table(HEADER, [line(r, section) for r in by_time(section["rows"])])
+        )
         parts[-1] += "".join(f"\n\n{text}" for text in remarks(section))
     return "\n\n".join(parts)
 
 
 def ordered(sections):
-    return [sections[name] for name in sorted(sections, key=lambda name: (not name.startswith("cube"), sections[name]["voxels"], name))]
+    return [
+        sections[name]
+        for name in sorted(sections, key=lambda name: (not name.startswith("cube"), sections[name]["voxels"], name))
+    ]
 
 
 def best(row):
@@ -54,7 +73,11 @@ def remarks(section):
     rows = [row for row in section["rows"] if "failed" not in row]
     versions = sorted({f"{row['program']} {row['version']}".strip() for row in rows})
     notes = [f"{row['program']} {row['method']}: {row['note']}" for row in rows if row["note"]]
-    return [f"Versions: {', '.join(versions)}.", *([f"{'; '.join(notes)}."] if notes else []), *section.get("remarks", [])]
+    return [
+        f"Versions: {', '.join(versions)}.",
+        *([f"{'; '.join(notes)}."] if notes else []),
+        *section.get("remarks", []),
+    ]
 
 
 def plot(sections, path):

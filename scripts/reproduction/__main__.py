@@ -15,9 +15,9 @@ from .setting import Setting
 SECTIONS = {"cube": cube.section, "teddy": teddy.section, "sponge": sponge.section}
 TITLE = """# Reproduction
 
-B. Kósa, K. Mikula: *Direct simple computation of middle surface between 3D point clouds and/or discrete surfaces by tracking sources in distance
-function calculation algorithms*, 2023: the tables of its distance experiments, with what this program gives. Tables are numbered as in the paper;
-its errors of printing are left out.
+B. Kósa, K. Mikula: *Direct simple computation of middle surface between 3D point clouds and/or discrete surfaces by
+tracking sources in distance function calculation algorithms*, 2023: the tables of its distance experiments, and what
+this program gives. Tables are numbered as in the paper. `scripts/reproduce` runs the experiments and writes this page.
 
     scripts/reproduce --data FOLDER            # all grids, up to 893 x 1279 x 482
     scripts/reproduce --finest 340             # those of at most 340 points along an axis
@@ -26,12 +26,18 @@ its errors of printing are left out.
 
 def arguments():
     parser = argparse.ArgumentParser(prog="scripts/reproduce", description=__doc__)
-    parser.add_argument("--finest", type=int, default=10**9, metavar="N", help="leave out grids of more than N points along an axis")
+    parser.add_argument(
+        "--finest", type=int, default=10**9, metavar="N", help="leave out grids of more than N points along an axis"
+    )
     parser.add_argument("--only", choices=SECTIONS, action="append", help="only this experiment; may be repeated (all)")
     data = os.environ.get("STRANDLINE_DATA")
-    parser.add_argument("--data", type=Path, default=data and Path(data), help=f"folder that holds {teddy.FILE} ($STRANDLINE_DATA)")
+    parser.add_argument(
+        "--data", type=Path, default=data and Path(data), help=f"folder that holds {teddy.FILE} ($STRANDLINE_DATA)"
+    )
     parser.add_argument("--scratch", type=Path, help="folder for temporary fields (the system's)")
-    parser.add_argument("--out", type=Path, default=page.ROOT / "docs" / "reproduction.md", help="page to write (docs/reproduction.md)")
+    parser.add_argument(
+        "--out", type=Path, default=page.ROOT / "docs" / "reproduction.md", help="page to write (docs/reproduction.md)"
+    )
     return parser.parse_args()
 
 

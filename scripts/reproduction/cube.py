@@ -4,14 +4,19 @@ import math
 import shutil
 
 import zarr
+
 from common import page, shapes
 from common.program import METHODS
 
 from . import paper
 from .setting import DEFAULT, SWEEP, TIMES_EXPLAINED, Notes, rows_of_times
 
+# Figures that differ for a reason: (method, place of the grid).
 KNOWN = {
-    ("fmm", 1): "the paper's FMM solves one quadratic with all finite neighbours; ours takes the upwind ones, as the equation asks"
+    (
+        "fmm",
+        1,
+    ): "the paper's FMM lets all finite neighbours into one quadratic; ours only the upwind ones, as the equation asks"
 }
 
 

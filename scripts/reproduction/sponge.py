@@ -1,6 +1,7 @@
 """Tables 7 and 8: fixed voxels of the Sponge & Sphere experiment, and the time of FSM and VDT."""
 
 import numpy as np
+
 from common import page, shapes
 from common.grids import around
 
@@ -21,8 +22,9 @@ def section(setting):
         one(setting, files, grids, notes, "vdt", "cell", paper.SPONGE_CELLS, paper.SPONGE_VDT_SECONDS),
     ]
     return (
-        "## Tables 7 and 8: fixed voxels, Sponge & Sphere\n\nFSM from the contiguous start (Table 7), VDT from Alg. 1 (Table 8); each shape 231 points. "
-        "The paper's seconds are initial condition and original method together, ours those of the default settings.\n\n"
+        "## Tables 7 and 8: fixed voxels, Sponge & Sphere\n\n"
+        "FSM from the contiguous start (Table 7), VDT from Alg. 1 (Table 8); each shape is 231 points. The paper's seconds\n"
+        "are those of initial condition and original method together, ours those of the default settings.\n\n"
         + "\n\n".join(tables)
         + f"\n\n{notes.markdown()}"
     )

@@ -44,8 +44,9 @@ def section(setting):
     of_cloud, of_mesh = runs(setting, grids, cloud), runs(setting, grids, mesh)
     return "\n\n".join(
         [
-            f"## Tables 4 to 6: teddy bear\n\nThe paper's bear has some 9,550 vertices. Ours has {len(positions):,} and {len(triangles):,} "
-            "triangles, another pose, and is scaled into the same grids: fixed points are comparable in size, not equal. "
+            "## Tables 4 to 6: teddy bear\n\n"
+            f"The paper's bear has some 9,550 vertices. Ours has {len(positions):,} and {len(triangles):,} triangles,\n"
+            "stands otherwise, and is scaled into the same grids: fixed points are of the same size, not equal.\n\n"
             + TIMES_EXPLAINED,
             times("### Table 4: time to the point cloud", grids, of_cloud, paper.TEDDY_CLOUD),
             times("### Table 5: time to the triangles", grids, of_mesh, paper.TEDDY_MESH),
@@ -81,8 +82,9 @@ def counts(grids, found):
             rows.append([None, None, name, *ours(grid, [found[m][n][which] for m in ("vdt", "dp")])])
     header = ["grid points", "h", "", "fixed points", "VDT", "VDT / grid points", "DP", "DP / grid points"]
     return (
-        "### Table 6: distances from a triangle to a point\n\nHow often the exact distance was computed while solving; a dash where the "
-        f"program does not report it.\n\n{page.table(header, rows)}"
+        "### Table 6: distances from a triangle to a point\n\n"
+        "How often the exact distance was computed while solving; a dash where the program does not report it.\n\n"
+        + page.table(header, rows)
     )
 
 
