@@ -71,6 +71,6 @@ def rows_of_times(runs, index, grid, printed, notes):
 
 TIMES_EXPLAINED = (
     "`sweep`: the papers' one iteration of eight ordered sweeps (FMM, DP: one queue over the whole grid) in f64 on\n"
-    "one thread. `default`: no flag but `--method`, that is the `front` schedule in f32 on all cores. Seconds; ours hold\n"
-    "the initial condition, which is made together with the first sweep. The paper's were taken on another machine."
+    "one thread. `default`: no flag but `--method`, that is the `front` schedule in f32 on all cores. Seconds; ours\n"
+    "hold the initial condition, which is made together with the first sweep. The paper's are of another machine."
 )

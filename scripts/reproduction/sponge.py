@@ -23,8 +23,8 @@ def section(setting):
     ]
     return (
         "## Tables 7 and 8: fixed voxels, Sponge & Sphere\n\n"
-        "FSM from the contiguous start (Table 7), VDT from Alg. 1 (Table 8); each shape is 231 points. The paper's seconds\n"
-        "are those of initial condition and original method together, ours those of the default settings.\n\n"
+        "FSM from the contiguous start (Table 7), VDT from Alg. 1 (Table 8); each shape is 231 points. The paper's\n"
+        "seconds are those of initial condition and original method together, ours those of the default settings.\n\n"
         + "\n\n".join(tables)
         + f"\n\n{notes.markdown()}"
     )
