@@ -18,10 +18,11 @@ EXPLAINED = """Seconds are medians; *runs* says of how many, with one and with t
 than 20 s in all is not run again). Each run is a process of its own, held on one processor or two; every program has
 its turn before any has its second. Ours is everything from the sources in memory to the finished field,
 initialisation included: the stages `sort sources` and `distance` of the report. The others' is the call, after
-imports and a first call on a small input, with the input in memory in the form that the program wants. B/voxel is the
-largest resident set during the call less that before the input was read: input and result count. ns/voxel is that of
-the faster column. Fields of ours and of edt, bioimage-cpp (fast marching: f64) and ITK are f32, those of scipy,
-scikit-fmm and pyfmm-kit f64. Ours without a word about the schedule are those of the default, `front`."""
+imports and a first call on a small input, with the input in memory in the form that the program wants; of calls
+shorter than a second or so the best of three in the process (ours has one). B/voxel is the largest resident set
+during the call less that before the input was read: input and result count. ns/voxel is that of the faster column.
+Fields of ours and of edt, bioimage-cpp (fast marching: f64) and ITK are f32, those of scipy, scikit-fmm and pyfmm-kit
+f64. Ours without a word about the schedule are those of the default, `front`."""
 
 
 def tables(sections):
