@@ -164,7 +164,7 @@ def peers(table, pythons, failures):
 def ours_on_grids(program):
     """All methods by default, and sweeps for those that have them."""
     methods = program.methods()
-    sweeps = [OwnEntry(program, m, ("--schedule", "sweep"), ", `--schedule sweep`") for m in methods]
+    sweeps = [OwnEntry(program, m, ("--schedule", "sweep"), ", sweep schedule") for m in methods]
     return [OwnEntry(program, m, ()) for m in methods] + sweeps
 
 

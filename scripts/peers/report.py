@@ -95,10 +95,12 @@ def plot(sections, path):
     figure, axes = pyplot.subplots(1, len(cubes), figsize=(5.2 * len(cubes), 5.2), squeeze=False, layout="constrained")
     for axis, section in zip(axes[0], cubes):
         rows = by_time([row for row in section["rows"] if "failed" not in row])[::-1]
-        names = [f"{row['program']}, {row['method'].replace('`', '')}" for row in rows]
+        names = [f"{row['program']}, {row['method']}" for row in rows]
         values = [best(row) / section["voxels"] * 1e9 for row in rows]
-        axis.barh(names, values, color=["#0072b2" if row["ours"] else "#b0b0b0" for row in rows])
+        bars = axis.barh(names, values, color=["#0072b2" if row["ours"] else "#b0b0b0" for row in rows])
+        axis.bar_label(bars, [f"{value:.3g}" for value in values], padding=2, fontsize=7)
         axis.set_xscale("log")
+        axis.set_xlim(1, 4 * max(values))
         axis.set_xlabel("ns per voxel")
         axis.set_title(section["title"])
         axis.tick_params(axis="y", labelsize=7)
