@@ -27,7 +27,7 @@ EXPLAINED = """Sources: the 462 points of Sponge & Sphere. Seconds are those of 
 the whole run, in which the field is also written. A load is a brick that was not resident. Bits: whether all values
 equal those of the run with all memory. Excess: the share of a million random voxels that lie more than rounding above
 the exact distance to the nearest point, and the most that one does. FSM and FMM solve the Eikonal equation: their
-excess is the error of a first order scheme."""
+excess, everywhere, is the error of a first order scheme."""
 
 
 def measure(program, size, methods, scratch):
@@ -128,5 +128,6 @@ def line(row):
         return [*head, row["failed"], *[None] * 6]
     speed = f"{row['seconds'] / row['voxels'] * 1e9:.2f}"
     peak, loads = f"{row['peak'] / 2**20:.0f}", f"{row['loads']:.2f}"
-    share, most = f"{row['excess_share']:.1e}", f"{row['excess']:.2g}"
+    share = f"{row['excess_share']:.1e}" if row["method"] in ("vdt", "dp") else None
+    most = f"{row['excess']:.2g}"
     return [*head, f"{row['seconds']:.1f}", speed, peak, loads, row.get("bits"), share, most]
