@@ -6,6 +6,8 @@ Results are kept in target/bench_peers.json by case; a run replaces the cases th
 import argparse
 import json
 import os
+import signal
+import sys
 import tempfile
 from pathlib import Path
 
@@ -111,6 +113,8 @@ def write(settings, kept):
 
 def main():
     settings = arguments()
+    # So that temporary fields go also when the run is ended from outside.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     program = Program()
     target = Path(os.environ["STRANDLINE_TARGET"])
     results = target / "bench_peers.json"

@@ -2,6 +2,8 @@
 
 import argparse
 import os
+import signal
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -43,6 +45,8 @@ def arguments():
 
 def main():
     settings = arguments()
+    # So that temporary fields go also when the run is ended from outside.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     program = Program()
     methods = program.methods()
     absent = [method for method in METHODS if method not in methods]
