@@ -111,6 +111,7 @@ def itk_fast_marching(case, threads):
     marching.SetOutputSpacing([case["spacing"]] * 3)
 
     def run():
+        marching.Modified()  # or a second call would find the field there
         marching.Update()
         return itk.array_view_from_image(marching.GetOutput())
 
