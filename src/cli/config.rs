@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
 use super::args::{DistanceArgs, Edge, ImageArgs, LevelSetArgs, OverlapArg, ResourceArgs, StopArg};
+use super::text::bytes;
 use super::values::Output;
 use crate::error::{Error, Result};
 use crate::exec::machine_memory;
@@ -115,7 +116,15 @@ pub(super) fn resources(args: &ResourceArgs, output: Option<&Path>) -> Result<Re
     if !(1..=MOST_THREADS).contains(&threads) {
         return Err(Error::usage(format!("--threads is {threads}; give 1 to {MOST_THREADS}")));
     }
-    let memory = args.memory.unwrap_or_else(|| machine_memory() / 2);
+    let there = machine_memory();
+    let memory = args.memory.unwrap_or(there / 2);
+    if memory > there {
+        return Err(Error::usage(format!(
+            "--memory is {}, but the machine or its control group has {}; give less, or leave it out",
+            bytes(memory),
+            bytes(there)
+        )));
+    }
     let from_environment = || std::env::var_os("TMPDIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
     let beside_output = || output.map(|path| folder_of(path).to_path_buf());
     let scratch = args.scratch.clone().or_else(from_environment).or_else(beside_output);

@@ -118,6 +118,7 @@ impl Job {
 
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, needs: &Needs) -> Result<u64> {
+        self.refuse_too_many_bricks()?;
         let window = Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
             let name = self.settings.method.name();
             let textbook = if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {
@@ -132,7 +133,6 @@ impl Job {
                 bytes(needs.scratch)
             ))
         })?;
-        self.refuse_too_many_bricks()?;
         let on_disk = needs.scratch.saturating_sub(window / 2);
         match free_space(&self.resources.scratch) {
             Some(free) if free < on_disk => Err(Error::failed(format!(

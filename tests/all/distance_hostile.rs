@@ -212,9 +212,10 @@ fn grids_that_make_no_sense_are_refused() {
         (
             &format!("{exact} 100000,100000,100000"),
             2,
-            &["1 000 000 000 000 000 voxels", "TiB of memory", "TiB of temporary fields", "give at least --memory"],
+            &["1 000 000 000 000 000 voxels", "iB of memory", "TiB of temporary fields", "give at least --memory"],
         ),
-        (&format!("{exact} 100000,100000,100000 --memory 9000TiB"), 2, &["bricks", "--brick"]),
+        (&format!("{exact} 100000,100000,100000 --brick 16"), 2, &["bricks", "--brick"]),
+        (&format!("{exact} 100,100,100 --memory 9000TiB"), 2, &["--memory is 9000 TiB", "the machine"]),
         (
             &format!("{exact} 16000,16000,2000 --memory 4GiB"),
             1,

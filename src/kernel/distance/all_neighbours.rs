@@ -110,6 +110,10 @@ impl<S: TrackedSource> DistanceMethod for AllNeighbours<S> {
         S::fixed(squared, source)
     }
 
+    fn told(source: u32) -> Option<u32> {
+        S::told(source)
+    }
+
     fn is_fixed(state: u32) -> bool {
         S::is_fixed(state)
     }

@@ -164,15 +164,15 @@ impl<A: Real> Work<A> {
         }
     }
 
-    /// Offers what ghosts and fixed voxels have.
-    fn offer_fixed<S: TrackedSource<Number = A>>(&mut self, sources: &S) {
+    /// Offers what ghosts and voxels with a source have.
+    fn offer_known<S: TrackedSource<Number = A>>(&mut self, sources: &S) {
         let valid = self.valid;
         let strides = [1, self.pitch, self.pitch * self.pitch];
         for z in 1..=valid[2] {
             for y in 1..=valid[1] {
                 let row = z * strides[2] + y * strides[1];
                 for x in 1..=valid[0] {
-                    if self.source[row + x] & FIXED != 0 {
+                    if has_source(self.source[row + x]) {
                         self.offer_around(sources, [x, y, z]);
                     }
                 }
@@ -233,6 +233,10 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
         S::fixed(squared, source)
     }
 
+    fn told(source: u32) -> Option<u32> {
+        S::told(source)
+    }
+
     fn is_fixed(state: u32) -> bool {
         S::is_fixed(state)
     }
@@ -245,7 +249,7 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
         let valid = tile.valid();
         work.load(&self.sources, tile, part);
         work.neighbours = self.neighbours;
-        work.offer_fixed(&self.sources);
+        work.offer_known(&self.sources);
         let width = WIDTH * self.spacing.iter().copied().fold(f64::INFINITY, f64::min);
         let range = (0..3).map(|a| self.spacing[a] * valid[a] as f64).sum();
         let changed = work.march(&self.sources, width, range);

@@ -19,6 +19,13 @@ pub trait DistanceMethod: Send + Sync {
     /// The state of a voxel that `source` fixes at the given squared distance.
     fn fixed(squared: f64, source: u32) -> Self::State;
 
+    /// The state of a voxel that is only told of a source near it, where the method keeps sources: it may learn of a
+    /// nearer one.
+    #[must_use]
+    fn told(_source: u32) -> Option<Self::State> {
+        None
+    }
+
     /// Whether a source fixed the voxel.
     fn is_fixed(state: Self::State) -> bool;
 

@@ -129,6 +129,10 @@ impl DistanceMethod for ShapeDistance<'_> {
         source | FIXED
     }
 
+    fn told(source: u32) -> Option<u32> {
+        Some(source)
+    }
+
     fn is_fixed(state: u32) -> bool {
         state & FIXED != 0
     }

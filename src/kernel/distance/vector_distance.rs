@@ -268,6 +268,10 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
         source | FIXED
     }
 
+    fn told(source: u32) -> Option<u32> {
+        Some(source)
+    }
+
     fn is_fixed(state: u32) -> bool {
         state & FIXED != 0
     }

@@ -17,6 +17,8 @@ pub struct Needs {
 
 /// Bytes of a voxel of the tiles of one thread: the tile, its layout along diagonals (twice as long), coordinates.
 const TILE_BYTES: u64 = 48;
+/// Bytes of a voxel while sources are entered: distance and source of those that fix it, and of those it is told of.
+const SEED_BYTES: u64 = 24;
 /// Bytes kept of each brick: its lock, its state, its places in tables.
 const BRICK_BYTES: u64 = 96;
 /// Bytes that every further rank keeps of each brick of the grid: its slot, its value where it is not stored.
@@ -35,7 +37,7 @@ impl DistanceSettings {
         let faces = 6 * (self.brick * self.brick) as u64;
         let row = self.method.solver::<P>();
         let element = row.state_bytes + if self.keeps_sources() { row.source_bytes } else { 0 };
-        let buffers = threads.max(ranks) as u64 * brick * (TILE_BYTES + element + 12);
+        let buffers = threads.max(ranks) as u64 * brick * (TILE_BYTES + SEED_BYTES + element);
         let cuts = ranks.saturating_sub(1) as u64;
         let of_brick = BRICK_BYTES + cuts * RANK_BYTES;
         let held = buffers + grid.len().saturating_mul(of_brick) + sets.len() as u64 * SOURCE_BYTES;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::field::{Solved, Values};
 use super::front::advance_front;
-use super::initialise::initialise;
+use super::initialise::{Start, initialise};
 use super::sweep::sweep_all;
 use super::textbook::{heap_dijkstra, heap_marching};
 use super::trace::{SourceField, trace_sources};
@@ -243,34 +243,34 @@ struct Job<'j, 'a> {
 
 impl<'a> Job<'_, 'a> {
     /// A method's start: its state with the voxels that sources fix, the bricks that hold any, their number.
-    fn start<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, Vec<Slot>, u64)> {
+    fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Vec<Slot>, u64)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state)?;
+        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state, start)?;
         Ok((state, start, fixed))
     }
 
     fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>()?;
+        let (state, start, fixed) = self.start::<M>(Start::Told)?;
         let spacing = self.sources.geometry.spacing;
         advance_front(self.stage, &method, &state, &start, spacing, self.options.farthest)?;
         Ok(self.solved(method, state, fixed))
     }
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>()?;
+        let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
         sweep_all(self.stage, &method, &state, &start, iterations)?;
         Ok(self.solved(method, state, fixed))
     }
 
     /// Distances, and then their sources, where these are asked for.
     fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>()?;
+        let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
         let geometry = self.sources.geometry;
         advance_front(self.stage, &method, &state, &start, geometry.spacing, self.options.farthest)?;
         if !self.options.sources {
             return Ok(self.solved(method, state, fixed));
         }
-        let (sources, start, _) = self.start::<ShapeDistance<'_>>()?;
+        let (sources, start, _) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
         trace_sources(self.stage, geometry, &state, &sources, &start)?;
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
     }
@@ -287,7 +287,7 @@ impl<'a> Job<'_, 'a> {
     }
 
     fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
-        let (state, _, fixed) = self.start::<S>()?;
+        let (state, _, fixed) = self.start::<S>(Start::Fixed)?;
         heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
         Ok(self.solved(method, state, fixed))
     }
@@ -297,7 +297,7 @@ impl<'a> Job<'_, 'a> {
         method: M,
         start: &S,
     ) -> Result<Solved<'a, P>> {
-        let (sources, _, fixed) = self.start::<S>()?;
+        let (sources, _, fixed) = self.start::<S>(Start::Fixed)?;
         let state = BrickArray::new(self.engine.scratch(), self.set)?;
         heap_marching(self.engine, self.sources.geometry, start, self.options.sources, &state, &sources)?;
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })

@@ -1,0 +1,1 @@
+"""Other programs and this one on the same inputs: scripts/bench_peers."""

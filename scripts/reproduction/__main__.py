@@ -1,0 +1,72 @@
+"""scripts/reproduce: runs the experiments and writes docs/reproduction.md."""
+
+import argparse
+import os
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from common import page
+from common.program import METHODS, Program
+
+from . import cube, sponge, teddy
+from .setting import Setting
+
+SECTIONS = {"cube": cube.section, "teddy": teddy.section, "sponge": sponge.section}
+TITLE = """# Reproduction
+
+B. Kósa, K. Mikula: *Direct simple computation of middle surface between 3D point clouds and/or discrete surfaces by
+tracking sources in distance function calculation algorithms*, 2023: the tables of its distance experiments, and what
+this program gives. Tables are numbered as in the paper. `scripts/reproduce` runs the experiments and writes this page.
+
+    scripts/reproduce --data FOLDER            # all grids, up to 893 x 1279 x 482
+    scripts/reproduce --finest 340             # those of at most 340 points along an axis
+"""
+
+
+def arguments():
+    parser = argparse.ArgumentParser(prog="scripts/reproduce", description=__doc__)
+    parser.add_argument(
+        "--finest", type=int, default=10**9, metavar="N", help="leave out grids of more than N points along an axis"
+    )
+    parser.add_argument("--only", choices=SECTIONS, action="append", help="only this experiment; may be repeated (all)")
+    data = os.environ.get("STRANDLINE_DATA")
+    parser.add_argument(
+        "--data", type=Path, default=data and Path(data), help=f"folder that holds {teddy.FILE} ($STRANDLINE_DATA)"
+    )
+    parser.add_argument("--scratch", type=Path, help="folder for temporary fields (the system's)")
+    parser.add_argument(
+        "--out", type=Path, default=page.ROOT / "docs" / "reproduction.md", help="page to write (docs/reproduction.md)"
+    )
+    return parser.parse_args()
+
+
+def main():
+    settings = arguments()
+    # So that temporary fields go also when the run is ended from outside.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    program = Program()
+    methods = program.methods()
+    absent = [method for method in METHODS if method not in methods]
+    if absent:
+        print(f"not in this version: {', '.join(absent)}", flush=True)
+    started = time.monotonic()
+    with tempfile.TemporaryDirectory(dir=settings.scratch) as scratch:
+        setting = Setting(program, methods, settings.finest, Path(scratch), settings.data)
+        parts = []
+        for name in settings.only or SECTIONS:
+            print(name, flush=True)
+            parts.append(SECTIONS[name](setting))
+    minutes = (time.monotonic() - started) / 60
+    head = f"{page.circumstances(program.version())} The whole took {minutes:.0f} minutes."
+    if not settings.out.exists():
+        settings.out.parent.mkdir(exist_ok=True)
+        settings.out.write_text(TITLE + "\n", encoding="utf-8")
+    page.write_part(settings.out, "scripts/reproduce", "\n\n".join([head, *parts]))
+    print(f"{settings.out} in {minutes:.1f} minutes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""Tables 4 to 6: the teddy bear, as a point cloud and as triangles.
+
+The paper's bear is not at hand. Ours is `teddy-cgal-bear.off` (13,826 vertices, 27,648 triangles) in the folder given
+by --data: of the same class, more finely divided, in another pose. It is scaled into the paper's grids.
+"""
+
+from common import page, shapes
+from common.grids import Grid
+from common.program import METHODS
+
+from . import paper
+from .setting import DEFAULT, SWEEP, TIMES_EXPLAINED, Notes, rows_of_times
+
+FILE = "teddy-cgal-bear.off"
+PADDING = 0.05  # what is left at least between the bear and the grid's border
+
+
+def find(data):
+    """The bear's file in or under the folder `data`, or None."""
+    return next((path for path in sorted(data.rglob(FILE))), None) if data else None
+
+
+def fitted(positions):
+    """The bear scaled into the paper's finest grid, centred; and the grids' origin."""
+    extent = [(n - 1) * paper.TEDDY_SPACINGS[-1] for n in paper.TEDDY_SHAPES[-1]]
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    scale = min((e - 2 * PADDING) / (h - lo) for e, lo, h in zip(extent, low, high))
+    origin = tuple(float(scale * (lo + h) / 2 - e / 2) for e, lo, h in zip(extent, low, high))
+    return scale * positions, origin
+
+
+def section(setting):
+    """The three tables as Markdown, or the line that says why they are missing."""
+    path = find(setting.data)
+    if path is None:
+        print(f"Tables 4 to 6 skipped: no {FILE} in the folder given by --data or STRANDLINE_DATA", flush=True)
+        return f"## Tables 4 to 6: teddy bear\n\nSkipped: `{FILE}`, which is not part of the project, was not at hand."
+    positions, triangles = shapes.read_off(path)
+    positions, origin = fitted(positions)
+    cloud, mesh = setting.scratch / "teddy-cloud.ply", setting.scratch / "teddy-mesh.ply"
+    shapes.write_cloud(cloud, positions)
+    shapes.write_mesh(mesh, positions, triangles)
+    grids = setting.grids([Grid(s, h, origin) for s, h in zip(paper.TEDDY_SHAPES, paper.TEDDY_SPACINGS)])
+    of_cloud, of_mesh = runs(setting, grids, cloud), runs(setting, grids, mesh)
+    return "\n\n".join(
+        [
+            "## Tables 4 to 6: teddy bear\n\n"
+            f"The paper's bear has some 9,550 vertices. Ours has {len(positions):,} and {len(triangles):,} triangles,\n"
+            "stands otherwise, and is scaled into the same grids: fixed points are of the same size, not equal.\n\n"
+            + TIMES_EXPLAINED,
+            times("### Table 4: time to the point cloud", grids, of_cloud, paper.TEDDY_CLOUD),
+            times("### Table 5: time to the triangles", grids, of_mesh, paper.TEDDY_MESH),
+            counts(grids, of_mesh),
+        ]
+    )
+
+
+def runs(setting, grids, source):
+    """runs[method][grid] = (sweep, default)."""
+    return {
+        method: {n: [setting.run(method, [source], grid, flags) for flags in (SWEEP, DEFAULT)] for n, grid in grids}
+        for method in METHODS
+    }
+
+
+def times(title, grids, found, printed):
+    notes = Notes()
+    rows = [row for n, grid in grids for row in rows_of_times(found, n, grid, printed[n], notes)]
+    header = ["grid points", "h", "", "fixed points", "initial condition", *(m.upper() for m in METHODS)]
+    return f"{title}\n\n{page.table(header, rows)}\n\n{notes.markdown()}"
+
+
+def counts(grids, found):
+    """Table 6; the column is empty where the program does not report the count."""
+    rows = []
+    for n, grid in grids:
+        row = [paper.TEDDY_MESH[n].fixed]
+        for method in ("vdt", "dp"):
+            row += per_point(paper.TRIANGLE_DISTANCES[method][n], grid)
+        rows.append([grid, f"{grid.spacing:.7g}", "paper", *row])
+        for which, name in enumerate(("sweep", "default")):
+            rows.append([None, None, name, *ours(grid, [found[m][n][which] for m in ("vdt", "dp")])])
+    header = ["grid points", "h", "", "fixed points", "VDT", "VDT / grid points", "DP", "DP / grid points"]
+    return (
+        "### Table 6: distances from a triangle to a point\n\n"
+        "How often the exact distance was computed while solving; a dash where the program does not report it.\n\n"
+        + page.table(header, rows)
+    )
+
+
+def ours(grid, both):
+    reports = [None if isinstance(run, str) else run.result for run in both]
+    fixed = next((result["fixed_voxels"] for result in reports if result), "-")
+    cells = []
+    for result in reports:
+        cells += per_point((result or {}).get("triangle_distances"), grid)
+    return [fixed, *cells]
+
+
+def per_point(count, grid):
+    return ["-", "-"] if count is None else [count, f"{count / grid.voxels:.4f}"]
