@@ -56,7 +56,7 @@ pub struct Evolution {
 }
 
 /// Relaxations of a cell each time it is taken up: enough to shrink its corrections about tenfold.
-const LOCAL_ITERATIONS: usize = 3;
+const LOCAL_ITERATIONS: usize = 4;
 /// Visits of a cell in one step at most; only steps far longer than a spacing need more than a few.
 const MAX_VISITS: usize = 1000;
 
