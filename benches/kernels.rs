@@ -2,7 +2,8 @@
 #![allow(missing_docs)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use strandline::kernel::level_set::covolume::{CellMask, Fields, Planes, Velocity, assemble};
+use strandline::kernel::level_set::covolume::{Fields, Planes, Velocity, assemble};
+use strandline::kernel::level_set::mask::CellMask;
 use strandline::kernel::level_set::scheme::SCHEME_LEN;
 use strandline::kernel::level_set::{CELL_LEN, sor};
 

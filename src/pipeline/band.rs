@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{BrickSet, NEIGHBOURS_26, Slot};
-use crate::kernel::level_set::covolume::CellMask;
+use crate::kernel::level_set::mask::CellMask;
 use crate::kernel::level_set::start;
 use crate::store::BrickArray;
 

@@ -4,9 +4,10 @@
 //! Neumann borders. Divided by its diagonal it has the same form as a time step of the level set, so the same
 //! relaxation solves it.
 
-use crate::kernel::level_set::covolume::CellMask;
-use crate::kernel::level_set::scheme::{LANES, SCHEME_LAYERS, write_part};
-use crate::kernel::level_set::{CELL, CELL_LEN};
+use crate::kernel::level_set::coefficients::{NO_COEFFICIENTS, close, normalise};
+use crate::kernel::level_set::mask::CellMask;
+use crate::kernel::level_set::scheme::write_plane;
+use crate::kernel::level_set::{CELL, CELL_LEN, GROWN};
 
 /// Fills the scheme of one cell; `initial` is `I_0` dense over the cell, `mask` says which faces are open.
 ///
@@ -15,24 +16,26 @@ use crate::kernel::level_set::{CELL, CELL_LEN};
 pub fn scheme(initial: &[f32], mask: &CellMask, spacing: [f64; 3], sigma: f64, out: &mut [f32]) {
     assert_eq!(initial.len(), CELL_LEN, "a cell of intensities");
     let step = spacing.map(|h| (0.5 * sigma * sigma / (h * h)) as f32);
-    vectorised!({ initial: &[f32], mask: &CellMask, step: [f32; 3], out: &mut [f32] } => scheme_rows);
+    vectorised!({ initial: &[f32], mask: &CellMask, step: [f32; 3], out: &mut [f32] } => scheme_planes);
 }
 
 #[inline(always)]
-fn scheme_rows(initial: &[f32], mask: &CellMask, step: [f32; 3], out: &mut [f32]) {
-    let (parts, _) = initial.as_chunks::<LANES>();
-    let (solved, _) = mask.solved.as_chunks::<LANES>();
-    for (n, (initial, solved)) in parts.iter().zip(solved).enumerate() {
-        let [start, y, z] = [n * LANES % CELL, n * LANES / CELL % CELL, n * LANES / (CELL * CELL)];
-        let mut terms = [[0.0f32; LANES]; SCHEME_LAYERS];
-        for (q, c) in terms[..6].iter_mut().enumerate() {
-            let open = &mask.open[q / 2][q % 2];
-            for x in 0..LANES {
-                let beyond = [open[start + x], open[y], open[z]][q / 2];
-                c[x] = f32::from(solved[x]) * step[q / 2] * beyond;
+fn scheme_planes(initial: &[f32], mask: &CellMask, step: [f32; 3], out: &mut [f32]) {
+    let rows = [0, CELL];
+    let mut terms = NO_COEFFICIENTS;
+    for z in 0..CELL {
+        for y in 0..CELL {
+            let row = (z * CELL + y) * CELL;
+            let solved = &mask.solved[row..][..CELL];
+            for (q, term) in terms[..6].iter_mut().enumerate() {
+                for (c, &solved) in term[y * GROWN..][..CELL].iter_mut().zip(solved) {
+                    *c = f32::from(solved) * step[q / 2];
+                }
             }
+            terms[6][y * GROWN..][..CELL].copy_from_slice(&initial[row..][..CELL]);
         }
-        terms[6] = *initial;
-        write_part(out, [start, y, z], &mut terms);
+        close(&mut terms, mask, z, rows);
+        normalise(rows, &mut terms);
+        write_plane(out, z, rows, &terms);
     }
 }

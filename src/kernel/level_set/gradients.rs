@@ -34,8 +34,14 @@ pub(crate) struct Metric {
     pub(crate) epsilon_squared: f32,
 }
 
-/// Rows of a plane that hold voxels or their upper faces, as a flat length.
-pub(crate) const FLAT: usize = (CELL + 1) * GROWN;
+/// Rows of a plane that hold voxels or their upper vertices, as a flat length.
+const VERTICES: usize = (CELL + 1) * GROWN;
+
+/// The length of a flat piece made up to whole vectors, so that no remainder runs value by value. All planes reach so far.
+#[inline(always)]
+pub(crate) fn whole_vectors(len: usize) -> usize {
+    len.next_multiple_of(CELL)
+}
 
 /// Vertex values of plane `k` of vertices, on and one beyond the given rows: the mean of the eight voxels around each.
 ///
@@ -43,10 +49,12 @@ pub(crate) const FLAT: usize = (CELL + 1) * GROWN;
 #[inline(always)]
 pub(crate) fn vertex_plane(u: &[f32], k: usize, rows: [usize; 2], out: &mut [f32]) {
     // The very last place would be a vertex that nobody reads.
-    let (start, end) = (rows[0] * GROWN, (rows[1] * GROWN + GROWN).min(FLAT - 1));
+    let (start, end) = (rows[0] * GROWN, (rows[1] * GROWN + GROWN).min(VERTICES - 1));
     if start >= end {
         return;
     }
+    // Made up to whole vectors at the front: behind the last vertex the grown cell ends.
+    let start = end.saturating_sub(whole_vectors(end - start));
     let len = end - start;
     // Local voxel (i, j) lies at (i + 1, j + 1): the four voxels around vertex (i, j) start at the vertex's own place.
     let below = &u[k * PLANE + start..][..len + GROWN + 1];
@@ -119,7 +127,8 @@ pub(crate) fn faces<const AXIS: usize>(
     let tangents = [[1, 2], [0, 2], [0, 1]][AXIS];
     // The first tangent lies within a plane of vertices, or within a row of it.
     let (below, side) = ([1, GROWN, PLANE][AXIS], [GROWN, 1, 1][AXIS]);
-    let (start, len) = (rows[0] * GROWN, (rows[1] - rows[0] + usize::from(AXIS == 1)) * GROWN - 1);
+    let (start, rows) = (rows[0] * GROWN, rows[1] - rows[0] + usize::from(AXIS == 1));
+    let len = whole_vectors(rows * GROWN - 1);
     let first = (k + 1) * PLANE + GROWN + 1 + start;
     let (p, q) = (&u[first..][..len], &u[first - below..][..len]);
     let [low, high] = vertices.map(|v| &v[start..][..len + side]);

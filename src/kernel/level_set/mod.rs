@@ -5,9 +5,11 @@
 
 pub mod basins;
 pub mod border;
+pub(crate) mod coefficients;
 pub mod covolume;
 pub mod flood;
 pub mod gradients;
+pub mod mask;
 pub mod persistence;
 pub mod scheme;
 pub mod sor;

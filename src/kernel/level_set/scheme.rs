@@ -8,7 +8,8 @@
 //! [z][colour][y][layer][x / 2]     colour: (x + y + z) % 2; layers: w across -x, +x, -y, +y, -z, +z, then r
 //! ```
 
-use super::{CELL, CELL_LEN};
+use super::coefficients::FLAT;
+use super::{CELL, CELL_LEN, GROWN};
 
 /// Values per voxel: six weights and the right side.
 pub const SCHEME_LAYERS: usize = 7;
@@ -31,37 +32,19 @@ pub(crate) fn half_start(colour: usize, y: usize, z: usize) -> usize {
     ((z * 2 + colour) * CELL + y) * HALF_LEN
 }
 
-/// Voxels that are assembled at a time.
-pub(crate) const LANES: usize = 8;
-
-/// Writes the voxels from `[x, y, z]` on, x a multiple of their number. `terms` are the coefficients c towards the six
-/// neighbours and the old values; each is divided by the diagonal, `1 + sum c`.
+/// Writes the given rows of plane z, whose terms lie flat, row y from `y * GROWN` on: even and odd voxels go where their
+/// halves of the row are.
 #[inline(always)]
-pub(crate) fn write_part(scheme: &mut [f32], at: [usize; 3], terms: &mut [[f32; LANES]; SCHEME_LAYERS]) {
-    let mut diagonal = [1.0f32; LANES];
-    for c in &terms[..6] {
-        for x in 0..LANES {
-            diagonal[x] += c[x];
+pub(crate) fn write_plane(scheme: &mut [f32], z: usize, rows: [usize; 2], terms: &[[f32; FLAT]; SCHEME_LAYERS]) {
+    for y in rows[0]..rows[1] {
+        for parity in 0..2 {
+            let half = &mut scheme[half_start((y + z + parity) % 2, y, z)..][..HALF_LEN];
+            for (half, term) in half.as_chunks_mut::<HALF>().0.iter_mut().zip(terms) {
+                let term = &term[y * GROWN..][..CELL];
+                for i in 0..HALF {
+                    half[i] = term[2 * i + parity];
+                }
+            }
         }
-    }
-    let inverse = diagonal.map(|d| 1.0 / d);
-    for term in terms.iter_mut() {
-        for x in 0..LANES {
-            term[x] *= inverse[x];
-        }
-    }
-    split(terms, scheme, at);
-}
-
-/// Writes even and odd voxels where their halves of the row lie.
-///
-/// Kept apart: inlined, the shuffles turn all arithmetic before them into scalar code.
-#[inline(never)]
-fn split(terms: &[[f32; LANES]; SCHEME_LAYERS], scheme: &mut [f32], [x, y, z]: [usize; 3]) {
-    const EACH: usize = LANES / 2;
-    let (even, odd) = (half_start((y + z) % 2, y, z) + x / 2, half_start((y + z + 1) % 2, y, z) + x / 2);
-    for (layer, [e0, o0, e1, o1, e2, o2, e3, o3]) in terms.iter().enumerate() {
-        scheme[even + layer * HALF..][..EACH].copy_from_slice(&[*e0, *e1, *e2, *e3]);
-        scheme[odd + layer * HALF..][..EACH].copy_from_slice(&[*o0, *o1, *o2, *o3]);
     }
 }

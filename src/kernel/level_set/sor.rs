@@ -5,7 +5,7 @@
 //! can change a bit. The values stay in [0, 1]: the solution does (maximum principle), and the clamp keeps
 //! over-relaxed iterates there on their way.
 
-use super::covolume::CellMask;
+use super::mask::CellMask;
 use super::scheme::{HALF, HALF_LEN, half_start};
 use super::{CELL, GROWN, PLANE};
 
