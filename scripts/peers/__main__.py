@@ -67,7 +67,7 @@ def section(case, rows, program, remarks=()):
 def run_cubes(settings, program, pythons, failures, scratch):
     for n in settings.sizes:
         case = cases.cube(n, scratch)
-        chosen = [*entries.ours_on_grids(program), *entries.peers(case.table, pythons, failures)]
+        chosen = [*entries.ours_on_grids(program, n), *entries.peers(case.table, pythons, failures)]
         yield section(case, measure(case, chosen, settings.repeats, scratch), program)
 
 

@@ -13,6 +13,8 @@ from common.program import RunFailed
 
 from . import adapters
 
+HEAPS = ("fmm", "dp")  # what `--schedule sweep` does by one heap
+MOST_ON_A_HEAP = 300  # points along an edge
 LAYER = 64  # planes compared at a time
 NAMES = {
     "fsm": "fast sweeping",
@@ -161,10 +163,11 @@ def peers(table, pythons, failures):
     return found
 
 
-def ours_on_grids(program):
-    """All methods by default, and sweeps for those that have them."""
+def ours_on_grids(program, n):
+    """All methods by default and as textbooks do them; one heap over a grid of more than MOST_ON_A_HEAP takes minutes."""
     methods = program.methods()
-    sweeps = [OwnEntry(program, m, ("--schedule", "sweep"), ", sweep schedule") for m in methods]
+    textbook = [m for m in methods if m not in HEAPS or n <= MOST_ON_A_HEAP]
+    sweeps = [OwnEntry(program, m, ("--schedule", "sweep"), ", `--schedule sweep`") for m in textbook]
     return [OwnEntry(program, m, ()) for m in methods] + sweeps
 
 
