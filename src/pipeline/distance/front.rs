@@ -110,27 +110,29 @@ fn leaving<M: DistanceMethod>(
 ) -> Option<f64> {
     let valid = tile.valid();
     let [u, v] = [[1, 2], [0, 2], [0, 1]][face.axis];
-    let strides = [1, tile.pitch(), tile.pitch() * tile.pitch()];
-    let layer = if face.upper { valid[face.axis] - 1 } else { 0 };
-    let across = if face.upper { strides[face.axis] as isize } else { -(strides[face.axis] as isize) };
+    let stride = if u == 0 { 1 } else { tile.pitch() };
+    let mut inside = [0; 3];
+    inside[face.axis] = if face.upper { valid[face.axis] as isize - 1 } else { 0 };
     let mut least = f64::INFINITY;
     for j in 0..valid[v] {
-        let mut at = [0; 3];
-        (at[face.axis], at[v]) = (layer, j);
-        let line = tile.at(at[0] as isize, at[1] as isize, at[2] as isize);
-        for i in 0..valid[u] {
-            let place = line + i * strides[u];
-            let here = tile.data()[place];
-            if here == told.map_or(M::UNKNOWN, |told| told[j * tile.edge() + i]) {
-                continue;
+        inside[v] = j as isize;
+        let mut ghost = inside;
+        ghost[face.axis] += if face.upper { 1 } else { -1 };
+        let line = |[x, y, z]: [isize; 3]| tile.data()[tile.at(x, y, z)..].iter().step_by(stride).take(valid[u]);
+        let mut voxel: [i64; 3] = std::array::from_fn(|a| part.lo[a] + ghost[a] as i64);
+        let mut enter = |here: M::State, beside: M::State, told: M::State| {
+            if here != told {
+                least = method.entering(here, beside, voxel).map_or(least, |value| least.min(value));
             }
-            at[u] = i;
-            let mut voxel: [i64; 3] = std::array::from_fn(|a| part.lo[a] + at[a] as i64);
-            voxel[face.axis] += if face.upper { 1 } else { -1 };
-            let beside = tile.data()[place.wrapping_add_signed(across)];
-            if let Some(value) = method.entering(here, beside, voxel) {
-                least = least.min(value);
+            voxel[u] += 1;
+        };
+        let pairs = line(inside).zip(line(ghost));
+        match told {
+            Some(told) => {
+                let told = &told[j * tile.edge()..][..valid[u]];
+                pairs.zip(told).for_each(|((&here, &beside), &told)| enter(here, beside, told));
             }
+            None => pairs.for_each(|(&here, &beside)| enter(here, beside, M::UNKNOWN)),
         }
     }
     least.is_finite().then_some(least)
