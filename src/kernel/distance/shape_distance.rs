@@ -43,29 +43,26 @@ impl<'a> ShapeDistance<'a> {
         triangle.map_or(f64::INFINITY, |triangle| triangle.distance_squared(here))
     }
 
-    /// The nearest of the kept source and the six beside.
-    fn nearest(&self, state: &[u32], at: usize, strides: [usize; 3], here: [f64; 3]) -> u32 {
-        let mut best = (state[at], f64::NAN);
-        let mut asked = [NO_SOURCE; 6];
-        for side in 0..6 {
-            let stride = strides[side / 2];
-            let source = state[if side % 2 == 0 { at - stride } else { at + stride }] & !FIXED;
-            if source == NO_SOURCE || source == best.0 || asked[..side].contains(&source) {
+    /// The nearest of the kept source and of those beside that were not asked yet.
+    fn nearest(&self, state: &[u32], asked: &mut Asked, at: usize, strides: [usize; 3], here: [f64; 3]) -> u32 {
+        let due = std::mem::take(&mut asked.due[at]);
+        let (mut best, mut now) = (state[at], [NO_SOURCE; 6]);
+        for side in (0..6).filter(|side| due >> side & 1 == 1) {
+            let source = state[beside(at, side, strides)] & !FIXED;
+            if source == NO_SOURCE || source == best || now.contains(&source) {
                 continue;
             }
-            asked[side] = source;
-            if best.1.is_nan() {
-                best.1 = self.squared(here, best.0);
-            }
+            now[side] = source;
+            let kept = asked.squared(at, || self.squared(here, best));
             let squared = self.squared(here, source);
-            if squared < best.1 {
-                best = (source, squared);
+            if squared < kept {
+                (best, asked.squared[at]) = (source, squared);
             }
         }
-        best.0
+        best
     }
 
-    fn pass(&self, tile: &mut HaloTile<u32>, part: &Box3, upward: [bool; 3]) -> Swept {
+    fn pass(&self, tile: &mut HaloTile<u32>, asked: &mut Asked, part: &Box3, upward: [bool; 3]) -> Swept {
         let (valid, pitch) = (tile.valid(), tile.pitch());
         let strides = [1, pitch, pitch * pitch];
         let ordered = |axis: usize| {
@@ -79,16 +76,17 @@ impl<'a> ShapeDistance<'a> {
                 for x in ordered(0) {
                     let (at, state) = (row + x, tile.data_mut());
                     let kept = state[at];
-                    if kept & FIXED != 0 {
+                    if kept & FIXED != 0 || asked.due[at] == 0 {
                         continue;
                     }
                     let voxel = [part.lo[0] + x as i64, part.lo[1] + y as i64, part.lo[2] + z as i64];
-                    state[at] = self.nearest(state, at, strides, self.geometry.position(voxel));
+                    state[at] = self.nearest(state, asked, at, strides, self.geometry.position(voxel));
                     if state[at] != kept {
+                        (0..6).for_each(|side| asked.due[beside(at, side, strides)] |= 1 << (side ^ 1));
                         let first = [x, y, z].map(|n| n == 0);
                         let last: [bool; 3] = std::array::from_fn(|a| [x, y, z][a] + 1 == valid[a]);
                         let inside = std::array::from_fn(|a| if upward[a] { !first[a] } else { !last[a] });
-                        swept |= CHANGED | self.carried_back(state, (at, voxel), strides, upward, inside);
+                        swept |= CHANGED | self.carried_back(state, asked, (at, voxel), strides, upward, inside);
                     }
                 }
             }
@@ -101,12 +99,13 @@ impl<'a> ShapeDistance<'a> {
     fn carried_back(
         &self,
         state: &[u32],
+        asked: &mut Asked,
         (at, voxel): (usize, [i64; 3]),
         strides: [usize; 3],
         upward: [bool; 3],
         inside: [bool; 3],
     ) -> Swept {
-        let is_nearer = |axis: usize| {
+        let mut is_nearer = |axis: usize| {
             let before = if upward[axis] { at - strides[axis] } else { at + strides[axis] };
             if !inside[axis] || state[before] & FIXED != 0 || state[before] == state[at] {
                 return false;
@@ -114,15 +113,53 @@ impl<'a> ShapeDistance<'a> {
             let mut there = voxel;
             there[axis] += if upward[axis] { -1 } else { 1 };
             let there = self.geometry.position(there);
-            self.squared(there, state[at]) < self.squared(there, state[before])
+            self.squared(there, state[at]) < asked.squared(before, || self.squared(there, state[before]))
         };
         (0..3).map(|axis| u32::from(is_nearer(axis)) << axis).sum()
     }
 }
 
+/// What is known about the voxels of a tile while it is swept, so that no source is asked twice.
+#[derive(Debug)]
+pub struct Asked {
+    /// Squared distances to the kept sources; NaN where nobody asked yet.
+    squared: Vec<f64>,
+    /// The sides, a bit each, whose sources changed since a voxel asked them. Its own only comes nearer: whoever was not
+    /// nearer before need not be asked again.
+    due: Vec<u8>,
+}
+
+impl Asked {
+    fn new(edge: usize) -> Self {
+        let len = (edge + 2).pow(3);
+        Self { squared: vec![f64::NAN; len], due: vec![ALL_SIDES; len] }
+    }
+
+    fn forget(&mut self) {
+        self.squared.fill(f64::NAN);
+        self.due.fill(ALL_SIDES);
+    }
+
+    /// The squared distance of the voxel at `place` to its source, found by `ask` if need be.
+    fn squared(&mut self, place: usize, ask: impl FnOnce() -> f64) -> f64 {
+        if self.squared[place].is_nan() {
+            self.squared[place] = ask();
+        }
+        self.squared[place]
+    }
+}
+
+const ALL_SIDES: u8 = 0b11_1111;
+
+/// The place across a side, in the order -x, +x, -y, +y, -z, +z.
+fn beside(at: usize, side: usize, strides: [usize; 3]) -> usize {
+    let stride = strides[side / 2];
+    if side % 2 == 0 { at - stride } else { at + stride }
+}
+
 impl DistanceMethod for ShapeDistance<'_> {
     type State = u32;
-    type Work = ();
+    type Work = Asked;
     const UNKNOWN: u32 = NO_SOURCE;
 
     fn fixed(_: f64, source: u32) -> u32 {
@@ -137,10 +174,13 @@ impl DistanceMethod for ShapeDistance<'_> {
         state & FIXED != 0
     }
 
-    fn work(_: usize) {}
+    fn work(edge: usize) -> Asked {
+        Asked::new(edge)
+    }
 
-    fn settle(&self, tile: &mut HaloTile<u32>, (): &mut (), part: &Box3) -> bool {
-        sweep_until_quiet([true; 3], |upward| self.pass(tile, part, upward))
+    fn settle(&self, tile: &mut HaloTile<u32>, asked: &mut Asked, part: &Box3) -> bool {
+        asked.forget();
+        sweep_until_quiet([true; 3], |upward| self.pass(tile, asked, part, upward))
     }
 
     fn entering(&self, beside: u32, state: u32, voxel: [i64; 3]) -> Option<f64> {
@@ -162,7 +202,8 @@ impl DistanceMethod for ShapeDistance<'_> {
 }
 
 impl OrderedSweeps for ShapeDistance<'_> {
-    fn sweep(&self, tile: &mut HaloTile<u32>, (): &mut (), part: &Box3, upward: [bool; 3]) -> bool {
-        self.pass(tile, part, upward) & CHANGED != 0
+    fn sweep(&self, tile: &mut HaloTile<u32>, asked: &mut Asked, part: &Box3, upward: [bool; 3]) -> bool {
+        asked.forget();
+        self.pass(tile, asked, part, upward) & CHANGED != 0
     }
 }
