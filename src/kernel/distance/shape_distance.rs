@@ -154,7 +154,7 @@ const ALL_SIDES: u8 = 0b11_1111;
 /// The place across a side, in the order -x, +x, -y, +y, -z, +z.
 fn beside(at: usize, side: usize, strides: [usize; 3]) -> usize {
     let stride = strides[side / 2];
-    if side % 2 == 0 { at - stride } else { at + stride }
+    if side.is_multiple_of(2) { at - stride } else { at + stride }
 }
 
 impl DistanceMethod for ShapeDistance<'_> {
