@@ -54,7 +54,7 @@ impl Job {
     fn new(args: DistanceJobArgs, typed: &[String]) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
-        let settings = settings(&args)?;
+        let mut settings = settings(&args)?;
         config::check_outputs(&args.output.output, &[&args.output.report], args.output.overwrite)?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
         let voice = match (args.output.quiet, args.output.verbose) {
@@ -69,6 +69,9 @@ impl Job {
         let geometry = grid(&args.grid, bounds, &mut notes)?;
         for note in &notes {
             console.note(note);
+        }
+        if args.resources.brick.is_none() {
+            settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
         }
         let typed = typed.to_vec();
         Ok(Self { args, typed, settings, resources, sets, geometry, console, cancel, started })

@@ -59,6 +59,18 @@ fn a_run_is_told_and_reported() {
     assert_eq!(bench.json("out/r.json")["result"], *result);
 }
 
+/// A small grid is cut into small bricks whatever the machine; an edge that is asked for is taken.
+#[test]
+fn bricks_follow_from_the_grid() {
+    let bench = bench();
+    for (flags, brick) in [("--threads 1", 32), ("--threads 4 --memory 900MiB", 32), ("--brick 64", 64)] {
+        bench.succeed(&format!(
+            "distance sponge.xyz --method fsm --spacing 0.1 -q -o none --overwrite --report r.json {flags}"
+        ));
+        assert_eq!(bench.json("r.json")["settings"]["brick"], brick, "{flags}");
+    }
+}
+
 /// Labels, closest points and distances of one store fit together, and no distance is below that of a plain search.
 #[test]
 fn fields_fit_together() {
