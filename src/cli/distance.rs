@@ -310,6 +310,8 @@ fn describe_found(found: &DistanceFound) -> String {
         grouped(found.fixed_voxels),
         grouped(found.unlabelled_voxels)
     )];
+    let triangles = found.triangle_distances;
+    lines.extend(triangles.map(|n| format!("{} distances to triangles were computed to fix voxels", grouped(n))));
     lines.extend(found.label_voxels.iter().map(|(label, n)| format!("label {label}: {} voxels", grouped(*n))));
     lines.join("\n") + "\n"
 }
@@ -375,6 +377,8 @@ struct Found {
     max: f64,
     fixed_voxels: u64,
     unlabelled_voxels: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    triangle_distances: Option<u64>,
     label_voxels: BTreeMap<String, u64>,
 }
 
@@ -384,6 +388,7 @@ impl Found {
             max: found.max,
             fixed_voxels: found.fixed_voxels,
             unlabelled_voxels: found.unlabelled_voxels,
+            triangle_distances: found.triangle_distances,
             label_voxels: found.label_voxels.iter().map(|(label, n)| (label.to_string(), *n)).collect(),
         }
     }

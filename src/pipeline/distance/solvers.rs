@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use super::field::{Solved, Values};
 use super::front::advance_front;
-use super::initialise::{Start, initialise};
+use super::initialise::{Seeded, Start, initialise};
 use super::sweep::sweep_all;
 use super::textbook::{heap_dijkstra, heap_marching};
 use super::trace::{SourceField, trace_sources};
 use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
-use crate::grid::{BrickGrid, BrickSet, Slot};
+use crate::grid::{BrickGrid, BrickSet};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::all_neighbours::AllNeighbours;
 use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
@@ -261,37 +261,37 @@ struct Job<'j, 'a> {
 }
 
 impl<'a> Job<'_, 'a> {
-    /// A method's start: its state with the voxels that sources fix, the bricks that hold any, their number.
-    fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Vec<Slot>, u64)> {
+    /// A method's start: its state with the voxels that sources fix.
+    fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state, start)?;
-        Ok((state, start, fixed))
+        let seeded = initialise::<M>(self.stage, self.sources, &state, start)?;
+        Ok((state, seeded))
     }
 
     fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>(Start::Told)?;
+        let (state, seeded) = self.start::<M>(Start::Told)?;
         let spacing = self.sources.geometry.spacing;
-        advance_front(self.stage, &method, &state, &start, spacing, self.options.farthest)?;
-        Ok(self.solved(method, state, fixed))
+        advance_front(self.stage, &method, &state, &seeded.bricks, spacing, self.options.farthest)?;
+        Ok(self.solved(method, state, &seeded))
     }
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
-        sweep_all(self.stage, &method, &state, &start, iterations)?;
-        Ok(self.solved(method, state, fixed))
+        let (state, seeded) = self.start::<M>(Start::Fixed)?;
+        sweep_all(self.stage, &method, &state, &seeded.bricks, iterations)?;
+        Ok(self.solved(method, state, &seeded))
     }
 
     /// Distances, and then their sources, where these are asked for.
     fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
+        let (state, seeded) = self.start::<M>(Start::Fixed)?;
         let geometry = self.sources.geometry;
-        advance_front(self.stage, &method, &state, &start, geometry.spacing, self.options.farthest)?;
+        advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, self.options.farthest)?;
         if !self.options.sources {
-            return Ok(self.solved(method, state, fixed));
+            return Ok(self.solved(method, state, &seeded));
         }
-        let (sources, start, _) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
-        trace_sources(self.stage, geometry, &state, &sources, &start)?;
-        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
+        let (sources, traced) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
+        trace_sources(self.stage, geometry, &state, &sources, &traced.bricks)?;
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 
     fn front_vector<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
@@ -306,9 +306,9 @@ impl<'a> Job<'_, 'a> {
     }
 
     fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
-        let (state, _, fixed) = self.start::<S>(Start::Fixed)?;
+        let (state, seeded) = self.start::<S>(Start::Fixed)?;
         heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
-        Ok(self.solved(method, state, fixed))
+        Ok(self.solved(method, state, &seeded))
     }
 
     fn heap_marching<P: Precision, M: DistanceMethod<State = P> + 'a, S: TrackedSource>(
@@ -316,20 +316,21 @@ impl<'a> Job<'_, 'a> {
         method: M,
         start: &S,
     ) -> Result<Solved<'a, P>> {
-        let (sources, _, fixed) = self.start::<S>(Start::Fixed)?;
+        let (sources, seeded) = self.start::<S>(Start::Fixed)?;
         let state = BrickArray::new(self.engine.scratch(), self.set)?;
         heap_marching(self.engine, self.sources.geometry, start, self.options.sources, &state, &sources)?;
-        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 
     fn solved<P: Precision, M: DistanceMethod + 'a>(
         &self,
         method: M,
         state: BrickArray<M::State>,
-        fixed_voxels: u64,
+        seeded: &Seeded,
     ) -> Solved<'a, P> {
         let values = Arc::new(Values { method, state, farthest: self.options.farthest });
-        Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels }
+        let Seeded { fixed_voxels, triangle_distances, .. } = *seeded;
+        Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels, triangle_distances }
     }
 }
 
