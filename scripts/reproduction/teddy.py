@@ -71,30 +71,34 @@ def times(title, grids, found, printed):
 
 
 def counts(grids, found):
-    """Table 6; the column is empty where the program does not report the count."""
+    """Table 6; the program reports the distances of the initial condition, the paper all of a run."""
     rows = []
     for n, grid in grids:
-        row = [paper.TEDDY_MESH[n].fixed]
+        row = [paper.TEDDY_MESH[n].fixed, "-", "-"]
         for method in ("vdt", "dp"):
             row += per_point(paper.TRIANGLE_DISTANCES[method][n], grid)
         rows.append([grid, f"{grid.spacing:.7g}", "paper", *row])
         for which, name in enumerate(("sweep", "default")):
-            rows.append([None, None, name, *ours(grid, [found[m][n][which] for m in ("vdt", "dp")])])
-    header = ["grid points", "h", "", "fixed points", "VDT", "VDT / grid points", "DP", "DP / grid points"]
+            rows.append([None, None, name, *ours(grid, [found[m][n][which] for m in METHODS])])
+    header = [
+        *("grid points", "h", "", "fixed points", "initial condition", "initial condition / grid points"),
+        *("VDT", "VDT / grid points", "DP", "DP / grid points"),
+    ]
     return (
         "### Table 6: distances from a triangle to a point\n\n"
-        "How often the exact distance was computed while solving; a dash where the program does not report it.\n\n"
+        "How often the exact distance was computed. The paper counts all of a run of VDT and of DP; the program reports those of\n"
+        "the initial condition, which are the same for every method and schedule: one for each grid point and each triangle\n"
+        "that cuts a cell beside it.\n\n"
         + page.table(header, rows)
     )
 
 
-def ours(grid, both):
-    reports = [None if isinstance(run, str) else run.result for run in both]
-    fixed = next((result["fixed_voxels"] for result in reports if result), "-")
-    cells = []
-    for result in reports:
-        cells += per_point((result or {}).get("triangle_distances"), grid)
-    return [fixed, *cells]
+def ours(grid, runs):
+    """What the runs of all methods report alike; a dash where they do not."""
+    results = [run.result for run in runs if not isinstance(run, str)]
+    alike = {(result["fixed_voxels"], result["triangle_distances"]) for result in results}
+    fixed, distances = alike.pop() if len(alike) == 1 else ("-", None)
+    return [fixed, *per_point(distances, grid), "-", "-", "-", "-"]
 
 
 def per_point(count, grid):

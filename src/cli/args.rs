@@ -152,7 +152,7 @@ pub(super) struct ResourceArgs {
     /// Threads [default: one for each core]
     #[arg(long, value_name = "N")]
     pub(super) threads: Option<usize>,
-    /// Edge of the bricks, voxels, a multiple of 16 [default: 64]; distance: what suits its method
+    /// Edge of the bricks, voxels, a multiple of 16 [default: 64; distance: 32, or 64 for fsm on large grids]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(super) brick: Option<i64>,
     /// Folder for temporary fields, removed at the end [default: $TMPDIR, else the folder of the output]

@@ -207,7 +207,7 @@ mod tests {
             let line = help.lines().find(|line| line.contains(what)).unwrap_or_else(|| panic!("{what}: {help}"));
             assert!(line.contains(&format!("[default: {value}]")), "{line}");
         }
-        assert!(help.contains("[default: 64]") && defaults.brick == 64);
+        assert!(help.contains("[default: 64;") && defaults.brick == 64);
         assert!(help.contains("[default: 0.1,99.9]") && defaults.percentiles == [0.1, 99.9]);
         assert!(help.contains("0.02 for surface") && defaults.stop == Stop::Surface(0.02));
     }

@@ -54,7 +54,7 @@ impl Job {
     fn new(args: DistanceJobArgs, typed: &[String]) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
-        let settings = settings(&args)?;
+        let mut settings = settings(&args)?;
         config::check_outputs(&args.output.output, &[&args.output.report], args.output.overwrite)?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
         let voice = match (args.output.quiet, args.output.verbose) {
@@ -69,6 +69,9 @@ impl Job {
         let geometry = grid(&args.grid, bounds, &mut notes)?;
         for note in &notes {
             console.note(note);
+        }
+        if args.resources.brick.is_none() {
+            settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
         }
         let typed = typed.to_vec();
         Ok(Self { args, typed, settings, resources, sets, geometry, console, cancel, started })
@@ -307,6 +310,8 @@ fn describe_found(found: &DistanceFound) -> String {
         grouped(found.fixed_voxels),
         grouped(found.unlabelled_voxels)
     )];
+    let triangles = found.triangle_distances;
+    lines.extend(triangles.map(|n| format!("{} distances to triangles were computed to fix voxels", grouped(n))));
     lines.extend(found.label_voxels.iter().map(|(label, n)| format!("label {label}: {} voxels", grouped(*n))));
     lines.join("\n") + "\n"
 }
@@ -372,6 +377,8 @@ struct Found {
     max: f64,
     fixed_voxels: u64,
     unlabelled_voxels: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    triangle_distances: Option<u64>,
     label_voxels: BTreeMap<String, u64>,
 }
 
@@ -381,6 +388,7 @@ impl Found {
             max: found.max,
             fixed_voxels: found.fixed_voxels,
             unlabelled_voxels: found.unlabelled_voxels,
+            triangle_distances: found.triangle_distances,
             label_voxels: found.label_voxels.iter().map(|(label, n)| (label.to_string(), *n)).collect(),
         }
     }

@@ -18,6 +18,7 @@ use super::text::{first_binary_byte, refuse_utf16};
 use crate::error::{Error, Result};
 use crate::grid::PointCloud;
 use layout::Layout;
+pub(super) use layout::foreign_line;
 
 /// Reads a point cloud in physical coordinates; `objects` and `contours` are empty where the file names none.
 ///

@@ -8,7 +8,7 @@ use std::path::Path;
 pub use super::input::Input;
 
 use super::mesh::{obj, off, stl};
-use super::text::{first_binary_byte, refuse_utf16};
+use super::text::{first_binary_byte, quoted, refuse_utf16};
 use super::{ply, points};
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
@@ -102,6 +102,14 @@ fn read(path: &Path) -> Result<Source> {
     if let Some(place) = first_binary_byte(head) {
         return Err(Error::input(format!(
             "holds binary data of no known format (byte {place} is no text); give points or a mesh ({})",
+            names()
+        )));
+    }
+    if let Some((line, text)) = points::foreign_line(head) {
+        return Err(Error::input(format!(
+            "is neither a point cloud nor a mesh: line {line}, {}, holds no numbers, no names x, y, z of columns and no \
+             start of a mesh; give one of {}",
+            quoted(&text),
             names()
         )));
     }

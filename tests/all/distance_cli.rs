@@ -59,6 +59,48 @@ fn a_run_is_told_and_reported() {
     assert_eq!(bench.json("out/r.json")["result"], *result);
 }
 
+/// A small grid is cut into small bricks whatever the machine; an edge that is asked for is taken.
+#[test]
+fn bricks_follow_from_the_grid() {
+    let bench = bench();
+    for (flags, brick) in [("--threads 1", 32), ("--threads 4 --memory 900MiB", 32), ("--brick 64", 64)] {
+        bench.succeed(&format!(
+            "distance sponge.xyz --method fsm --spacing 0.1 -q -o none --overwrite --report r.json {flags}"
+        ));
+        assert_eq!(bench.json("r.json")["settings"]["brick"], brick, "{flags}");
+    }
+}
+
+/// A triangle that covers a layer of cells is measured from the voxels below and above it, once each: two planes of the
+/// grid for each triangle. Nothing but the sources and the grid decides that.
+#[test]
+fn triangle_distances_are_counted_for_each_voxel() {
+    let bench = bench();
+    let layers = [2.3, 2.4, 9.5];
+    let corners = layers.map(|z| format!("-500 -500 {z}\n900 -500 {z}\n-500 900 {z}\n")).concat();
+    bench.write("layers.off", &format!("OFF\n9 3 0\n{corners}3 0 1 2\n3 3 4 5\n3 6 7 8\n"));
+    let grid = "--origin 0,0,0 --shape 40,37,20 --spacing 1 -q -o none --overwrite --report r.json";
+    for flags in [
+        "--brick 16 --threads 1",
+        "--brick 64 --threads 4",
+        "--brick 16 --ranks 3",
+        "--schedule sweep",
+        "--method dp --ranks 2",
+        "--method dp --schedule sweep",
+        "--method fsm --brick 16",
+        "--method fmm --labels",
+        "--method fmm --schedule sweep --labels",
+    ] {
+        bench.succeed(&format!("distance layers.off sponge.xyz {grid} {flags}"));
+        let result = &bench.json("r.json")["result"];
+        assert_eq!(result["triangle_distances"], 3 * 2 * 40 * 37, "{flags}: {result}");
+    }
+    bench.succeed(&format!("distance sponge.xyz {grid}"));
+    assert!(bench.json("r.json")["result"]["triangle_distances"].is_null());
+    let printed = bench.succeed("distance layers.off --origin 0,0,0 --shape 4,3,20 --spacing 1 -o none");
+    assert!(printed.contains("72 distances to triangles"), "{printed}");
+}
+
 /// Labels, closest points and distances of one store fit together, and no distance is below that of a plain search.
 #[test]
 fn fields_fit_together() {

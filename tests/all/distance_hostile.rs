@@ -73,6 +73,7 @@ fn files_without_content_are_refused() {
         ("none.obj", b"# made\no a\n".to_vec(), &["no point"]),
         ("none.xyz", b"# x y z\n".to_vec(), &["no point"]),
         ("none.csv", b"x,y,z\n".to_vec(), &["no point"]),
+        ("Cargo.toml", b"[package]\nname = \"a\"\n".to_vec(), &["neither a point cloud nor a mesh", "'[package]'"]),
     ]);
     assert_files_refused(&files);
 }

@@ -180,7 +180,14 @@ fn dialects_of_stl() {
 fn unusable_text_is_refused_with_line_and_reason() {
     assert_refused(&[
         ("", &["is empty", "PLY, OFF, STL, OBJ, CSV, XYZ"]),
-        ("nothing but words\n", &["line 1", "x, y, z"]),
+        (
+            "nothing but words\n",
+            &["neither a point cloud nor a mesh", "line 1", "'nothing but words'", "x, y, z", "OBJ, CSV"],
+        ),
+        ("# settings\n\n[package]\nname = \"a\"\n", &["neither a point cloud nor a mesh", "line 3, '[package]'"]),
+        ("name,age\nx,7\n", &["neither a point cloud nor a mesh", "line 1, 'name,age'"]),
+        // One that names a coordinate means to be a table.
+        ("x,y\n1,2\n", &["line 1", "not z"]),
         ("v 1 2\n", &["line 1", "no z"]),
         ("v 1 2 3\nv 1 b 3\n", &["line 2", "y is 'b'"]),
         ("v 1 2 nan\n", &["line 1", "z is 'nan'", "not finite"]),

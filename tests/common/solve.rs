@@ -59,12 +59,25 @@ pub(crate) fn solve<P: Stored>(
     method: Method,
     schedule: Schedule,
 ) -> Field<P> {
+    let options = everywhere(method.solver::<P>().keeps_sources);
+    solve_with(lab, geometry, cloud, edge, method, schedule, options)
+}
+
+/// Solves so with other options.
+pub(crate) fn solve_with<P: Stored>(
+    lab: &Lab,
+    geometry: &Geometry,
+    cloud: &[[f64; 3]],
+    edge: i64,
+    method: Method,
+    schedule: Schedule,
+    options: Options,
+) -> Field<P> {
     let set = dense(geometry.shape, edge);
     let bins = PointBins::new(*set.grid(), geometry, cloud);
     let sources = Sources::cloud(geometry, cloud, &bins);
     let stage = lab.engine.stage("distance", 0);
     let row = method.solver::<P>();
-    let options = everywhere(row.keeps_sources);
     let solved = (row.solve)(&stage, &lab.engine, &sources, &set, schedule, options).expect("room for a field");
     stage.finish();
     let loads = lab.engine.reports().last().map_or(0, |report| report.brick_loads);

@@ -88,6 +88,20 @@ fn named(names: &[&str], line: u64) -> Result<Columns> {
     Columns::named(names).map_err(|error| Error::input(format!("line {line} {error}")))
 }
 
+/// The first line that is no comment, and its number, where it holds no number at its start and names no coordinate:
+/// then the text is no table of points.
+pub(in crate::io) fn foreign_line(head: &[u8]) -> Option<(u64, String)> {
+    let head = String::from_utf8_lossy(head);
+    let mut lines = (1..).zip(head.split('\n')).map(|(number, line)| (number, uncommented(line).trim()));
+    let (number, text) = lines.find(|(_, text)| !text.is_empty())?;
+    let is_coordinate = |name: &str| {
+        let name = name.trim_matches('"').to_lowercase();
+        ["x", "y", "z"].contains(&name.as_str()) || name.starts_with("axis-")
+    };
+    let names_one = text.split([' ', '\t', ',', ';']).any(is_coordinate);
+    (!starts_with_number(text) && !names_one).then(|| (number, text.to_owned()))
+}
+
 /// A line up to its comment, which starts at `#` or, at the start of a line, at `//`.
 pub(super) fn uncommented(line: &str) -> &str {
     if line.trim_start().starts_with("//") { "" } else { line.split('#').next().unwrap_or_default() }

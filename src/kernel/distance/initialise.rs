@@ -22,10 +22,13 @@ impl Cube {
     /// The corners of the point's cell (Alg. 1).
     pub const CELL: Self = Self { margin: [0; 3], snaps: false };
 
-    /// So many voxels larger on every side; a point on a grid point counts as one in the cell above it.
+    /// So many voxels larger on every side, along each axis; a point on a grid point counts as one in the cell above it.
     #[must_use]
-    pub fn grown(self, voxels: i64) -> Self {
-        if voxels == 0 { self } else { Self { margin: self.margin.map(|m| m + voxels), snaps: false } }
+    pub fn grown(self, voxels: [i64; 3]) -> Self {
+        if voxels == [0; 3] {
+            return self;
+        }
+        Self { margin: std::array::from_fn(|a| self.margin[a] + voxels[a]), snaps: false }
     }
 
     /// The voxels that a point at `at`, in voxel units, fixes.

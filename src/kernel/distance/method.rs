@@ -7,7 +7,8 @@ use crate::grid::Box3;
 use crate::store::Element;
 use crate::tile::HaloTile;
 
-/// A way to carry distance from fixed voxels outward. Values only ever fall; fixed voxels never change.
+/// A way to carry distance from fixed voxels outward. Values only ever fall; fixed voxels keep what they
+/// start with.
 pub trait DistanceMethod: Send + Sync {
     /// What a brick keeps of each voxel.
     type State: Element;

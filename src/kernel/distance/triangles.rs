@@ -41,7 +41,8 @@ fn halve(triangle: &VoxelTriangle, cells: &Box3, visit: &mut impl FnMut([i64; 3]
 ///
 /// `squared` holds squared distances (start: infinity), `source` the index of the fixing triangle (start:
 /// [`NO_SOURCE`](super::initialise::NO_SOURCE)); both dense `[z][y][x]` with room for `edge`^3 voxels from `part.lo`
-/// on. Scratch: 4 bytes a voxel.
+/// on. Returns how many distances it computed: for each voxel one to each triangle that cuts a cell beside it, so that
+/// the sum over parts of a grid is that of the grid. Scratch: 4 bytes a voxel.
 pub fn fix_voxels(
     geometry: &Geometry,
     part: &Box3,
@@ -49,9 +50,10 @@ pub fn fix_voxels(
     triangles: impl Iterator<Item = (u32, [[f64; 3]; 3])>,
     squared: &mut [f64],
     source: &mut [u32],
-) {
+) -> u64 {
     // A voxel is a corner of several cells; the number of the last triangle that was measured from it spares the rest.
     let mut measured = vec![0_u32; edge * edge * edge];
+    let mut distances = 0;
     for (number, (index, corners)) in (1..).zip(triangles) {
         let triangle = Triangle::new(corners);
         cut_cells(geometry, corners, part, |cell| {
@@ -66,6 +68,7 @@ pub fn fix_voxels(
                     continue;
                 }
                 measured[place] = number;
+                distances += 1;
                 let distance = triangle.distance_squared(geometry.position(voxel));
                 let nearer = distance < squared[place] || (distance == squared[place] && index < source[place]);
                 if nearer {
@@ -75,6 +78,7 @@ pub fn fix_voxels(
             }
         });
     }
+    distances
 }
 
 #[cfg(test)]

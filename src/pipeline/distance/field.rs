@@ -23,6 +23,8 @@ pub struct Solved<'a, P> {
     pub fixed: Arc<dyn BoxSource<u8> + Send + 'a>,
     /// Voxels that sources fixed.
     pub fixed_voxels: u64,
+    /// Distances from a voxel to a triangle that were computed to fix them.
+    pub triangle_distances: u64,
 }
 
 /// What a field holds, for the report.

@@ -10,16 +10,26 @@ use crate::kernel::distance::method::DistanceMethod;
 use crate::kernel::distance::triangles;
 use crate::store::BrickArray;
 
-/// How far beyond the voxels that a point fixes others are told of it, in voxels. A point whose voxels are all nearer to
-/// other points would else be walled in by them, and nobody beyond would ever hear of it.
-const TOLD: i64 = 1;
+/// At most so far beyond the voxels that a point fixes others are told of it, in voxels: what that costs grows with it.
+const FARTHEST_TOLD: i64 = 4;
+
+/// How far beyond the voxels that a point fixes others are told of it, along each axis: a point of another cell can be
+/// nearer than the one that fixes a voxel, but no farther than a cell's diagonal. With equal spacings 1.
+///
+/// It lets fixed voxels start from the nearest point of all. And a point whose voxels are all nearer to others would
+/// else be walled in by them, and nobody beyond would ever hear of it.
+fn told_margin(spacing: [f64; 3]) -> [i64; 3] {
+    let diagonal = spacing.iter().map(|h| h * h).sum::<f64>().sqrt();
+    spacing.map(|h| ((diagonal / h).ceil().min(1e3) as i64 - 1).clamp(1, FARTHEST_TOLD))
+}
 
 /// Whether voxels beside those that a point fixes are told of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Start {
     /// Only fixed voxels know of a source, as the textbook has it.
     Fixed,
-    /// Voxels beside them too, where a method keeps sources.
+    /// Where a method keeps sources, voxels beside them too; and of all these points a fixed voxel has the nearest, also
+    /// one that does not fix it.
     Told,
 }
 
@@ -28,6 +38,9 @@ struct Seeds {
     squared: Vec<f64>,
     source: Vec<u32>,
 }
+
+/// A voxel that no point is near to.
+const NONE: (f64, u32) = (f64::INFINITY, NO_SOURCE);
 
 impl Seeds {
     fn new(len: usize) -> Self {
@@ -44,18 +57,26 @@ impl Seeds {
     }
 }
 
-/// Fixes voxels of this rank's bricks; returns the bricks that know of a source, in order of their slots, and the number
-/// of fixed voxels.
+/// What the sources made of this rank's bricks.
+pub(super) struct Seeded {
+    /// The bricks that know of a source, in order of their slots.
+    pub(super) bricks: Vec<Slot>,
+    pub(super) fixed_voxels: u64,
+    /// Distances from a voxel to a triangle that were computed.
+    pub(super) triangle_distances: u64,
+}
+
+/// Fixes voxels of this rank's bricks.
 pub(super) fn initialise<M: DistanceMethod>(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
     array: &BrickArray<M::State>,
     start: Start,
-) -> Result<(Vec<Slot>, u64)> {
+) -> Result<Seeded> {
     let set = array.set();
     let (grid, len) = (*set.grid(), set.grid().brick_len());
     let tells = start == Start::Told && M::told(0).is_some();
-    let margin = if tells { TOLD } else { 0 };
+    let margin = if tells { told_margin(sources.geometry.spacing) } else { [0; 3] };
     let near: Vec<Slot> = set.owned().filter(|&slot| sources.may_seed(set.id(slot), margin)).collect();
     let workers = Workers::new(move || (Seeds::new(len), Seeds::new(if tells { len } else { 0 })));
     let counts = stage.run(&near, &workers, |(fixed, told), &slot| {
@@ -63,12 +84,14 @@ pub(super) fn initialise<M: DistanceMethod>(
         let (part, edge) = (grid.brick_box(id), grid.edge() as usize);
         fixed.clear();
         told.clear();
-        let points = sources.points_seeding(id, 0);
+        let points = sources.points_seeding(id, [0; 3]);
         fix_voxels(sources.geometry, &part, edge, points, &mut fixed.squared, &mut fixed.source);
+        let mut distances = 0;
         if let Some((mesh, bins)) = sources.mesh {
             let first = sources.positions.len() as u32;
             let beside = bins.of(id).iter().map(|&n| (first + n, mesh.corners(n as usize)));
-            triangles::fix_voxels(sources.geometry, &part, edge, beside, &mut fixed.squared, &mut fixed.source);
+            let (squared, source) = (&mut fixed.squared, &mut fixed.source);
+            distances = triangles::fix_voxels(sources.geometry, &part, edge, beside, squared, source);
         }
         if tells {
             let points = sources.points_seeding(id, margin);
@@ -79,19 +102,27 @@ pub(super) fn initialise<M: DistanceMethod>(
             array.write(slot, |out| write_seeds::<M>(fixed, told, out));
             array.refresh_faces(slot);
         }
-        Ok((count, known))
+        Ok((count, known, distances))
     })?;
-    let start = near.into_iter().zip(&counts).filter(|(_, (_, known))| *known > 0).map(|(slot, _)| slot).collect();
-    Ok((start, counts.iter().map(|(count, _)| count).sum()))
+    let known = near.into_iter().zip(&counts).filter(|(_, (_, known, _))| *known > 0);
+    Ok(Seeded {
+        bricks: known.map(|(slot, _)| slot).collect(),
+        fixed_voxels: counts.iter().map(|(fixed, _, _)| fixed).sum(),
+        triangle_distances: counts.iter().map(|(_, _, distances)| distances).sum(),
+    })
 }
 
 fn write_seeds<M: DistanceMethod>(fixed: &Seeds, told: &Seeds, out: &mut [M::State]) {
-    for (out, (&squared, &source)) in out.iter_mut().zip(fixed.squared.iter().zip(&fixed.source)) {
-        *out = if source == NO_SOURCE { M::UNKNOWN } else { M::fixed(squared, source) };
-    }
-    for (out, &source) in out.iter_mut().zip(&told.source) {
-        if source != NO_SOURCE && !M::is_fixed(*out) {
-            *out = M::told(source).unwrap_or(*out);
-        }
+    for (at, out) in out.iter_mut().enumerate() {
+        let nearest = |seeds: &Seeds| (seeds.squared[at], seeds.source[at]);
+        let (fixing, beside) = (nearest(fixed), if told.source.is_empty() { NONE } else { nearest(told) });
+        *out = match (fixing.1 == NO_SOURCE, beside.1 == NO_SOURCE) {
+            (false, _) => {
+                let (squared, source) = if beside < fixing { beside } else { fixing };
+                M::fixed(squared, source)
+            }
+            (true, false) => M::told(beside.1).unwrap_or(M::UNKNOWN),
+            (true, true) => M::UNKNOWN,
+        };
     }
 }

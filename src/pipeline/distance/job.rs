@@ -67,6 +67,8 @@ pub struct DistanceFound {
     pub fixed_voxels: u64,
     /// Voxels that no source reached.
     pub unlabelled_voxels: u64,
+    /// Distances from a voxel to a triangle that were computed to fix voxels, where there are triangles.
+    pub triangle_distances: Option<u64>,
     /// Voxels of each label, where labels were asked for.
     pub label_voxels: BTreeMap<u32, u64>,
 }
@@ -123,8 +125,13 @@ pub fn distance<P: Precision>(
     if let Some(store) = store {
         write_fields(engine, geometry, sets, settings, &solved, measured.max, store)?;
     }
-    let unlabelled_voxels = measured.unlabelled_voxels;
-    Ok(DistanceFound { max: measured.max, fixed_voxels: solved.fixed_voxels, unlabelled_voxels, label_voxels })
+    Ok(DistanceFound {
+        max: measured.max,
+        fixed_voxels: solved.fixed_voxels,
+        unlabelled_voxels: measured.unlabelled_voxels,
+        triangle_distances: triangles.is_some().then_some(solved.triangle_distances),
+        label_voxels,
+    })
 }
 
 /// The voxels that the points of each data set fix.

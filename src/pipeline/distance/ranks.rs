@@ -34,12 +34,13 @@ pub fn solve<'a, P: Precision>(
         (solver.solve)(stage, engine, sources, &own, schedule, options)
     })?;
     let joined = Cut { grid: *set.grid(), ownership };
-    let fixed_voxels = parts.iter().map(|part| part.fixed_voxels).sum();
+    let sum = |of: fn(&Solved<'a, P>) -> u64| parts.iter().map(of).sum();
     Ok(Solved {
         values: joined.join(parts.iter().map(|part| part.values.clone()).collect()),
         sources: joined.join(parts.iter().map(|part| part.sources.clone()).collect()),
         fixed: joined.join(parts.iter().map(|part| part.fixed.clone()).collect()),
-        fixed_voxels,
+        fixed_voxels: sum(|part| part.fixed_voxels),
+        triangle_distances: sum(|part| part.triangle_distances),
     })
 }
 

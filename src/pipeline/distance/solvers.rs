@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use super::field::{Solved, Values};
 use super::front::advance_front;
-use super::initialise::{Start, initialise};
+use super::initialise::{Seeded, Start, initialise};
 use super::sweep::sweep_all;
 use super::textbook::{heap_dijkstra, heap_marching};
 use super::trace::{SourceField, trace_sources};
 use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
-use crate::grid::{BrickSet, Slot};
+use crate::grid::{BrickGrid, BrickSet};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::all_neighbours::AllNeighbours;
 use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
@@ -55,7 +55,7 @@ pub struct Solver<P> {
     pub takes_all_neighbours: bool,
     /// Whether it keeps the source of each voxel.
     pub keeps_sources: bool,
-    /// Edge of bricks that it is fastest with.
+    /// Edge of bricks that it is fastest with on large grids.
     pub brick: i64,
     /// Bytes of a voxel's state.
     pub state_bytes: u64,
@@ -63,6 +63,25 @@ pub struct Solver<P> {
     pub source_bytes: u64,
     /// Does it.
     pub solve: Solve<P>,
+}
+
+/// Edge of the bricks of grids that are too small or too thin for larger ones.
+const SMALL_BRICK: i64 = 32;
+/// Fewer bricks than this are a small grid: what a brick at its border stores beyond it, and that a thread waits for the
+/// last brick of a wave, then cost more than larger bricks save.
+const FEWEST_BRICKS: u64 = 512;
+
+impl<P> Solver<P> {
+    /// Edge of the bricks that a grid is cut into where nobody asks for another. It follows from the shape alone, so
+    /// that a run can be repeated on another machine.
+    #[must_use]
+    pub fn brick_for(&self, shape: [i64; 3]) -> i64 {
+        let bricks = |edge| BrickGrid::new(shape, edge).len();
+        let stored = |edge: i64| bricks(edge) as f64 * edge.pow(3) as f64;
+        // Thin grids: larger bricks would stick out of them by a quarter more.
+        let sticks_out = stored(self.brick) > 1.25 * stored(SMALL_BRICK);
+        if bricks(self.brick) < FEWEST_BRICKS || sticks_out { self.brick.min(SMALL_BRICK) } else { self.brick }
+    }
 }
 
 /// The distance methods, in the order in which the help lists them.
@@ -86,7 +105,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             textbook: Textbook::Sweeps,
             takes_all_neighbours: true,
             keeps_sources: true,
-            brick: 64,
+            brick: 32,
             state_bytes: 4,
             source_bytes: 0,
             solve: vector_distance::<P>,
@@ -242,37 +261,37 @@ struct Job<'j, 'a> {
 }
 
 impl<'a> Job<'_, 'a> {
-    /// A method's start: its state with the voxels that sources fix, the bricks that hold any, their number.
-    fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Vec<Slot>, u64)> {
+    /// A method's start: its state with the voxels that sources fix.
+    fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state, start)?;
-        Ok((state, start, fixed))
+        let seeded = initialise::<M>(self.stage, self.sources, &state, start)?;
+        Ok((state, seeded))
     }
 
     fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>(Start::Told)?;
+        let (state, seeded) = self.start::<M>(Start::Told)?;
         let spacing = self.sources.geometry.spacing;
-        advance_front(self.stage, &method, &state, &start, spacing, self.options.farthest)?;
-        Ok(self.solved(method, state, fixed))
+        advance_front(self.stage, &method, &state, &seeded.bricks, spacing, self.options.farthest)?;
+        Ok(self.solved(method, state, &seeded))
     }
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
-        sweep_all(self.stage, &method, &state, &start, iterations)?;
-        Ok(self.solved(method, state, fixed))
+        let (state, seeded) = self.start::<M>(Start::Fixed)?;
+        sweep_all(self.stage, &method, &state, &seeded.bricks, iterations)?;
+        Ok(self.solved(method, state, &seeded))
     }
 
     /// Distances, and then their sources, where these are asked for.
     fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
+        let (state, seeded) = self.start::<M>(Start::Fixed)?;
         let geometry = self.sources.geometry;
-        advance_front(self.stage, &method, &state, &start, geometry.spacing, self.options.farthest)?;
+        advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, self.options.farthest)?;
         if !self.options.sources {
-            return Ok(self.solved(method, state, fixed));
+            return Ok(self.solved(method, state, &seeded));
         }
-        let (sources, start, _) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
-        trace_sources(self.stage, geometry, &state, &sources, &start)?;
-        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
+        let (sources, traced) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
+        trace_sources(self.stage, geometry, &state, &sources, &traced.bricks)?;
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 
     fn front_vector<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
@@ -287,9 +306,9 @@ impl<'a> Job<'_, 'a> {
     }
 
     fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
-        let (state, _, fixed) = self.start::<S>(Start::Fixed)?;
+        let (state, seeded) = self.start::<S>(Start::Fixed)?;
         heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
-        Ok(self.solved(method, state, fixed))
+        Ok(self.solved(method, state, &seeded))
     }
 
     fn heap_marching<P: Precision, M: DistanceMethod<State = P> + 'a, S: TrackedSource>(
@@ -297,19 +316,49 @@ impl<'a> Job<'_, 'a> {
         method: M,
         start: &S,
     ) -> Result<Solved<'a, P>> {
-        let (sources, _, fixed) = self.start::<S>(Start::Fixed)?;
+        let (sources, seeded) = self.start::<S>(Start::Fixed)?;
         let state = BrickArray::new(self.engine.scratch(), self.set)?;
         heap_marching(self.engine, self.sources.geometry, start, self.options.sources, &state, &sources)?;
-        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 
     fn solved<P: Precision, M: DistanceMethod + 'a>(
         &self,
         method: M,
         state: BrickArray<M::State>,
-        fixed_voxels: u64,
+        seeded: &Seeded,
     ) -> Solved<'a, P> {
         let values = Arc::new(Values { method, state, farthest: self.options.farthest });
-        Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels }
+        let Seeded { fixed_voxels, triangle_distances, .. } = *seeded;
+        Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels, triangle_distances }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_and_thin_grids_get_small_bricks() {
+        let of = |name: &str, shape| Method::named(name).unwrap().solver::<f32>().brick_for(shape);
+        for shape in [[1; 3], [145; 3], [289; 3], [397; 3], [3000, 3000, 1], [20_000, 30, 20_000], [70, 1300, 1300]] {
+            assert_eq!(SOLVERS.iter().map(|row| row.brick_for(shape)).max(), Some(32), "{shape:?}");
+        }
+        for shape in [[577; 3], [512; 3], [2048, 2048, 1024], [1024, 20_000, 250]] {
+            assert_eq!([of("fsm", shape), of("vdt", shape)], [64, 32], "{shape:?}");
+        }
+    }
+
+    /// Bricks never store much more beyond the grid's border than small ones would.
+    #[test]
+    fn bricks_stick_out_of_no_grid_far() {
+        let stored = |shape, edge| BrickGrid::new(shape, edge).len() * edge.pow(3) as u64;
+        for n in 1..400 {
+            let shape = [n, 3 * n + 1, 2000 / n + 5];
+            for row in SOLVERS {
+                let edge = row.brick_for(shape);
+                assert!(4 * stored(shape, edge) <= 5 * stored(shape, 32), "{} {shape:?}: {edge}", row.name);
+            }
+        }
     }
 }

@@ -33,7 +33,7 @@ impl<'a> Sources<'a> {
     }
 
     /// The bricks whose points may fix voxels of a brick, or voxels so many beyond it.
-    fn bricks_seeding(&self, id: BrickId, beyond: i64) -> impl Iterator<Item = BrickId> + use<'_> {
+    fn bricks_seeding(&self, id: BrickId, beyond: [i64; 3]) -> impl Iterator<Item = BrickId> + use<'_> {
         let grid = self.bins.grid();
         let part = grid.brick_box(id);
         let margin = self
@@ -41,20 +41,24 @@ impl<'a> Sources<'a> {
             .iter()
             .fold([0; 3], |most: [i64; 3], (_, cube)| std::array::from_fn(|a| most[a].max(cube.margin[a])));
         let reach = Box3 {
-            lo: std::array::from_fn(|a| part.lo[a] - 1 - margin[a] - beyond),
-            hi: std::array::from_fn(|a| part.hi[a] + margin[a] + beyond),
+            lo: std::array::from_fn(|a| part.lo[a] - 1 - margin[a] - beyond[a]),
+            hi: std::array::from_fn(|a| part.hi[a] + margin[a] + beyond[a]),
         };
         grid.bricks_in(&reach.intersect(&Box3::from_shape(grid.shape())))
     }
 
     /// The points that may fix voxels of a brick, with their positions and cubes, these so many voxels larger all around.
-    pub(super) fn points_seeding(&self, id: BrickId, beyond: i64) -> impl Iterator<Item = (u32, [f64; 3], Cube)> + '_ {
+    pub(super) fn points_seeding(
+        &self,
+        id: BrickId,
+        beyond: [i64; 3],
+    ) -> impl Iterator<Item = (u32, [f64; 3], Cube)> + '_ {
         let points = self.bricks_seeding(id, beyond).flat_map(|brick| self.bins.of(brick).iter().copied());
         points.map(move |p| (p, self.positions[p as usize], self.cube(p).grown(beyond)))
     }
 
     /// Whether any source may fix a voxel of a brick, or a point voxels so many beyond it.
-    pub(super) fn may_seed(&self, id: BrickId, beyond: i64) -> bool {
+    pub(super) fn may_seed(&self, id: BrickId, beyond: [i64; 3]) -> bool {
         self.bricks_seeding(id, beyond).any(|brick| !self.bins.of(brick).is_empty())
             || self.mesh.is_some_and(|(_, bins)| !bins.of(id).is_empty())
     }
