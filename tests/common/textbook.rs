@@ -1,4 +1,4 @@
-//! The printed loops over a whole volume (Kósa & Mikula 2023, Alg. 1-3, errata of the descending loops), plain and in
+//! The printed loops over a whole volume (Kósa & Mikula 2023, Alg. 1-3 and 7, errata of the descending loops), plain and in
 //! the printed order: nothing is shared with the program.
 //!
 //! Bits follow from the order of operations, so the arithmetic of one update is stated here as the program states it in
@@ -89,30 +89,61 @@ fn sweep_order(shape: [i64; 3], sweep: usize) -> impl Iterator<Item = [i64; 3]> 
 
 /// The x with `sum (((x - a) / h)^+)^2 = 1` for the smaller neighbours `a` and spacings `h` along x, y, z (eq. 9).
 pub(crate) fn godunov(near: [f64; 3], spacing: [f64; 3]) -> f64 {
+    upwind(near, spacing).0
+}
+
+/// That x, and the axes that entered it in order of their `a`: of equal ones x before y before z.
+fn upwind(near: [f64; 3], spacing: [f64; 3]) -> (f64, Vec<usize>) {
     let weight = spacing.map(|h| 1.0 / (h * h));
     let mut axes = [0, 1, 2];
     axes.sort_by(|&i: &usize, &j| near[i].total_cmp(&near[j]));
     let [i, j, k] = axes;
     let (b, c) = (near[j] - near[i], near[k] - near[i]);
-    if spacing[i] <= b {
-        return near[i] + spacing[i];
+    // Both infinite: nothing to compare with.
+    if b.is_nan() || spacing[i] <= b {
+        return (near[i] + spacing[i], vec![i]);
     }
     let mean = weight[j] * b;
     let two = weight[i] + weight[j];
     let root = (mean * mean - two * (mean * b - 1.0)).max(0.0).sqrt();
     let x = (mean + root) * (1.0 / two);
     if x <= c {
-        return near[i] + x;
+        return (near[i] + x, vec![i, j]);
     }
     let three = weight[0] + weight[1] + weight[2];
     let mean_of_three = mean + weight[k] * c;
     let rest = mean * b + weight[k] * c * c - 1.0;
     let root = (mean_of_three * mean_of_three - three * rest).max(0.0).sqrt();
-    near[i] + (mean_of_three + root) * (1.0 / three)
+    (near[i] + (mean_of_three + root) * (1.0 / three), vec![i, j, k])
+}
+
+/// Alg. 7, lines 8 to 20: what the neighbours' values make of a voxel, the offset that its source is taken from, and the
+/// offset of the smallest neighbour. Of two equal neighbours along an axis Alg. 7 names the upper one first.
+fn update(geometry: &Geometry, v: [i64; 3], value: impl Fn([i64; 3]) -> f64) -> (f64, [i64; 3], [i64; 3]) {
+    let n = PlainGrid::around(v).map(value);
+    let upper: [bool; 3] = std::array::from_fn(|a| n[2 * a + 1] <= n[2 * a]);
+    let near: [f64; 3] = std::array::from_fn(|a| if upper[a] { n[2 * a + 1] } else { n[2 * a] });
+    let (x, entered) = upwind(near, geometry.spacing);
+    let (mut sum, mut first) = ([0; 3], [0; 3]);
+    for &a in &entered {
+        sum[a] = if upper[a] { 1 } else { -1 };
+    }
+    first[entered[0]] = sum[entered[0]];
+    (x, sum, first)
 }
 
 /// Alg. 2: distances after so many iterations, or once one changes nothing.
 pub(crate) fn fsm<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], iterations: u32) -> Vec<P> {
+    fsm_with_sources(geometry, cloud, iterations).0
+}
+
+/// Alg. 7: distances and sources, both updated in place; where the voxel at the sum of the offsets has no source yet, that
+/// of the smallest neighbour.
+pub(crate) fn fsm_with_sources<P: Stored>(
+    geometry: &Geometry,
+    cloud: &[[f64; 3]],
+    iterations: u32,
+) -> (Vec<P>, Vec<Option<usize>>) {
     let grid = PlainGrid { shape: geometry.shape };
     let fixing = fixing_sources(geometry, cloud);
     let start = |v: [i64; 3]| match fixing[grid.at(v)] {
@@ -120,17 +151,19 @@ pub(crate) fn fsm<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], iterations
         None => P::UNKNOWN,
     };
     let mut d: Vec<P> = grid.voxels().map(start).collect();
+    let mut s = fixing.clone();
     for _ in 0..iterations {
         let before = d.clone();
         for sweep in 0..8 {
             for v in sweep_order(geometry.shape, sweep).filter(|v| fixing[grid.at(*v)].is_none()) {
                 let value = |q: [i64; 3]| if grid.contains(q) { d[grid.at(q)].to_f64() } else { f64::INFINITY };
-                let n = PlainGrid::around(v).map(value);
-                let near: [f64; 3] = std::array::from_fn(|a| n[2 * a].min(n[2 * a + 1]));
-                if near.iter().any(|a| a.is_finite()) {
-                    let lower = P::store(godunov(near, geometry.spacing));
-                    let kept = &mut d[grid.at(v)];
-                    *kept = if lower < *kept { lower } else { *kept };
+                let (x, sum, first) = update(geometry, v, value);
+                let lower = P::store(x);
+                if lower < d[grid.at(v)] {
+                    let source = |o: [i64; 3]| s[grid.at(std::array::from_fn(|a| v[a] + o[a]))];
+                    let found = source(sum).or(source(first));
+                    d[grid.at(v)] = lower;
+                    s[grid.at(v)] = found;
                 }
             }
         }
@@ -138,7 +171,26 @@ pub(crate) fn fsm<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], iterations
             break;
         }
     }
-    d
+    (d, s)
+}
+
+/// Alg. 7 on finished distances: voxels in order of their distance copy the source at the sum of the offsets of the
+/// neighbours that enter their update, where the distance there is smaller, else that of the smallest neighbour.
+pub(crate) fn sources_along<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], d: &[P]) -> Vec<Option<usize>> {
+    let grid = PlainGrid { shape: geometry.shape };
+    let voxels: Vec<[i64; 3]> = grid.voxels().collect();
+    let mut s = fixing_sources(geometry, cloud);
+    let free = |at: &usize| s[*at].is_none() && d[*at].to_f64().is_finite();
+    let mut order: Vec<usize> = (0..d.len()).filter(free).collect();
+    order.sort_by_key(|&at| d[at].rank());
+    for at in order {
+        let v = voxels[at];
+        let value = |q: [i64; 3]| if grid.contains(q) { d[grid.at(q)].to_f64() } else { f64::INFINITY };
+        let (_, sum, first) = update(geometry, v, value);
+        let beside = [sum, first].map(|o| grid.at(std::array::from_fn(|a| v[a] + o[a])));
+        s[at] = beside.into_iter().find(|&q| d[q].rank() < d[at].rank()).and_then(|q| s[q]);
+    }
+    s
 }
 
 /// Alg. 3: the sources that the sweeps leave with each voxel.

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::field::{Solved, Values};
 use super::front::advance_front;
 use super::initialise::{Start, initialise};
-use super::sweep::sweep_all;
+use super::sweep::{Alone, sweep_all};
+use super::sweep_sources::TrackedSweeps;
 use super::textbook::{heap_dijkstra, heap_marching};
 use super::trace::{SourceField, trace_sources};
 use super::{Options, Schedule, Sources};
@@ -19,6 +20,7 @@ use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
 use crate::kernel::distance::fast_marching::FastMarching;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
+use crate::kernel::distance::parents::{Parents, ShortestWay, UpwindSum};
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::tracked::TrackedSource;
@@ -74,10 +76,10 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "fast sweeping, the Eikonal equation",
             textbook: Textbook::Sweeps,
             takes_all_neighbours: false,
-            keeps_sources: false,
+            keeps_sources: true,
             brick: 64,
             state_bytes: size_of::<P>() as u64,
-            source_bytes: 0,
+            source_bytes: 4,
             solve: fast_sweeping::<P>,
         },
         Solver {
@@ -168,8 +170,8 @@ fn fast_sweeping<'a, P: Precision>(
     let job = Job { stage, engine, sources, set, options };
     let spacing = sources.geometry.spacing;
     match schedule {
-        Schedule::Front => job.front(FastSweeping::<P, P::Fast>::new(spacing)),
-        Schedule::Sweep { iterations } => job.sweeps(FastSweeping::<P, f64>::new(spacing), iterations),
+        Schedule::Front => job.front_then_sources::<P, _, UpwindSum>(FastSweeping::<P, P::Fast>::new(spacing)),
+        Schedule::Sweep { iterations } => job.sweeps_with_sources(FastSweeping::<P, f64>::new(spacing), iterations),
     }
 }
 
@@ -208,7 +210,7 @@ fn fast_marching<'a, P: Precision>(
     let (geometry, positions) = (sources.geometry, sources.positions);
     let method = FastMarching::<P, P::Fast>::new(geometry.spacing);
     match (schedule, sources.sets) {
-        (Schedule::Front, _) => job.front_then_sources(method),
+        (Schedule::Front, _) => job.front_then_sources::<P, _, ShortestWay>(method),
         (_, Some(sets)) => job.heap_marching(method, &ShapeDistance::new(geometry, sets)),
         (_, None) => job.heap_marching(method, &VectorDistance::<f64>::new(geometry, positions)),
     }
@@ -258,12 +260,32 @@ impl<'a> Job<'_, 'a> {
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
         let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
-        sweep_all(self.stage, &method, &state, &start, iterations)?;
+        sweep_all(self.stage, &method, &state, &mut Alone(self.set), &start, iterations)?;
         Ok(self.solved(method, state, fixed))
     }
 
+    /// Distances, and along with them their sources, where these are asked for.
+    fn sweeps_with_sources<P: Precision>(
+        &self,
+        method: FastSweeping<P, f64>,
+        iterations: u32,
+    ) -> Result<Solved<'a, P>> {
+        if !self.options.sources {
+            return self.sweeps(method, iterations);
+        }
+        let (state, start, fixed) = self.start::<FastSweeping<P, f64>>(Start::Fixed)?;
+        let (sources, ..) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
+        let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &start)?;
+        sweep_all(self.stage, &method, &state, &mut tracked, &start, iterations)?;
+        drop(tracked);
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
+    }
+
     /// Distances, and then their sources, where these are asked for.
-    fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+    fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a, R: Parents>(
+        &self,
+        method: M,
+    ) -> Result<Solved<'a, P>> {
         let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
         let geometry = self.sources.geometry;
         advance_front(self.stage, &method, &state, &start, geometry.spacing, self.options.farthest)?;
@@ -271,7 +293,7 @@ impl<'a> Job<'_, 'a> {
             return Ok(self.solved(method, state, fixed));
         }
         let (sources, start, _) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
-        trace_sources(self.stage, geometry, &state, &sources, &start)?;
+        trace_sources::<P, R>(self.stage, geometry, &state, &sources, &start)?;
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
     }
 
