@@ -92,43 +92,54 @@ pub(crate) fn godunov(near: [f64; 3], spacing: [f64; 3]) -> f64 {
     upwind(near, spacing).0
 }
 
-/// That x, and the axes that entered it in order of their `a`: of equal ones x before y before z.
-fn upwind(near: [f64; 3], spacing: [f64; 3]) -> (f64, Vec<usize>) {
+/// That x; the axes in order of their `a`, of equal ones x before y before z; and the solutions on the way to x without
+/// the second and without the third axis.
+fn upwind(near: [f64; 3], spacing: [f64; 3]) -> (f64, [usize; 3], [f64; 2]) {
     let weight = spacing.map(|h| 1.0 / (h * h));
     let mut axes = [0, 1, 2];
     axes.sort_by(|&i: &usize, &j| near[i].total_cmp(&near[j]));
     let [i, j, k] = axes;
     let (b, c) = (near[j] - near[i], near[k] - near[i]);
+    let one = near[i] + spacing[i];
     // Both infinite: nothing to compare with.
     if b.is_nan() || spacing[i] <= b {
-        return (near[i] + spacing[i], vec![i]);
+        return (one, axes, [one, one]);
     }
     let mean = weight[j] * b;
     let two = weight[i] + weight[j];
     let root = (mean * mean - two * (mean * b - 1.0)).max(0.0).sqrt();
     let x = (mean + root) * (1.0 / two);
     if x <= c {
-        return (near[i] + x, vec![i, j]);
+        return (near[i] + x, axes, [one, near[i] + x]);
     }
     let three = weight[0] + weight[1] + weight[2];
     let mean_of_three = mean + weight[k] * c;
     let rest = mean * b + weight[k] * c * c - 1.0;
     let root = (mean_of_three * mean_of_three - three * rest).max(0.0).sqrt();
-    (near[i] + (mean_of_three + root) * (1.0 / three), vec![i, j, k])
+    (near[i] + (mean_of_three + root) * (1.0 / three), axes, [one, near[i] + x])
 }
 
 /// Alg. 7, lines 8 to 20: what the neighbours' values make of a voxel, the offset that its source is taken from, and the
-/// offset of the smallest neighbour. Of two equal neighbours along an axis Alg. 7 names the upper one first.
-fn update(geometry: &Geometry, v: [i64; 3], value: impl Fn([i64; 3]) -> f64) -> (f64, [i64; 3], [i64; 3]) {
+/// offset of the smallest neighbour. Of two equal neighbours along an axis Alg. 7 names the upper one first. An axis enters
+/// when the solution without it is above its neighbour, both as they are stored.
+fn update<P: Stored>(geometry: &Geometry, v: [i64; 3], value: impl Fn([i64; 3]) -> f64) -> (f64, [i64; 3], [i64; 3]) {
     let n = PlainGrid::around(v).map(value);
     let upper: [bool; 3] = std::array::from_fn(|a| n[2 * a + 1] <= n[2 * a]);
     let near: [f64; 3] = std::array::from_fn(|a| if upper[a] { n[2 * a + 1] } else { n[2 * a] });
-    let (x, entered) = upwind(near, geometry.spacing);
-    let (mut sum, mut first) = ([0; 3], [0; 3]);
-    for &a in &entered {
-        sum[a] = if upper[a] { 1 } else { -1 };
+    let (x, axes, without) = upwind(near, geometry.spacing);
+    let step = |axis: usize| {
+        let mut offset = [0; 3];
+        offset[axis] = if upper[axis] { 1 } else { -1 };
+        offset
+    };
+    let first = step(axes[0]);
+    let mut sum = first;
+    for (&axis, without) in axes[1..].iter().zip(without) {
+        if P::store(without).to_f64() <= near[axis] {
+            break;
+        }
+        sum[axis] = step(axis)[axis];
     }
-    first[entered[0]] = sum[entered[0]];
     (x, sum, first)
 }
 
@@ -137,27 +148,35 @@ pub(crate) fn fsm<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], iterations
     fsm_with_sources(geometry, cloud, iterations).0
 }
 
-/// Alg. 7: distances and sources, both updated in place; where the voxel at the sum of the offsets has no source yet, that
-/// of the smallest neighbour.
+/// Alg. 1 and 7: distances and sources.
 pub(crate) fn fsm_with_sources<P: Stored>(
     geometry: &Geometry,
     cloud: &[[f64; 3]],
     iterations: u32,
 ) -> (Vec<P>, Vec<Option<usize>>) {
-    let grid = PlainGrid { shape: geometry.shape };
     let fixing = fixing_sources(geometry, cloud);
-    let start = |v: [i64; 3]| match fixing[grid.at(v)] {
-        Some(s) => P::store(squared(position(geometry, v), cloud[s]).sqrt()),
-        None => P::UNKNOWN,
+    let distance = |(v, s): ([i64; 3], &Option<usize>)| {
+        s.map_or(P::UNKNOWN, |s| P::store(squared(position(geometry, v), cloud[s]).sqrt()))
     };
-    let mut d: Vec<P> = grid.voxels().map(start).collect();
-    let mut s = fixing.clone();
+    let d = PlainGrid { shape: geometry.shape }.voxels().zip(&fixing).map(distance).collect();
+    fsm_from(geometry, (d, fixing), iterations)
+}
+
+/// Alg. 7 from given fixed voxels, those that have a source: distances and sources, both updated in place; where the voxel
+/// at the sum of the offsets has no source yet, that of the smallest neighbour.
+pub(crate) fn fsm_from<P: Stored>(
+    geometry: &Geometry,
+    (mut d, mut s): (Vec<P>, Vec<Option<usize>>),
+    iterations: u32,
+) -> (Vec<P>, Vec<Option<usize>>) {
+    let grid = PlainGrid { shape: geometry.shape };
+    let free: Vec<bool> = s.iter().map(Option::is_none).collect();
     for _ in 0..iterations {
         let before = d.clone();
         for sweep in 0..8 {
-            for v in sweep_order(geometry.shape, sweep).filter(|v| fixing[grid.at(*v)].is_none()) {
+            for v in sweep_order(geometry.shape, sweep).filter(|v| free[grid.at(*v)]) {
                 let value = |q: [i64; 3]| if grid.contains(q) { d[grid.at(q)].to_f64() } else { f64::INFINITY };
-                let (x, sum, first) = update(geometry, v, value);
+                let (x, sum, first) = update::<P>(geometry, v, value);
                 let lower = P::store(x);
                 if lower < d[grid.at(v)] {
                     let source = |o: [i64; 3]| s[grid.at(std::array::from_fn(|a| v[a] + o[a]))];
@@ -186,7 +205,7 @@ pub(crate) fn sources_along<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], 
     for at in order {
         let v = voxels[at];
         let value = |q: [i64; 3]| if grid.contains(q) { d[grid.at(q)].to_f64() } else { f64::INFINITY };
-        let (_, sum, first) = update(geometry, v, value);
+        let (_, sum, first) = update::<P>(geometry, v, value);
         let beside = [sum, first].map(|o| grid.at(std::array::from_fn(|a| v[a] + o[a])));
         s[at] = beside.into_iter().find(|&q| d[q].rank() < d[at].rank()).and_then(|q| s[q]);
     }

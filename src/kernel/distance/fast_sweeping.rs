@@ -7,12 +7,12 @@
 
 use std::marker::PhantomData;
 
-use super::diagonals::{Diagonals, has_wide_vectors};
+use super::diagonals::{Diagonals, MOST_LANES, has_wide_vectors};
 use super::directions::{CHANGED, Swept, sweep_until_quiet};
 use super::method::{DistanceMethod, OrderedSweeps};
 use super::precision::{Precision, Real};
 use super::sweep_sources::Fell;
-use super::upwind::{Axes, Upwind, godunov};
+use super::upwind::{Axes, Upwind, solve};
 use crate::grid::Box3;
 use crate::tile::HaloTile;
 
@@ -36,13 +36,13 @@ trait Record {
     /// Whether voxels of a diagonal are taken in the order of the sweep too.
     const ORDERED: bool;
 
-    /// Voxels of a vector fell, from those beside them; the first of them lies at place `at` of plane `z`.
-    fn fell<A: Real, L: Real, const N: usize, const ISOTROPIC: bool>(
+    /// Those of a vector whose bits are 1 in `falls` fell, from those beside them; `more` axes entered beside the first.
+    fn fell<L: Real, const N: usize>(
         &mut self,
         falls: &[u32; N],
+        more: &[u32; N],
         beside: [&[L; N]; 6],
         place: Place<'_>,
-        k: &Axes<A>,
     );
 }
 
@@ -53,7 +53,6 @@ struct Place<'a> {
     z: usize,
     /// The first voxel's place in the plane.
     at: usize,
-    upward: bool,
 }
 
 /// Nothing is kept.
@@ -63,46 +62,32 @@ impl Record for Forget {
     const ORDERED: bool = false;
 
     #[inline(always)]
-    fn fell<A: Real, L: Real, const N: usize, const ISOTROPIC: bool>(
-        &mut self,
-        _: &[u32; N],
-        _: [&[L; N]; 6],
-        _: Place<'_>,
-        _: &Axes<A>,
-    ) {
-    }
+    fn fell<L: Real, const N: usize>(&mut self, _: &[u32; N], _: &[u32; N], _: [&[L; N]; 6], _: Place<'_>) {}
 }
 
 impl Record for Vec<Fell> {
     const ORDERED: bool = true;
 
     #[inline(always)]
-    fn fell<A: Real, L: Real, const N: usize, const ISOTROPIC: bool>(
+    fn fell<L: Real, const N: usize>(
         &mut self,
         falls: &[u32; N],
+        more: &[u32; N],
         beside: [&[L; N]; 6],
-        Place { layout, z, at, upward }: Place<'_>,
-        k: &Axes<A>,
+        Place { layout, z, at }: Place<'_>,
     ) {
         let (lower_y, upper_y) = if layout.turned { (3, 2) } else { (2, 3) };
-        let mut from = [Upwind::default(); N];
+        let mut from = [Upwind::default(); MOST_LANES];
+        let mut which = 0;
         for i in 0..N {
-            let value = |side: usize| A::of_lane(beside[side][i].magnitude());
+            let value = |side: usize| beside[side][i].magnitude();
             let beside = [value(0), value(1), value(lower_y), value(upper_y), value(4), value(5)];
-            from[i] = Upwind::of::<A, ISOTROPIC>(beside, k);
+            from[i] = Upwind::new(beside, more[i]);
+            which |= falls[i] << i;
         }
         let (s, y) = (at / layout.row, at % layout.row);
-        let fell = |i: usize| {
-            let (x, y) = (s - y - i, y + i);
-            let y = if layout.turned { layout.valid[1] + 1 - y } else { y };
-            Fell { voxel: [x - 1, y - 1, z - 1].map(|n| n as u16), from: from[i] }
-        };
-        for n in 0..N {
-            let i = if upward { n } else { N - 1 - n };
-            if falls[i] == 1 {
-                self.push(fell(i));
-            }
-        }
+        let (x, y) = (s - y, if layout.turned { layout.valid[1] + 1 - y } else { y });
+        self.push(Fell { first: [x, y, z].map(|n| n as i16 - 1), which: which as u16, from });
     }
 }
 
@@ -128,7 +113,7 @@ fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool>
                 let here = run.here[at..].first_chunk_mut::<N>();
                 let beside = run.beside.map(|side| side[at..].first_chunk::<N>());
                 if let (Some(here), [Some(xl), Some(xu), Some(yl), Some(yu), Some(zl), Some(zu)]) = (here, beside) {
-                    let place = Place { layout, z, at: start + at, upward: upward[0] };
+                    let place = Place { layout, z, at: start + at };
                     let beside = [xl, xu, yl, yu, zl, zu];
                     swept |= lower::<P, A, R, N, ISOTROPIC>(here, beside, passed, k, (place, record));
                 }
@@ -148,10 +133,12 @@ fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool
     (place, record): (Place<'_>, &mut R),
 ) -> Swept {
     let mut value = [P::Lane::default(); N];
-    let mut falls = [0_u32; N];
+    let (mut falls, mut more) = ([0_u32; N], [0_u32; N]);
     for i in 0..N {
         let near = |a: usize| A::of_lane(beside[2 * a][i].magnitude().smaller(beside[2 * a + 1][i].magnitude()));
-        let x = P::round(godunov::<A, ISOTROPIC>([near(0), near(1), near(2)], k));
+        let solution = solve::<A, ISOTROPIC>([near(0), near(1), near(2)], k);
+        let x = P::round(solution.value);
+        more[i] = solution.more::<P>();
         // A fixed voxel is below zero and so below anything.
         falls[i] = u32::from(x < here[i]);
         value[i] = if x < here[i] { x } else { here[i] };
@@ -169,7 +156,7 @@ fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool
         swept |= back << axis;
     }
     *here = value;
-    record.fell::<A, P::Lane, N, ISOTROPIC>(&falls, beside, place, k);
+    record.fell(&falls, &more, beside, place);
     swept
 }
 

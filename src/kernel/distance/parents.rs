@@ -3,7 +3,7 @@
 //! follows them.
 
 use super::precision::{Precision, Real};
-use super::upwind::{Axes, Upwind};
+use super::upwind::{Axes, Upwind, solve};
 use crate::grid::{Geometry, NEIGHBOURS_26};
 use crate::tile::HaloTile;
 
@@ -12,8 +12,9 @@ pub trait Parents: Clone + Send + Sync + 'static {
     /// The rule for tiles of `edge`^3 voxels of a grid.
     fn new(geometry: &Geometry, edge: usize) -> Self;
 
-    /// Looks at a grown tile of distances, halo 1, all 26 directions; sign bit on fixed voxels.
-    fn look<P: Precision>(&mut self, _distance: &HaloTile<P>) {}
+    /// Looks at the rows of a grown tile of distances, halo 1, all 26 directions, that start at these places; sign bit on
+    /// fixed voxels.
+    fn look<P: Precision>(&mut self, _distance: &HaloTile<P>, _rows: &[usize]) {}
 
     /// The place of the parent of the voxel at a place of that tile.
     fn parent<P: Precision>(&self, distance: &[P], place: usize) -> Option<usize>;
@@ -79,8 +80,8 @@ impl Parents for UpwindSum {
         }
     }
 
-    fn look<P: Precision>(&mut self, distance: &HaloTile<P>) {
-        pulp::Arch::new().dispatch(Look { distance, axes: &self.axes, from: &mut self.from });
+    fn look<P: Precision>(&mut self, distance: &HaloTile<P>, rows: &[usize]) {
+        pulp::Arch::new().dispatch(Look { distance, rows, axes: &self.axes, from: &mut self.from });
     }
 
     #[inline]
@@ -94,6 +95,7 @@ impl Parents for UpwindSum {
 /// Which neighbours enter the update of each voxel, compiled for each vector unit.
 struct Look<'a, P> {
     distance: &'a HaloTile<P>,
+    rows: &'a [usize],
     axes: &'a Axes<f64>,
     from: &'a mut [Upwind],
 }
@@ -110,19 +112,18 @@ impl<P: Precision> pulp::NullaryFnOnce for Look<'_, P> {
 impl<P: Precision> Look<'_, P> {
     #[inline(always)]
     fn all<const ISOTROPIC: bool>(self) {
-        let ([nx, ny, nz], pitch) = (self.distance.valid(), self.distance.pitch());
-        for z in 0..nz as isize {
-            for y in 0..ny as isize {
-                let row = self.distance.at(0, y, z);
-                let side = |place: usize| &self.distance.data()[place..][..nx];
-                let [xl, xu] = [side(row - 1), side(row + 1)];
-                let [yl, yu] = [side(row - pitch), side(row + pitch)];
-                let [zl, zu] = [side(row - pitch * pitch), side(row + pitch * pitch)];
-                for (x, from) in self.from[row..][..nx].iter_mut().enumerate() {
-                    let value = |side: &[P]| side[x].lane().magnitude().f64();
-                    let beside = [value(xl), value(xu), value(yl), value(yu), value(zl), value(zu)];
-                    *from = Upwind::of::<f64, ISOTROPIC>(beside, self.axes);
-                }
+        let (width, pitch) = (self.distance.valid()[0], self.distance.pitch());
+        for &row in self.rows {
+            let side = |place: usize| &self.distance.data()[place..][..width];
+            let [xl, xu] = [side(row - 1), side(row + 1)];
+            let [yl, yu] = [side(row - pitch), side(row + pitch)];
+            let [zl, zu] = [side(row - pitch * pitch), side(row + pitch * pitch)];
+            for (x, from) in self.from[row..][..width].iter_mut().enumerate() {
+                let value = |side: &[P]| side[x].lane().magnitude();
+                let beside = [value(xl), value(xu), value(yl), value(yu), value(zl), value(zu)];
+                let near = |a: usize| beside[2 * a].smaller(beside[2 * a + 1]).f64();
+                let solution = solve::<f64, ISOTROPIC>([near(0), near(1), near(2)], self.axes);
+                *from = Upwind::new(beside, solution.more::<P>());
             }
         }
     }

@@ -7,18 +7,23 @@
 //! In: the voxels that fell, in an order that puts those first that come first for their neighbours in the same tile; the
 //! sources of a brick, `[z][y][x]`; ghosts as they are now and as they were before the sweep. Out: the brick's sources.
 
+use super::diagonals::MOST_LANES;
 use super::initialise::NO_SOURCE;
 use super::tracked::{has_source, source_of};
 use super::upwind::Upwind;
+use crate::grid::MOST_SOURCES;
 use crate::tile::HaloTile;
 
-/// A voxel that fell in a sweep.
+/// Voxels that fell in a sweep, of a run along a diagonal of their tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fell {
-    /// Where in its tile, from 0.
-    pub voxel: [u16; 3],
+    /// Where the first of the run lies in the tile, from 0. From one to the next x falls by 1, and y rises or, in sweeps of
+    /// opposite directions along x and y, falls by 1.
+    pub(crate) first: [i16; 3],
+    /// Bit n that the n-th of the run fell.
+    pub(crate) which: u16,
     /// From which neighbours.
-    pub from: Upwind,
+    pub(crate) from: [Upwind; MOST_LANES],
 }
 
 /// The state of a voxel whose source is not known yet: below [`NO_SOURCE`], above all sources.
@@ -29,6 +34,10 @@ fn pending(from: Upwind) -> u32 {
 fn pending_from(state: u32) -> Option<Upwind> {
     let from = NO_SOURCE.wrapping_sub(1).wrapping_sub(state);
     u8::try_from(from).ok().map(Upwind)
+}
+
+fn any_pending(states: &[u32]) -> bool {
+    states.iter().fold(false, |any, &state| any | pending_from(state).is_some())
 }
 
 /// The neighbours that a voxel may copy from.
@@ -102,12 +111,33 @@ impl SweepSources {
     pub fn take(&self, fell: &[Fell], brick: &mut [u32], edge: usize, valid: [usize; 3], ghosts: &Ghosts) -> bool {
         let around = Around { brick, edge, valid, ghosts, all: false };
         let mut left = false;
-        for &Fell { voxel, from } in fell {
-            let voxel = voxel.map(usize::from);
-            let state = self.source(&around, voxel, from);
-            left |= pending_from(state).is_some();
-            let place = around.place(voxel);
-            around.brick[place] = state;
+        let (along_y, edge) = (if self.upward[0] == self.upward[1] { 1 } else { -1 }, edge as isize);
+        let steps = self.ways.iter().map(|way| way.sum.offset.map(isize::from)).collect::<Vec<_>>();
+        let steps: Vec<isize> = steps.iter().map(|[x, y, z]| (z * edge + y) * edge + x).collect();
+        let inside = |at: isize, axis: usize| at > 0 && at + 1 < valid[axis] as isize;
+        for fell in fell {
+            let [x, y, z] = fell.first.map(isize::from);
+            let z_inside = inside(z, 2);
+            let mut which = fell.which;
+            while which != 0 {
+                // In the order of the sweep.
+                let n = if self.upward[0] { which.trailing_zeros() } else { which.ilog2() };
+                which &= !(1 << n);
+                let from = fell.from[n as usize];
+                let (x, y) = (x - n as isize, y + along_y * n as isize);
+                let place = ((z * edge + y) * edge + x) as usize;
+                if z_inside && inside(x, 0) && inside(y, 1) {
+                    // By far the most, taken without asking where the neighbour lies.
+                    let sum = source_of(around.brick[place.wrapping_add_signed(steps[usize::from(from.0)])]);
+                    if (sum as usize) < MOST_SOURCES {
+                        around.brick[place] = sum;
+                        continue;
+                    }
+                }
+                let state = self.source(&around, [x, y, z].map(|n| n as usize), from);
+                left |= pending_from(state).is_some();
+                around.brick[place] = state;
+            }
         }
         left
     }
@@ -122,11 +152,14 @@ impl SweepSources {
         let (mut found, mut left) = (false, false);
         for z in ordered(2) {
             for y in ordered(1) {
+                let row = around.place([0, y, z]);
+                if !any_pending(&around.brick[row..][..valid[0]]) {
+                    continue;
+                }
                 for x in ordered(0) {
-                    let place = around.place([x, y, z]);
-                    let Some(from) = pending_from(around.brick[place]) else { continue };
+                    let Some(from) = pending_from(around.brick[row + x]) else { continue };
                     let state = self.source(&around, [x, y, z], from);
-                    around.brick[place] = state;
+                    around.brick[row + x] = state;
                     let resolved = pending_from(state).is_none();
                     found |= resolved;
                     left |= !resolved;
@@ -178,15 +211,16 @@ impl Around<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::distance::vector_distance::FIXED;
 
     #[test]
     fn pending_states_are_no_sources() {
         for code in 0..=u8::MAX {
             assert_eq!(pending_from(pending(Upwind(code))), Some(Upwind(code)));
-            assert!(pending(Upwind(code)) as usize >= crate::grid::MOST_SOURCES);
+            assert!(pending(Upwind(code)) as usize >= MOST_SOURCES);
         }
         assert_eq!(pending_from(NO_SOURCE), None);
-        assert_eq!(pending_from(crate::grid::MOST_SOURCES as u32 - 1), None);
-        assert_eq!(pending_from(7 | super::super::vector_distance::FIXED), None);
+        assert_eq!(pending_from(MOST_SOURCES as u32 - 1), None);
+        assert_eq!(pending_from(7 | FIXED), None);
     }
 }

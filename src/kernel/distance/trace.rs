@@ -21,7 +21,9 @@ use crate::tile::HaloTile;
 #[derive(Clone, Debug)]
 pub struct Tracer<R> {
     parents: R,
-    /// Whether a voxel's chain was followed in this tile.
+    /// Places at which rows start that hold voxels without a source.
+    rows: Vec<usize>,
+    /// Whether a voxel's chain was followed in this tile, or ends there.
     followed: Vec<bool>,
     chain: Vec<usize>,
 }
@@ -30,51 +32,70 @@ impl<R: Parents> Tracer<R> {
     /// For tiles of `edge`^3 voxels of a grid.
     #[must_use]
     pub fn new(geometry: &Geometry, edge: usize) -> Self {
-        Self { parents: R::new(geometry, edge), followed: vec![false; (edge + 2).pow(3)], chain: Vec::new() }
+        let followed = vec![true; (edge + 2).pow(3)];
+        Self { parents: R::new(geometry, edge), rows: Vec::new(), followed, chain: Vec::new() }
     }
 
     /// Gives voxels their sources where the chain ends at a known one. Returns whether any got one, and whether any that
     /// has a distance is left without.
     pub fn trace<P: Precision>(&mut self, distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> (bool, bool) {
         let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
-        self.parents.look(distance);
-        // Chains end at ghosts.
-        self.followed.fill(true);
-        for z in 1..=nz {
-            for y in 1..=ny {
-                self.followed[(z * pitch + y) * pitch + 1..][..nx].fill(false);
-            }
+        let rows = (1..=nz).flat_map(|z| (1..=ny).map(move |y| (z * pitch + y) * pitch + 1));
+        self.rows.clear();
+        self.rows.extend(rows.filter(|&row| lacks(&state.data()[row..][..nx])));
+        self.parents.look(distance, &self.rows);
+        for &row in &self.rows {
+            self.followed[row..][..nx].fill(false);
         }
         let (mut found, mut left) = (false, false);
-        for z in 1..=nz {
-            for y in 1..=ny {
-                for x in 1..=nx {
-                    let place = (z * pitch + y) * pitch + x;
-                    if distance.data()[place].lane() < P::Lane::INFINITY && !has_source(state.data()[place]) {
-                        let known = self.follow(distance.data(), state.data_mut(), place);
-                        found |= known;
-                        left |= !known;
-                    }
+        for n in 0..self.rows.len() {
+            let row = self.rows[n];
+            for place in row..row + nx {
+                if !has_source(state.data()[place]) && distance.data()[place].lane() < P::Lane::INFINITY {
+                    let known = self.follow(distance.data(), state.data_mut(), place);
+                    found |= known;
+                    left |= !known;
                 }
             }
+        }
+        // Chains end at ghosts, and in rows that have all sources.
+        for &row in &self.rows {
+            self.followed[row..][..nx].fill(true);
         }
         (found, left)
     }
 
     /// Follows the chain from a voxel; all voxels on it get the source at its end, if that is known.
     fn follow<P: Precision>(&mut self, distance: &[P], state: &mut [u32], from: usize) -> bool {
+        if self.followed[from] {
+            return false;
+        }
+        let mut next = self.parents.parent(distance, from);
+        if let Some(parent) = next.filter(|&parent| has_source(state[parent])) {
+            state[from] = source_of(state[parent]);
+            return true;
+        }
         self.chain.clear();
-        let mut at = from;
-        while !has_source(state[at]) && !self.followed[at] {
+        self.chain.push(from);
+        self.followed[from] = true;
+        let mut source = NO_SOURCE;
+        while let Some(at) = next {
+            source = source_of(state[at]);
+            if source != NO_SOURCE || self.followed[at] {
+                break;
+            }
             self.followed[at] = true;
             self.chain.push(at);
-            let Some(parent) = self.parents.parent(distance, at) else { break };
-            at = parent;
+            next = self.parents.parent(distance, at);
         }
-        let source = source_of(state[at]);
         self.chain.iter().for_each(|&place| state[place] = source);
         source != NO_SOURCE
     }
+}
+
+/// Whether any of these voxels has no source.
+fn lacks(states: &[u32]) -> bool {
+    states.iter().fold(false, |any, &state| any | !has_source(state))
 }
 
 /// Fills voxels that tracing left without a source, as far as that is known in this tile. While it goes on their states
@@ -92,7 +113,8 @@ pub fn fill<P: Precision>(distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> 
         {
             let (here, kept) = (values[place].lane(), state.data()[place]);
             let is_filled = kept == NO_SOURCE || kept & FIXED != 0;
-            if here.is_marked() || !(here < P::Lane::INFINITY) || !is_filled {
+            let has_distance = here < P::Lane::INFINITY && !here.is_marked();
+            if !(has_distance && is_filled) {
                 continue;
             }
             filled = true;

@@ -3,11 +3,13 @@
 //!
 //! With `a_s` the smaller neighbour along axis s, the solution is the x with `sum (((x - a_s)^+) / h_s)^2 = 1`, taken with
 //! one, two, then three axes in order of a. Of two equal neighbours along an axis the upper one counts, which Alg. 7 names
-//! first; of equal axes x comes before y before z, as its sorting leaves them. The source is the one of the voxel at the
-//! sum of the offsets of the neighbours that entered; where that voxel has none (the paper is silent there), the one of
-//! the first, smallest, of these neighbours.
+//! first; of equal axes x comes before y before z, as its sorting leaves them. An axis counts as entered when the solution
+//! without it, rounded as it would be stored, is above its neighbour (lines 15 and 18): rounding must not let in one that
+//! is just as far, or symmetric sources would get unequal shares. The source is the one of the voxel at the sum of the
+//! offsets of the neighbours that entered; where that voxel has none (the paper is silent there), the one of the first,
+//! smallest, of these neighbours.
 
-use super::precision::Real;
+use super::precision::{Precision, Real};
 
 /// What the solution needs of the spacing.
 #[derive(Clone, Copy, Debug)]
@@ -55,18 +57,31 @@ fn order<A: Real, const ISOTROPIC: bool>(axes: &mut [Axis<A>; 3], i: usize, j: u
     }
 }
 
-/// An upwind solution, and whether the second and the third axis entered it.
+/// An upwind solution.
 #[derive(Clone, Copy)]
-struct Solution<A> {
-    value: A,
-    second: bool,
-    third: bool,
+pub(crate) struct Solution<A> {
+    pub(crate) value: A,
+    /// The smaller neighbours of the second and the third axis, and the solutions without them.
+    second: (A, A),
+    third: (A, A),
 }
 
+impl<A: Real> Solution<A> {
+    /// How many axes entered beside the first, for a solution that is stored as `P`.
+    #[inline(always)]
+    pub(crate) fn more<P: Precision>(self) -> u32 {
+        let enters = |(neighbour, without): (A, A)| u32::from(A::of_lane(P::round(without)) > neighbour);
+        let second = enters(self.second);
+        second + (second & enters(self.third))
+    }
+}
+
+/// The upwind solution for the smaller neighbours `near` along the three axes; infinity when all of them are.
+///
 /// Values are counted from the smallest neighbour, so that nothing cancels. Without branches: every lane of a vector
 /// computes all three solutions and keeps the one that holds.
 #[inline(always)]
-fn solve<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>) -> Solution<A> {
+pub(crate) fn solve<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>) -> Solution<A> {
     let axis = |a: usize| (near[a], k.spacing[a], k.weight[a], k.without[a]);
     let mut axes = [axis(0), axis(1), axis(2)];
     order::<A, ISOTROPIC>(&mut axes, 0, 1);
@@ -82,14 +97,12 @@ fn solve<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>) -> Solution<
     let mean3 = mean + w3 * c;
     let discriminant = mean3 * mean3 - k.total[0] * (mean * b + w3 * c * c - k.one);
     let of_three = (mean3 + discriminant.larger(zero).root()) * k.total[1];
-    let second = h > b;
-    let x = if second { of_two } else { h };
-    let third = x > c;
-    let x = if third { of_three } else { x };
-    Solution { value: first + x, second, third }
+    let two = if h > b { of_two } else { h };
+    let x = if two > c { of_three } else { two };
+    Solution { value: first + x, second: (second, first + h), third: (third, first + two) }
 }
 
-/// The upwind solution for the smaller neighbours `near` along the three axes; infinity when all of them are.
+/// The upwind solution alone.
 #[inline(always)]
 pub(crate) fn godunov<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>) -> A {
     solve::<A, ISOTROPIC>(near, k).value
@@ -101,14 +114,12 @@ pub(crate) fn godunov<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>)
 pub struct Upwind(pub(crate) u8);
 
 impl Upwind {
-    /// For neighbours in the order -x, +x, -y, +y, -z, +z.
+    /// For neighbours in the order -x, +x, -y, +y, -z, +z, when so many axes entered beside the first. Without branches:
+    /// bits of whole lanes.
     #[inline(always)]
-    pub(crate) fn of<A: Real, const ISOTROPIC: bool>(beside: [A; 6], k: &Axes<A>) -> Self {
-        let [xl, xu, yl, yu, zl, zu] = beside;
-        let [x, y, z] = [xu.smaller(xl), yu.smaller(yl), zu.smaller(zl)];
-        let Solution { second, third, .. } = solve::<A, ISOTROPIC>([x, y, z], k);
-        // Without branches: bits of whole lanes.
+    pub(crate) fn new<L: Real>([xl, xu, yl, yu, zl, zu]: [L; 6], more: u32) -> Self {
         let is = u32::from;
+        let [x, y, z] = [xu.smaller(xl), yu.smaller(yl), zu.smaller(zl)];
         let sides = is(xu <= xl) | is(yu <= yl) << 1 | is(zu <= zl) << 2;
         // The axes that come first and last in a sorting that keeps the order of equal ones.
         let x_first = is(x <= y) & is(x <= z);
@@ -117,7 +128,8 @@ impl Upwind {
         let z_last = is(z >= x) & is(z >= y);
         let y_last = (1 - z_last) & is(y >= x);
         let x_last = 1 - (z_last | y_last);
-        let entered = |first: u32, last: u32| first | (is(second) & (1 - last)) | is(third);
+        let (second, third) = (is(more > 0), is(more > 1));
+        let entered = |first: u32, last: u32| first | (second & (1 - last)) | third;
         let axes = entered(x_first, x_last) | entered(y_first, y_last) << 1 | entered(z_first, z_last) << 2;
         Self((sides | axes << 3 | y_first << 6 | z_first << 7) as u8)
     }
@@ -154,9 +166,11 @@ mod tests {
     use super::*;
 
     fn of(beside: [f64; 6]) -> Upwind {
-        let wide = Upwind::of::<f64, true>(beside, &Axes::new([1.0; 3]));
-        assert_eq!(wide, Upwind::of::<f64, false>(beside, &Axes::new([1.0; 3])));
-        wide
+        let near = std::array::from_fn(|a| beside[2 * a].min(beside[2 * a + 1]));
+        let axes = Axes::new([1.0; 3]);
+        let (equal, any) = (solve::<_, true>(near, &axes).more::<f64>(), solve::<_, false>(near, &axes).more::<f64>());
+        assert_eq!(equal, any);
+        Upwind::new(beside, equal)
     }
 
     #[test]

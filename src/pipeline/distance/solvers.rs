@@ -19,6 +19,7 @@ use crate::kernel::distance::all_neighbours::AllNeighbours;
 use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
 use crate::kernel::distance::fast_marching::FastMarching;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
+use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::parents::{Parents, ShortestWay, UpwindSum};
 use crate::kernel::distance::precision::Precision;
@@ -247,8 +248,17 @@ impl<'a> Job<'_, 'a> {
     /// A method's start: its state with the voxels that sources fix, the bricks that hold any, their number.
     fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Vec<Slot>, u64)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state, start)?;
+        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state, None, start)?;
         Ok((state, start, fixed))
+    }
+
+    /// The start of a method that keeps no sources, and a field with those of its fixed voxels.
+    #[allow(clippy::type_complexity, reason = "as `start`, with a field more")]
+    fn start_apart<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, BrickArray<u32>, Vec<Slot>, u64)> {
+        let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
+        let sources = BrickArray::blank(self.engine.scratch(), self.set, NO_SOURCE)?;
+        let (start, fixed) = initialise::<M>(self.stage, self.sources, &state, Some(&sources), Start::Fixed)?;
+        Ok((state, sources, start, fixed))
     }
 
     fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
@@ -273,8 +283,7 @@ impl<'a> Job<'_, 'a> {
         if !self.options.sources {
             return self.sweeps(method, iterations);
         }
-        let (state, start, fixed) = self.start::<FastSweeping<P, f64>>(Start::Fixed)?;
-        let (sources, ..) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
+        let (state, sources, start, fixed) = self.start_apart::<FastSweeping<P, f64>>()?;
         let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &start)?;
         sweep_all(self.stage, &method, &state, &mut tracked, &start, iterations)?;
         drop(tracked);
@@ -286,13 +295,12 @@ impl<'a> Job<'_, 'a> {
         &self,
         method: M,
     ) -> Result<Solved<'a, P>> {
-        let (state, start, fixed) = self.start::<M>(Start::Fixed)?;
+        if !self.options.sources {
+            return self.front(method);
+        }
+        let (state, sources, start, fixed) = self.start_apart::<M>()?;
         let geometry = self.sources.geometry;
         advance_front(self.stage, &method, &state, &start, geometry.spacing, self.options.farthest)?;
-        if !self.options.sources {
-            return Ok(self.solved(method, state, fixed));
-        }
-        let (sources, start, _) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
         trace_sources::<P, R>(self.stage, geometry, &state, &sources, &start)?;
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, fixed) })
     }
