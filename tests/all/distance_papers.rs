@@ -141,7 +141,7 @@ fn sponge_and_sphere_share_all_voxels() {
         exact[usize::from(second < first)] += 1;
         between += u64::from((first.sqrt() - second.sqrt()).abs() < 0.1);
     }
-    for method in Method::all().filter(|method| method.solver::<f32>().keeps_sources) {
+    for method in Method::all() {
         for schedule in schedules(method) {
             let found = pair(&lab, 0.1, method, schedule, Init::Cell, true).expect("a distance");
             let counts = [1, 2].map(|label| found.label_voxels.get(&label).copied().unwrap_or(0));
@@ -158,7 +158,8 @@ fn sponge_and_sphere_share_all_voxels() {
 }
 
 /// Sec. 4, Experiment 2: the grid points on each vertex, open edge and open face of the cube are a data set of their own.
-/// By Alg. 7 all vertices get as many voxels (one has the centre too), all edges, all faces: algorithms, section 10.
+/// By Alg. 7 all vertices get as many voxels (one has the centre too), all edges, all faces: algorithms, section 10. In
+/// single precision: the last bits of f64 differ where distances are equal by symmetry.
 #[test]
 fn subsets_of_the_cube_share_its_voxels_evenly() {
     let count = 37;
@@ -185,7 +186,7 @@ fn subsets_of_the_cube_share_its_voxels_evenly() {
         closest_point: false,
         brick: 16,
     };
-    let found = run_distance::<f64>(&Lab::new(2).engine, &geometry, &sets, &settings, None).expect("a distance");
+    let found = run_distance::<f32>(&Lab::new(2).engine, &geometry, &sets, &settings, None).expect("a distance");
     let mut voxels = [vec![], vec![], vec![]];
     for (label, dimension) in (1..).zip(dimensions) {
         voxels[dimension].push(found.label_voxels[&label]);

@@ -1,6 +1,8 @@
 //! Sources of FSM. With `--schedule sweep` those of Alg. 7 (Kósa & Mikula 2023), bit for bit: on clouds in `distance`, on
 //! meshes here. With `front` they follow from the finished distances alone, whatever the layout.
 
+use std::collections::BTreeSet;
+
 use half::f16;
 use proptest::prelude::*;
 use rstar::RTree;
@@ -140,9 +142,11 @@ fn no_voxel_stays_without_a_source_where_distances_are_lost_in_rounding() {
     }
 }
 
-/// The share of voxels whose source is not the nearest one, and by how much it is farther at most, in spacings.
+/// The share of voxels whose source is not the nearest one of those that fix voxels, and by how much it is farther at most,
+/// in spacings.
 fn inexact(geometry: &Geometry, cloud: &[[f64; 3]], sources: &[Option<usize>]) -> (f64, f64) {
-    let tree = RTree::bulk_load(cloud.to_vec());
+    let fixing: BTreeSet<usize> = textbook::fixing_sources(geometry, cloud).into_iter().flatten().collect();
+    let tree = RTree::bulk_load(fixing.into_iter().map(|s| cloud[s]).collect());
     let (mut wrong, mut most) = (0, 0.0_f64);
     for (v, s) in (PlainGrid { shape: geometry.shape }).voxels().zip(sources) {
         let here = position(geometry, v);
@@ -154,24 +158,27 @@ fn inexact(geometry: &Geometry, cloud: &[[f64; 3]], sources: &[Option<usize>]) -
     (wrong as f64 / sources.len() as f64, most)
 }
 
-/// Sources of an Eikonal method are off where those of its characteristics are: near where two sources are equally far.
+/// Sources are carried along steps to one of 26 neighbours, not along characteristics, so a voxel may get one that is near,
+/// not nearest: seldom in a cloud that fills the volume, for half of the voxels far from a dense surface. Both schedules alike.
 #[test]
 fn most_sources_are_the_nearest_ones() {
     let lab = Lab::new(2);
     let pair = sponge_and_sphere().concat();
     let mut cases = vec![("Sponge & Sphere".to_string(), grid_around(&pair, 0.05), pair, 0.6)];
-    for (seed, spacing) in [[0.5; 3], [0.4, 0.4, 1.3]].into_iter().enumerate() {
+    for (seed, spacing, share) in [(0, [0.5; 3], 0.08), (1, [0.4, 0.4, 1.3], 0.16)] {
         let geometry = grid([70, 64, 50], spacing);
-        let cloud = random_cloud(&geometry, 100, seed as u64);
-        cases.push((format!("100 points, spacing {spacing:?}"), geometry, cloud, 0.6));
+        let cloud = random_cloud(&geometry, 100, seed);
+        cases.push((format!("100 points, spacing {spacing:?}"), geometry, cloud, share));
     }
-    for (name, geometry, cloud, shares) in &cases {
+    for (name, geometry, cloud, allowed) in &cases {
         for schedule in [SWEEP, Schedule::Front] {
             let found = solve::<f32>(&lab, geometry, cloud, 16, Method::FSM, schedule);
             let (share, most) = inexact(geometry, cloud, &found.sources);
             println!("{name}, {schedule:?}: {share} of the voxels, {most} spacings at most");
-            assert!(share < *shares && most < 20.0, "{name}, {schedule:?}: {share}, {most}");
+            assert!(share < *allowed, "{name}, {schedule:?}: {share} of the voxels, {most} spacings at most");
         }
+        let fmm = solve::<f32>(&lab, geometry, cloud, 16, Method::FMM, Schedule::Front);
+        println!("{name}, fmm: {:?}", inexact(geometry, cloud, &fmm.sources));
     }
 }
 

@@ -39,7 +39,7 @@ pub(crate) fn sweeps(method: Method) -> bool {
 /// A solved field, `[z][y][x]` over the whole grid.
 pub(crate) struct Field<P> {
     pub(crate) values: Vec<P>,
-    /// The nearest source, where one is known and kept.
+    /// The nearest source, where one is known.
     pub(crate) sources: Vec<Option<usize>>,
     /// Bricks that were not resident when they were used.
     pub(crate) loads: u64,
@@ -64,7 +64,7 @@ pub(crate) fn solve<P: Stored>(
     let sources = Sources::cloud(geometry, cloud, &bins);
     let stage = lab.engine.stage("distance", 0);
     let row = method.solver::<P>();
-    let options = everywhere(row.keeps_sources);
+    let options = everywhere(true);
     let solved = (row.solve)(&stage, &lab.engine, &sources, &set, schedule, options).expect("room for a field");
     stage.finish();
     let loads = lab.engine.reports().last().map_or(0, |report| report.brick_loads);

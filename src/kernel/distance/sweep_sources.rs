@@ -26,6 +26,22 @@ pub struct Fell {
     pub(crate) from: [Upwind; MOST_LANES],
 }
 
+impl Fell {
+    /// The voxels that fell, in the order of the sweep.
+    #[inline(always)]
+    fn each(&self, upward: [bool; 3], mut f: impl FnMut([usize; 3], Upwind)) {
+        let [x, y, z] = self.first.map(isize::from);
+        let along_y = if upward[0] == upward[1] { 1 } else { -1 };
+        let mut which = self.which;
+        while which != 0 {
+            let n = if upward[0] { which.trailing_zeros() } else { which.ilog2() };
+            which &= !(1 << n);
+            let voxel = [x - n as isize, y + along_y * n as isize, z];
+            f(voxel.map(|n| n as usize), self.from[n as usize]);
+        }
+    }
+}
+
 /// The state of a voxel whose source is not known yet: below [`NO_SOURCE`], above all sources.
 fn pending(from: Upwind) -> u32 {
     NO_SOURCE - 1 - u32::from(from.0)
@@ -110,34 +126,23 @@ impl SweepSources {
     /// now are known in tiles upwind. Returns whether any voxel is left pending.
     pub fn take(&self, fell: &[Fell], brick: &mut [u32], edge: usize, valid: [usize; 3], ghosts: &Ghosts) -> bool {
         let around = Around { brick, edge, valid, ghosts, all: false };
+        let step = |way: &Way| {
+            let [x, y, z] = way.sum.offset.map(isize::from);
+            (z * edge as isize + y) * edge as isize + x
+        };
+        let steps: Vec<isize> = self.ways.iter().map(step).collect();
         let mut left = false;
-        let (along_y, edge) = (if self.upward[0] == self.upward[1] { 1 } else { -1 }, edge as isize);
-        let steps = self.ways.iter().map(|way| way.sum.offset.map(isize::from)).collect::<Vec<_>>();
-        let steps: Vec<isize> = steps.iter().map(|[x, y, z]| (z * edge + y) * edge + x).collect();
-        let inside = |at: isize, axis: usize| at > 0 && at + 1 < valid[axis] as isize;
         for fell in fell {
-            let [x, y, z] = fell.first.map(isize::from);
-            let z_inside = inside(z, 2);
-            let mut which = fell.which;
-            while which != 0 {
-                // In the order of the sweep.
-                let n = if self.upward[0] { which.trailing_zeros() } else { which.ilog2() };
-                which &= !(1 << n);
-                let from = fell.from[n as usize];
-                let (x, y) = (x - n as isize, y + along_y * n as isize);
-                let place = ((z * edge + y) * edge + x) as usize;
-                if z_inside && inside(x, 0) && inside(y, 1) {
-                    // By far the most, taken without asking where the neighbour lies.
-                    let sum = source_of(around.brick[place.wrapping_add_signed(steps[usize::from(from.0)])]);
-                    if (sum as usize) < MOST_SOURCES {
-                        around.brick[place] = sum;
-                        continue;
-                    }
-                }
-                let state = self.source(&around, [x, y, z].map(|n| n as usize), from);
+            fell.each(self.upward, |voxel, from| {
+                let place = around.place(voxel);
+                let inside = (0..3).all(|a| voxel[a] > 0 && voxel[a] + 1 < valid[a]);
+                // By far the most are taken without asking where the neighbour lies.
+                let beside = place.wrapping_add_signed(steps[usize::from(from.0)]);
+                let sum = if inside { source_of(around.brick[beside]) } else { NO_SOURCE };
+                let state = if (sum as usize) < MOST_SOURCES { sum } else { self.source(&around, voxel, from) };
                 left |= pending_from(state).is_some();
                 around.brick[place] = state;
-            }
+            });
         }
         left
     }

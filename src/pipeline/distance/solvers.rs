@@ -56,8 +56,6 @@ pub struct Solver<P> {
     pub textbook: Textbook,
     /// Whether it can look at all 26 neighbours.
     pub takes_all_neighbours: bool,
-    /// Whether it keeps the source of each voxel.
-    pub keeps_sources: bool,
     /// Edge of bricks that it is fastest with.
     pub brick: i64,
     /// Bytes of a voxel's state.
@@ -77,7 +75,6 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "fast sweeping, the Eikonal equation",
             textbook: Textbook::Sweeps,
             takes_all_neighbours: false,
-            keeps_sources: true,
             brick: 64,
             state_bytes: size_of::<P>() as u64,
             source_bytes: 4,
@@ -88,7 +85,6 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "vector distance transform, Euclidean to a tracked source",
             textbook: Textbook::Sweeps,
             takes_all_neighbours: true,
-            keeps_sources: true,
             brick: 64,
             state_bytes: 4,
             source_bytes: 0,
@@ -99,7 +95,6 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "fast marching, the Eikonal equation",
             textbook: Textbook::Heap { bytes: size_of::<P>() as u64 + 4 + marching_heap::SCRATCH_BYTES },
             takes_all_neighbours: false,
-            keeps_sources: true,
             brick: 32,
             state_bytes: size_of::<P>() as u64,
             source_bytes: 4,
@@ -110,7 +105,6 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "Dijkstra-Pythagoras, Euclidean to a tracked source",
             textbook: Textbook::Heap { bytes: 4 + dijkstra_heap::SCRATCH_BYTES },
             takes_all_neighbours: true,
-            keeps_sources: true,
             brick: 32,
             state_bytes: 4,
             source_bytes: 0,
