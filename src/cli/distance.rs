@@ -21,7 +21,7 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::precision::Precision;
-use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, SOLVERS, Schedule, Textbook, distance};
+use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, Schedule, Textbook, distance};
 use crate::store::{Scratch, free_space};
 
 /// More ranks than this are no use in one process.
@@ -219,14 +219,6 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     }
     if sweeps && field.max_distance.is_some() {
         return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
-    }
-    if !row.keeps_sources && (field.labels || field.closest_point) {
-        let keeping: Vec<&str> = SOLVERS.iter().filter(|row| row.keeps_sources).map(|row| row.name).collect();
-        return Err(Error::usage(format!(
-            "--method {} keeps no sources, which --labels and --closest-point are made of; give one of {}",
-            row.name,
-            keeping.join(", ")
-        )));
     }
     if !(1..=MOST_RANKS).contains(&args.ranks) {
         return Err(Error::usage(format!("--ranks is {}; give 1 to {MOST_RANKS}", args.ranks)));

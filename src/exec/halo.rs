@@ -56,6 +56,13 @@ impl HaloPlan {
         Self { grid, links }
     }
 
+    /// The plan for the ghosts of some directions only; others keep what they hold.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn([i64; 3]) -> bool) -> Self {
+        let links = self.links.iter().copied().filter(|link| keep(link.offset)).collect();
+        Self { grid: self.grid, links }
+    }
+
     /// For each direction that ghosts come from, the step to that neighbour and the face of it that is read.
     pub(super) fn reads(&self) -> impl Iterator<Item = ([i64; 3], Face)> {
         self.links.iter().map(|link| (link.offset, link.face))

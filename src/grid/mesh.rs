@@ -2,8 +2,9 @@
 
 use crate::error::{Error, Result};
 
-/// The most sources that a distance field can tell apart: indices have 31 bits, and the highest one means none.
-pub const MOST_SOURCES: usize = (u32::MAX >> 1) as usize - 1;
+/// The most sources that a distance field can tell apart: indices have 31 bits, of which the highest 257 mean none, or one
+/// that is not known yet.
+pub const MOST_SOURCES: usize = (u32::MAX >> 1) as usize - 256;
 
 /// A triangle mesh in physical coordinates. A triangle's index is the source number that distance fields carry.
 ///

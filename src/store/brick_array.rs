@@ -108,10 +108,13 @@ impl<T: Element> BrickArray<T> {
     /// # Errors
     /// When the scratch folder cannot hold it.
     pub fn with_faces(scratch: &Scratch, set: &Arc<BrickSet>) -> Result<Self> {
-        let mut array = Self::new(scratch, set)?;
-        let edge = set.grid().edge() as usize;
-        array.faces = Some(SlotFile::create(&scratch.dir, &scratch.window, 6 * edge * edge, set.len())?);
-        Ok(array)
+        Self::new(scratch, set)?.and_faces(scratch)
+    }
+
+    fn and_faces(self, scratch: &Scratch) -> Result<Self> {
+        let area = (self.set.grid().edge() * self.set.grid().edge()) as usize;
+        let faces = SlotFile::create(&scratch.dir, &scratch.window, 6 * area, self.set.len())?;
+        Ok(Self { faces: Some(faces), ..self })
     }
 
     /// A field with faces whose bricks are `value` throughout until they are written, and cost nothing until then.
@@ -119,10 +122,22 @@ impl<T: Element> BrickArray<T> {
     /// # Errors
     /// When the scratch folder cannot hold it.
     pub fn blank(scratch: &Scratch, set: &Arc<BrickSet>, value: T) -> Result<Self> {
-        let mut array = Self::with_faces(scratch, set)?;
-        array.absent.fill(value);
-        array.blank = Some(Blank { value, written: set.ids().iter().map(|_| AtomicBool::new(false)).collect() });
-        Ok(array)
+        Ok(Self::with_faces(scratch, set)?.and_blank(value))
+    }
+
+    /// The faces alone of a field made [`BrickArray::blank`]: there are no bricks to read or write.
+    ///
+    /// # Errors
+    /// When the scratch folder cannot hold it.
+    pub fn blank_faces(scratch: &Scratch, set: &Arc<BrickSet>, value: T) -> Result<Self> {
+        Ok(Self::with_layers(scratch, set, 0)?.and_faces(scratch)?.and_blank(value))
+    }
+
+    fn and_blank(mut self, value: T) -> Self {
+        self.absent.fill(value);
+        let written = self.set.ids().iter().map(|_| AtomicBool::new(false)).collect();
+        self.blank = Some(Blank { value, written });
+        self
     }
 
     /// The value of all voxels of a stored brick that was not written yet, in an array made [`BrickArray::blank`].

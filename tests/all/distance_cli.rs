@@ -135,19 +135,18 @@ fn fields_fit_together() {
 #[test]
 fn layout_threads_and_memory_change_no_bit() {
     let bench = bench();
-    let run = |name: &str, flags: &str| {
-        let sources = "ball.off sponge.xyz --spacing 0.05 --labels --closest-point";
-        bench.succeed(&format!("distance {sources} -q -o out/{name}.zarr {flags}"));
-        contents(&bench.path(&format!("out/{name}.zarr")))
-    };
-    let first = run("front", "--threads 1");
-    same(&first, &run("front-2", "--threads 2 --memory 192MiB"), "front, threads and memory");
-    let first = run("sweep", "--schedule sweep --brick 16 --threads 1");
-    same(
-        &first,
-        &run("sweep-2", "--schedule sweep --brick 64 --threads 2 --memory 256MiB"),
-        "sweep, bricks and threads",
-    );
+    for method in ["vdt", "fsm"] {
+        let run = |name: &str, flags: &str| {
+            let sources = "ball.off sponge.xyz --spacing 0.05 --labels --closest-point";
+            bench.succeed(&format!("distance {sources} --method {method} -q --overwrite -o out/{name}.zarr {flags}"));
+            contents(&bench.path(&format!("out/{name}.zarr")))
+        };
+        let first = run("front", "--threads 1");
+        same(&first, &run("front-2", "--threads 2 --memory 192MiB"), "front, threads and memory");
+        let first = run("sweep", "--schedule sweep --brick 16 --threads 1");
+        let other = run("sweep-2", "--schedule sweep --brick 64 --threads 2 --memory 256MiB");
+        same(&first, &other, "sweep, bricks and threads");
+    }
 }
 
 #[test]

@@ -242,8 +242,7 @@ fn settings_that_contradict_are_refused() {
     bench.write("a.xyz", "0 0 0\n1 1 1\n");
     for (flags, word) in [
         ("--signed", "--signed"),
-        ("--method fsm --labels", "--method"),
-        ("--method fsm --closest-point", "--method"),
+        ("--method fsm --neighbours 26", "--neighbours"),
         ("--schedule sweep --max-distance 1", "--max-distance"),
         ("--schedule sweep --iterations 0", "--iterations is 0"),
         ("--brick 8", "multiple of 16"),

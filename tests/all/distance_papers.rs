@@ -141,7 +141,7 @@ fn sponge_and_sphere_share_all_voxels() {
         exact[usize::from(second < first)] += 1;
         between += u64::from((first.sqrt() - second.sqrt()).abs() < 0.1);
     }
-    for method in Method::all().filter(|method| method.solver::<f32>().keeps_sources) {
+    for method in Method::all() {
         for schedule in schedules(method) {
             let found = pair(&lab, 0.1, method, schedule, Init::Cell, true).expect("a distance");
             let counts = [1, 2].map(|label| found.label_voxels.get(&label).copied().unwrap_or(0));
@@ -155,4 +155,45 @@ fn sponge_and_sphere_share_all_voxels() {
             assert!(apart < allowed, "{}: {counts:?}, exact {exact:?}, allowed {allowed}", method.name());
         }
     }
+}
+
+/// Sec. 4, Experiment 2: the grid points on each vertex, open edge and open face of the cube are a data set of their own.
+/// By Alg. 7 all vertices get as many voxels (one has the centre too), all edges, all faces: algorithms, section 10. In
+/// single precision: the last bits of f64 differ where distances are equal by symmetry.
+#[test]
+fn subsets_of_the_cube_share_its_voxels_evenly() {
+    let count = 37;
+    let grid = PlainGrid { shape: [count; 3] };
+    let geometry = cube_grid(count);
+    let h = (count - 1) / 9;
+    // -1, 0, 1 along each axis: at the lower end, between, at the upper one.
+    let side = |i: i64| i64::from(i == 7 * h) - i64::from(i == 2 * h);
+    let mut sets = DataSets::default();
+    let mut dimensions = Vec::new();
+    for subset in (PlainGrid { shape: [3; 3] }).voxels().map(|v| v.map(|n| n - 1)).filter(|o| *o != [0; 3]) {
+        let of_subset = grid.voxels().filter(|v| on_cube(count, *v) && v.map(side) == subset);
+        sets.add_cloud(&of_subset.map(|v| position(&geometry, v)).collect::<Vec<_>>());
+        dimensions.push(subset.iter().filter(|o| **o == 0).count());
+    }
+    let settings = DistanceSettings {
+        method: Method::FSM,
+        schedule: Schedule::Sweep { iterations: 1 },
+        neighbours: Neighbours::Faces,
+        init: Init::Grid,
+        farthest: None,
+        signed: false,
+        labels: true,
+        closest_point: false,
+        brick: 16,
+    };
+    let found = run_distance::<f32>(&Lab::new(2).engine, &geometry, &sets, &settings, None).expect("a distance");
+    let mut voxels = [vec![], vec![], vec![]];
+    for (label, dimension) in (1..).zip(dimensions) {
+        voxels[dimension].push(found.label_voxels[&label]);
+    }
+    for voxels in &mut voxels {
+        voxels.sort_unstable();
+    }
+    let vertices = [738, 738, 738, 738, 738, 738, 738, 739];
+    assert_eq!(voxels, [vertices.to_vec(), vec![1620; 12], vec![4218; 6]]);
 }

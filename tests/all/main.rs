@@ -11,6 +11,7 @@ mod distance_hostile;
 mod distance_meshes;
 mod distance_papers;
 mod flood;
+mod fsm_sources;
 mod heat;
 mod level_set;
 mod maximum_principle;

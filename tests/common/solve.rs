@@ -39,7 +39,7 @@ pub(crate) fn sweeps(method: Method) -> bool {
 /// A solved field, `[z][y][x]` over the whole grid.
 pub(crate) struct Field<P> {
     pub(crate) values: Vec<P>,
-    /// The nearest source, where one is known and kept.
+    /// The nearest source, where one is known.
     pub(crate) sources: Vec<Option<usize>>,
     /// Bricks that were not resident when they were used.
     pub(crate) loads: u64,
@@ -59,7 +59,7 @@ pub(crate) fn solve<P: Stored>(
     method: Method,
     schedule: Schedule,
 ) -> Field<P> {
-    let options = everywhere(method.solver::<P>().keeps_sources);
+    let options = everywhere(true);
     solve_with(lab, geometry, cloud, edge, method, schedule, options)
 }
 

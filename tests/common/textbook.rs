@@ -1,4 +1,4 @@
-//! The printed loops over a whole volume (Kósa & Mikula 2023, Alg. 1-3, errata of the descending loops), plain and in
+//! The printed loops over a whole volume (Kósa & Mikula 2023, Alg. 1-3 and 7, errata of the descending loops), plain and in
 //! the printed order: nothing is shared with the program.
 //!
 //! Bits follow from the order of operations, so the arithmetic of one update is stated here as the program states it in
@@ -89,48 +89,100 @@ fn sweep_order(shape: [i64; 3], sweep: usize) -> impl Iterator<Item = [i64; 3]> 
 
 /// The x with `sum (((x - a) / h)^+)^2 = 1` for the smaller neighbours `a` and spacings `h` along x, y, z (eq. 9).
 pub(crate) fn godunov(near: [f64; 3], spacing: [f64; 3]) -> f64 {
+    upwind(near, spacing).0
+}
+
+/// That x; the axes in order of their `a`, of equal ones x before y before z; and the solutions on the way to x without
+/// the second and without the third axis.
+fn upwind(near: [f64; 3], spacing: [f64; 3]) -> (f64, [usize; 3], [f64; 2]) {
     let weight = spacing.map(|h| 1.0 / (h * h));
     let mut axes = [0, 1, 2];
     axes.sort_by(|&i: &usize, &j| near[i].total_cmp(&near[j]));
     let [i, j, k] = axes;
     let (b, c) = (near[j] - near[i], near[k] - near[i]);
-    if spacing[i] <= b {
-        return near[i] + spacing[i];
+    let one = near[i] + spacing[i];
+    // Both infinite: nothing to compare with.
+    if b.is_nan() || spacing[i] <= b {
+        return (one, axes, [one, one]);
     }
     let mean = weight[j] * b;
     let two = weight[i] + weight[j];
     let root = (mean * mean - two * (mean * b - 1.0)).max(0.0).sqrt();
     let x = (mean + root) * (1.0 / two);
     if x <= c {
-        return near[i] + x;
+        return (near[i] + x, axes, [one, near[i] + x]);
     }
     let three = weight[0] + weight[1] + weight[2];
     let mean_of_three = mean + weight[k] * c;
     let rest = mean * b + weight[k] * c * c - 1.0;
     let root = (mean_of_three * mean_of_three - three * rest).max(0.0).sqrt();
-    near[i] + (mean_of_three + root) * (1.0 / three)
+    (near[i] + (mean_of_three + root) * (1.0 / three), axes, [one, near[i] + x])
+}
+
+/// Alg. 7, lines 8 to 20: what the neighbours' values make of a voxel, the offset that its source is taken from, and the
+/// offset of the smallest neighbour. Of two equal neighbours along an axis Alg. 7 names the upper one first. An axis enters
+/// when the solution without it is above its neighbour, both as they are stored.
+fn update<P: Stored>(geometry: &Geometry, v: [i64; 3], value: impl Fn([i64; 3]) -> f64) -> (f64, [i64; 3], [i64; 3]) {
+    let n = PlainGrid::around(v).map(value);
+    let upper: [bool; 3] = std::array::from_fn(|a| n[2 * a + 1] <= n[2 * a]);
+    let near: [f64; 3] = std::array::from_fn(|a| if upper[a] { n[2 * a + 1] } else { n[2 * a] });
+    let (x, axes, without) = upwind(near, geometry.spacing);
+    let step = |axis: usize| {
+        let mut offset = [0; 3];
+        offset[axis] = if upper[axis] { 1 } else { -1 };
+        offset
+    };
+    let first = step(axes[0]);
+    let mut sum = first;
+    for (&axis, without) in axes[1..].iter().zip(without) {
+        if P::store(without).to_f64() <= near[axis] {
+            break;
+        }
+        sum[axis] = step(axis)[axis];
+    }
+    (x, sum, first)
 }
 
 /// Alg. 2: distances after so many iterations, or once one changes nothing.
 pub(crate) fn fsm<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], iterations: u32) -> Vec<P> {
-    let grid = PlainGrid { shape: geometry.shape };
+    fsm_with_sources(geometry, cloud, iterations).0
+}
+
+/// Alg. 1 and 7: distances and sources.
+pub(crate) fn fsm_with_sources<P: Stored>(
+    geometry: &Geometry,
+    cloud: &[[f64; 3]],
+    iterations: u32,
+) -> (Vec<P>, Vec<Option<usize>>) {
     let fixing = fixing_sources(geometry, cloud);
-    let start = |v: [i64; 3]| match fixing[grid.at(v)] {
-        Some(s) => P::store(squared(position(geometry, v), cloud[s]).sqrt()),
-        None => P::UNKNOWN,
+    let distance = |(v, s): ([i64; 3], &Option<usize>)| {
+        s.map_or(P::UNKNOWN, |s| P::store(squared(position(geometry, v), cloud[s]).sqrt()))
     };
-    let mut d: Vec<P> = grid.voxels().map(start).collect();
+    let d = PlainGrid { shape: geometry.shape }.voxels().zip(&fixing).map(distance).collect();
+    fsm_from(geometry, (d, fixing), iterations)
+}
+
+/// Alg. 7 from given fixed voxels, those that have a source: distances and sources, both updated in place; where the voxel
+/// at the sum of the offsets has no source yet, that of the smallest neighbour.
+pub(crate) fn fsm_from<P: Stored>(
+    geometry: &Geometry,
+    (mut d, mut s): (Vec<P>, Vec<Option<usize>>),
+    iterations: u32,
+) -> (Vec<P>, Vec<Option<usize>>) {
+    let grid = PlainGrid { shape: geometry.shape };
+    let free: Vec<bool> = s.iter().map(Option::is_none).collect();
     for _ in 0..iterations {
         let before = d.clone();
         for sweep in 0..8 {
-            for v in sweep_order(geometry.shape, sweep).filter(|v| fixing[grid.at(*v)].is_none()) {
+            for v in sweep_order(geometry.shape, sweep).filter(|v| free[grid.at(*v)]) {
                 let value = |q: [i64; 3]| if grid.contains(q) { d[grid.at(q)].to_f64() } else { f64::INFINITY };
-                let n = PlainGrid::around(v).map(value);
-                let near: [f64; 3] = std::array::from_fn(|a| n[2 * a].min(n[2 * a + 1]));
-                if near.iter().any(|a| a.is_finite()) {
-                    let lower = P::store(godunov(near, geometry.spacing));
-                    let kept = &mut d[grid.at(v)];
-                    *kept = if lower < *kept { lower } else { *kept };
+                let (x, sum, first) = update::<P>(geometry, v, value);
+                let lower = P::store(x);
+                if lower < d[grid.at(v)] {
+                    let source = |o: [i64; 3]| s[grid.at(std::array::from_fn(|a| v[a] + o[a]))];
+                    let found = source(sum).or(source(first));
+                    d[grid.at(v)] = lower;
+                    s[grid.at(v)] = found;
                 }
             }
         }
@@ -138,7 +190,26 @@ pub(crate) fn fsm<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], iterations
             break;
         }
     }
-    d
+    (d, s)
+}
+
+/// Alg. 7 on finished distances: voxels in order of their distance copy the source at the sum of the offsets of the
+/// neighbours that enter their update, where the distance there is smaller, else that of the smallest neighbour.
+pub(crate) fn sources_along<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], d: &[P]) -> Vec<Option<usize>> {
+    let grid = PlainGrid { shape: geometry.shape };
+    let voxels: Vec<[i64; 3]> = grid.voxels().collect();
+    let mut s = fixing_sources(geometry, cloud);
+    let free = |at: &usize| s[*at].is_none() && d[*at].to_f64().is_finite();
+    let mut order: Vec<usize> = (0..d.len()).filter(free).collect();
+    order.sort_by_key(|&at| d[at].rank());
+    for at in order {
+        let v = voxels[at];
+        let value = |q: [i64; 3]| if grid.contains(q) { d[grid.at(q)].to_f64() } else { f64::INFINITY };
+        let (_, sum, first) = update::<P>(geometry, v, value);
+        let beside = [sum, first].map(|o| grid.at(std::array::from_fn(|a| v[a] + o[a])));
+        s[at] = beside.into_iter().find(|&q| d[q].rank() < d[at].rank()).and_then(|q| s[q]);
+    }
+    s
 }
 
 /// Alg. 3: the sources that the sweeps leave with each voxel.

@@ -12,9 +12,10 @@
 //! faces. Scratch: about 12 bytes a voxel. Each voxel costs about two updates, whatever the shape of the front.
 
 use super::buckets::Buckets;
-use super::fast_sweeping::{Axes, FastSweeping, godunov};
+use super::fast_sweeping::FastSweeping;
 use super::method::DistanceMethod;
 use super::precision::{Precision, Real};
+use super::upwind::{Axes, godunov};
 use crate::grid::Box3;
 use crate::tile::HaloTile;
 

@@ -1,16 +1,18 @@
 //! FSM, the fast sweeping method for `|grad d| = 1` (Zhao 2005; Kósa & Mikula 2023, Alg. 2; algorithms: section 3).
 //!
-//! Godunov update: with `a_s` the smaller neighbour along axis s, the new value is the x with
-//! `sum (((x - a_s)^+) / h_s)^2 = 1`, taken with one, two, then three axes in order of a. It is kept only when it
-//! lowers the value. In and out: a grown tile of distances (physical units, infinity where nothing is known); fixed
-//! voxels carry the sign bit and are never changed. Halo 1, faces. Tiles are swept along diagonals (`diagonals`).
+//! Each voxel takes the upwind solution (`upwind`) when that lowers its value. In and out: a grown tile of distances
+//! (physical units, infinity where nothing is known); fixed voxels carry the sign bit and are never changed. Halo 1,
+//! faces. Tiles are swept along diagonals (`diagonals`). Where sources are wanted, a sweep also tells which voxels fell
+//! and from which neighbours (Alg. 7); `sweep_sources` makes sources of that.
 
 use std::marker::PhantomData;
 
-use super::diagonals::{Diagonals, has_wide_vectors};
+use super::diagonals::{Diagonals, MOST_LANES, has_wide_vectors};
 use super::directions::{CHANGED, Swept, sweep_until_quiet};
 use super::method::{DistanceMethod, OrderedSweeps};
 use super::precision::{Precision, Real};
+use super::sweep_sources::Fell;
+use super::upwind::{Axes, Upwind, solve};
 use crate::grid::Box3;
 use crate::tile::HaloTile;
 
@@ -29,85 +31,74 @@ impl<P: Precision, A: Real> FastSweeping<P, A> {
     }
 }
 
-/// What the update needs of the spacing.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Axes<A> {
-    spacing: [A; 3],
-    /// `1 / h^2`.
-    weight: [A; 3],
-    /// One over the sum of the other two weights.
-    without: [A; 3],
-    /// The sum of all weights, and one over it.
-    total: [A; 2],
-    one: A,
-    pub(crate) isotropic: bool,
+/// What is kept of the voxels that fall in a pass.
+trait Record {
+    /// Whether voxels of a diagonal are taken in the order of the sweep too.
+    const ORDERED: bool;
+
+    /// Those of a vector whose bits are 1 in `falls` fell, from those beside them; `more` axes entered beside the first.
+    fn fell<L: Real, const N: usize>(
+        &mut self,
+        falls: &[u32; N],
+        more: &[u32; N],
+        beside: [&[L; N]; 6],
+        place: Place<'_>,
+    );
 }
 
-impl<A: Real> Axes<A> {
-    pub(crate) fn new(spacing: [f64; 3]) -> Self {
-        let weight = spacing.map(|h| 1.0 / (h * h));
-        let total: f64 = weight.iter().sum();
-        let without = [weight[1] + weight[2], weight[0] + weight[2], weight[0] + weight[1]];
-        Self {
-            spacing: spacing.map(A::of),
-            weight: weight.map(A::of),
-            without: without.map(|sum| A::of(1.0 / sum)),
-            total: [A::of(total), A::of(1.0 / total)],
-            one: A::of(1.0),
-            isotropic: spacing.iter().all(|&h| h == spacing[0]),
+/// Where a vector of voxels lies in a tile.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    layout: &'a Diagonals,
+    z: usize,
+    /// The first voxel's place in the plane.
+    at: usize,
+}
+
+/// Nothing is kept.
+struct Forget;
+
+impl Record for Forget {
+    const ORDERED: bool = false;
+
+    #[inline(always)]
+    fn fell<L: Real, const N: usize>(&mut self, _: &[u32; N], _: &[u32; N], _: [&[L; N]; 6], _: Place<'_>) {}
+}
+
+impl Record for Vec<Fell> {
+    const ORDERED: bool = true;
+
+    #[inline(always)]
+    fn fell<L: Real, const N: usize>(
+        &mut self,
+        falls: &[u32; N],
+        more: &[u32; N],
+        beside: [&[L; N]; 6],
+        Place { layout, z, at }: Place<'_>,
+    ) {
+        let (lower_y, upper_y) = if layout.turned { (3, 2) } else { (2, 3) };
+        let mut from = [Upwind::default(); MOST_LANES];
+        let mut which = 0;
+        for i in 0..N {
+            let value = |side: usize| beside[side][i].magnitude();
+            let beside = [value(0), value(1), value(lower_y), value(upper_y), value(4), value(5)];
+            from[i] = Upwind::new(beside, more[i]);
+            which |= falls[i] << i;
         }
+        let (s, y) = (at / layout.row, at % layout.row);
+        let (x, y) = (s - y, if layout.turned { layout.valid[1] + 1 - y } else { y });
+        self.push(Fell { first: [x, y, z].map(|n| n as i16 - 1), which: which as u16, from });
     }
-}
-
-/// One axis of an update: the smaller neighbour, the spacing, its weight, one over the others' weights.
-type Axis<A> = (A, A, A, A);
-
-#[inline(always)]
-fn order<A: Real, const ISOTROPIC: bool>(axes: &mut [Axis<A>; 3], i: usize, j: usize) {
-    let (p, q) = (axes[i], axes[j]);
-    let swap = q.0 < p.0;
-    let pick = |a: A, b: A| if swap { b } else { a };
-    if ISOTROPIC {
-        (axes[i].0, axes[j].0) = (pick(p.0, q.0), pick(q.0, p.0));
-    } else {
-        axes[i] = (pick(p.0, q.0), pick(p.1, q.1), pick(p.2, q.2), pick(p.3, q.3));
-        axes[j] = (pick(q.0, p.0), pick(q.1, p.1), pick(q.2, p.2), pick(q.3, p.3));
-    }
-}
-
-/// The upwind solution for the smaller neighbours `near` along the three axes; infinity when all of them are.
-///
-/// Values are counted from the smallest neighbour, so that nothing cancels. Without branches: every lane of a vector
-/// computes all three solutions and keeps the one that holds.
-#[inline(always)]
-pub(crate) fn godunov<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>) -> A {
-    let axis = |a: usize| (near[a], k.spacing[a], k.weight[a], k.without[a]);
-    let mut axes = [axis(0), axis(1), axis(2)];
-    order::<A, ISOTROPIC>(&mut axes, 0, 1);
-    order::<A, ISOTROPIC>(&mut axes, 1, 2);
-    order::<A, ISOTROPIC>(&mut axes, 0, 1);
-    let [(first, h, w1, _), (second, _, w2, _), (third, _, w3, without_third)] = axes;
-    let (b, c) = (second - first, third - first);
-    let zero = A::default();
-    // The larger root of sum w (x - a)^2 = 1 over two axes, then over three.
-    let mean = w2 * b;
-    let discriminant = mean * mean - (w1 + w2) * (mean * b - k.one);
-    let of_two = (mean + discriminant.larger(zero).root()) * without_third;
-    let mean3 = mean + w3 * c;
-    let discriminant = mean3 * mean3 - k.total[0] * (mean * b + w3 * c * c - k.one);
-    let of_three = (mean3 + discriminant.larger(zero).root()) * k.total[1];
-    let x = if h > b { of_two } else { h };
-    let x = if x > c { of_three } else { x };
-    first + x
 }
 
 /// One ordered pass over a tile laid out along diagonals, `N` voxels at a time.
 #[inline(always)]
-fn pass<P: Precision, A: Real, const N: usize, const ISOTROPIC: bool>(
+fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool>(
     data: &mut [P::Lane],
     layout: &Diagonals,
     upward: [bool; 2],
     k: &Axes<A>,
+    record: &mut R,
 ) -> Swept {
     let depth = layout.valid[2];
     let passed = Diagonals::passed(upward);
@@ -117,11 +108,14 @@ fn pass<P: Precision, A: Real, const N: usize, const ISOTROPIC: bool>(
         for (start, count) in layout.diagonals(upward[0]) {
             let count = count.next_multiple_of(N);
             let run = layout.run(data, z * layout.plane + start, count);
-            for at in (0..count).step_by(N) {
+            for n in (0..count).step_by(N) {
+                let at = if R::ORDERED && !upward[0] { count - N - n } else { n };
                 let here = run.here[at..].first_chunk_mut::<N>();
                 let beside = run.beside.map(|side| side[at..].first_chunk::<N>());
                 if let (Some(here), [Some(xl), Some(xu), Some(yl), Some(yu), Some(zl), Some(zu)]) = (here, beside) {
-                    swept |= lower::<P, A, N, ISOTROPIC>(here, [xl, xu, yl, yu, zl, zu], passed, k);
+                    let place = Place { layout, z, at: start + at };
+                    let beside = [xl, xu, yl, yu, zl, zu];
+                    swept |= lower::<P, A, R, N, ISOTROPIC>(here, beside, passed, k, (place, record));
                 }
             }
         }
@@ -131,17 +125,20 @@ fn pass<P: Precision, A: Real, const N: usize, const ISOTROPIC: bool>(
 
 /// Lowers the voxels of one vector. Something is to be carried back to a side that was passed before and is larger.
 #[inline(always)]
-fn lower<P: Precision, A: Real, const N: usize, const ISOTROPIC: bool>(
+fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool>(
     here: &mut [P::Lane; N],
     beside: [&[P::Lane; N]; 6],
     passed: [usize; 3],
     k: &Axes<A>,
+    (place, record): (Place<'_>, &mut R),
 ) -> Swept {
     let mut value = [P::Lane::default(); N];
-    let mut falls = [0_u32; N];
+    let (mut falls, mut more) = ([0_u32; N], [0_u32; N]);
     for i in 0..N {
         let near = |a: usize| A::of_lane(beside[2 * a][i].magnitude().smaller(beside[2 * a + 1][i].magnitude()));
-        let x = P::round(godunov::<A, ISOTROPIC>([near(0), near(1), near(2)], k));
+        let solution = solve::<A, ISOTROPIC>([near(0), near(1), near(2)], k);
+        let x = P::round(solution.value);
+        more[i] = solution.more::<P>();
         // A fixed voxel is below zero and so below anything.
         falls[i] = u32::from(x < here[i]);
         value[i] = if x < here[i] { x } else { here[i] };
@@ -159,26 +156,29 @@ fn lower<P: Precision, A: Real, const N: usize, const ISOTROPIC: bool>(
         swept |= back << axis;
     }
     *here = value;
+    record.fell(&falls, &more, beside, place);
     swept
 }
 
 /// A pass, compiled for each vector unit.
-struct Pass<'a, P: Precision, A, const N: usize> {
+struct Pass<'a, P: Precision, A, R, const N: usize> {
     data: &'a mut [P::Lane],
     layout: &'a Diagonals,
     upward: [bool; 2],
     axes: &'a Axes<A>,
+    record: &'a mut R,
 }
 
-impl<P: Precision, A: Real, const N: usize> pulp::NullaryFnOnce for Pass<'_, P, A, N> {
+impl<P: Precision, A: Real, R: Record, const N: usize> pulp::NullaryFnOnce for Pass<'_, P, A, R, N> {
     type Output = Swept;
 
     #[inline(always)]
     fn call(self) -> Swept {
-        if self.axes.isotropic {
-            pass::<P, A, N, true>(self.data, self.layout, self.upward, self.axes)
+        let Self { data, layout, upward, axes, record } = self;
+        if axes.isotropic {
+            pass::<P, A, R, N, true>(data, layout, upward, axes, record)
         } else {
-            pass::<P, A, N, false>(self.data, self.layout, self.upward, self.axes)
+            pass::<P, A, R, N, false>(data, layout, upward, axes, record)
         }
     }
 }
@@ -203,14 +203,42 @@ impl<P: Precision, A: Real> FastSweeping<P, A> {
     }
 
     /// Sweeps the tile as it is laid out.
-    fn sweep_layout(&self, work: &mut Work<P::Lane>, upward: [bool; 3]) -> Swept {
+    fn sweep_layout<R: Record>(&self, work: &mut Work<P::Lane>, upward: [bool; 3], record: &mut R) -> Swept {
         let Work { data, layout } = work;
         let (upward, axes) = ([upward[0], upward[2]], &self.axes);
         if has_wide_vectors() {
-            pulp::Arch::new().dispatch(Pass::<P, A, 16> { data, layout, upward, axes })
+            pulp::Arch::new().dispatch(Pass::<P, A, R, 16> { data, layout, upward, axes, record })
         } else {
-            pulp::Arch::new().dispatch(Pass::<P, A, 8> { data, layout, upward, axes })
+            pulp::Arch::new().dispatch(Pass::<P, A, R, 8> { data, layout, upward, axes, record })
         }
+    }
+
+    fn sweep_tile<R: Record>(
+        &self,
+        tile: &mut HaloTile<P>,
+        work: &mut Work<P::Lane>,
+        upward: [bool; 3],
+        record: &mut R,
+    ) -> bool {
+        Self::lay_out(work, tile, upward);
+        let changed = self.sweep_layout(work, upward, record) & CHANGED != 0;
+        if changed {
+            work.layout.store(&work.data, tile, P::of_lane);
+        }
+        changed
+    }
+
+    /// As [`OrderedSweeps::sweep`]; `fell` becomes the voxels that fell, those whose sources others take before these, as
+    /// in the triple loop.
+    pub fn sweep_telling(
+        &self,
+        tile: &mut HaloTile<P>,
+        work: &mut Work<P::Lane>,
+        upward: [bool; 3],
+        fell: &mut Vec<Fell>,
+    ) -> bool {
+        fell.clear();
+        self.sweep_tile(tile, work, upward, fell)
     }
 }
 
@@ -239,7 +267,7 @@ impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
                 work.layout.store(&work.data, tile, P::of_lane);
                 Self::lay_out(work, tile, upward);
             }
-            self.sweep_layout(work, upward)
+            self.sweep_layout(work, upward, &mut Forget)
         });
         if changed {
             work.layout.store(&work.data, tile, P::of_lane);
@@ -263,12 +291,7 @@ impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
 
 impl<P: Precision, A: Real> OrderedSweeps for FastSweeping<P, A> {
     fn sweep(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3, upward: [bool; 3]) -> bool {
-        Self::lay_out(work, tile, upward);
-        let changed = self.sweep_layout(work, upward) & CHANGED != 0;
-        if changed {
-            work.layout.store(&work.data, tile, P::of_lane);
-        }
-        changed
+        self.sweep_tile(tile, work, upward, &mut Forget)
     }
 }
 

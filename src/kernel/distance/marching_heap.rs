@@ -8,10 +8,10 @@
 //! rounded to `P` at every update. `fast_marching`, in a front of bricks, computes f32 fields in f32 and takes what a
 //! voxel's neighbours end with: the two differ by rounding alone.
 
-use super::fast_sweeping::{Axes, godunov};
 use super::initialise::NO_SOURCE;
 use super::precision::{Precision, Real};
 use super::tracked::source_of;
+use super::upwind::{Axes, godunov};
 use super::wavefront::Wavefront;
 use crate::grid::{FACES, Geometry, NEIGHBOURS_26};
 

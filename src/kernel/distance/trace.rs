@@ -1,95 +1,134 @@
-//! Sources for a finished FMM field, tile by tile (Kósa & Mikula 2023, Alg. 8; algorithms: section 4).
+//! Sources for finished distances, tile by tile: each voxel has a *parent* (`parents`), and its source is the one of the
+//! fixed voxel at the end of the chain of parents.
 //!
-//! Alg. 8 gives a voxel, when it freezes, the source of the frozen one of its 26 neighbours with the smallest sum of its
-//! distance and the way to it. Voxels freeze in order of distance, of equal ones in order of their places, so which
-//! neighbour that is follows from the finished distances alone: a voxel has a *parent*, and its source is the one of
-//! the fixed voxel at the end of the chain. Here chains are followed inside a tile, to voxels and ghosts whose source is
-//! known. In: grown tiles of distances (sign bit on fixed voxels) and of source states. Out: the states. Halo 1, all
-//! 26 directions. Scratch: one byte a voxel. What is found does not depend on the order in which tiles come.
+//! Here chains are followed inside a tile, to voxels and ghosts whose source is known. In: grown tiles of distances (sign
+//! bit on fixed voxels) and of source states. Out: the states. Halo 1, all 26 directions. Scratch: a few bytes a voxel.
+//! What is found does not depend on the order in which tiles come.
+//!
+//! Where distances are so large that a step is lost in rounding, neighbours are equal, and a voxel may have no parent. Such
+//! voxels, and those whose chains lead to them, are *filled* in the end: among the sources that reach one through such
+//! voxels, on a way on which distances never fall, it gets the lowest.
 
 use super::initialise::NO_SOURCE;
+use super::parents::Parents;
 use super::precision::{Precision, Real};
 use super::tracked::{has_source, source_of};
-use crate::grid::{Geometry, NEIGHBOURS_26};
+use super::vector_distance::FIXED;
+use crate::grid::Geometry;
 use crate::tile::HaloTile;
 
 /// Finds sources in tiles of one size.
 #[derive(Clone, Debug)]
-pub struct Tracer {
-    /// Steps to the 26 neighbours in the buffer, and their lengths.
-    steps: Vec<(isize, f64)>,
-    /// Whether a voxel's chain was followed in this tile.
+pub struct Tracer<R> {
+    parents: R,
+    /// Places at which rows start that hold voxels without a source.
+    rows: Vec<usize>,
+    /// Whether a voxel's chain was followed in this tile, or ends there.
     followed: Vec<bool>,
     chain: Vec<usize>,
 }
 
-impl Tracer {
+impl<R: Parents> Tracer<R> {
     /// For tiles of `edge`^3 voxels of a grid.
     #[must_use]
     pub fn new(geometry: &Geometry, edge: usize) -> Self {
-        let pitch = edge as isize + 2;
-        let step = |[x, y, z]: [i64; 3]| (z as isize * pitch + y as isize) * pitch + x as isize;
-        let steps = NEIGHBOURS_26.iter().map(|&offset| (step(offset), geometry.length(offset))).collect();
-        Self { steps, followed: vec![false; (edge + 2).pow(3)], chain: Vec::new() }
+        let followed = vec![true; (edge + 2).pow(3)];
+        Self { parents: R::new(geometry, edge), rows: Vec::new(), followed, chain: Vec::new() }
     }
 
     /// Gives voxels their sources where the chain ends at a known one. Returns whether any got one, and whether any that
     /// has a distance is left without.
     pub fn trace<P: Precision>(&mut self, distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> (bool, bool) {
         let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
-        // Chains end at ghosts.
-        self.followed.fill(true);
-        for z in 1..=nz {
-            for y in 1..=ny {
-                self.followed[(z * pitch + y) * pitch + 1..][..nx].fill(false);
-            }
+        let rows = (1..=nz).flat_map(|z| (1..=ny).map(move |y| (z * pitch + y) * pitch + 1));
+        self.rows.clear();
+        self.rows.extend(rows.filter(|&row| lacks(&state.data()[row..][..nx])));
+        self.parents.look(distance, &self.rows);
+        for &row in &self.rows {
+            self.followed[row..][..nx].fill(false);
         }
         let (mut found, mut left) = (false, false);
-        for z in 1..=nz {
-            for y in 1..=ny {
-                for x in 1..=nx {
-                    let place = (z * pitch + y) * pitch + x;
-                    if distance.data()[place].lane() < P::Lane::INFINITY && !has_source(state.data()[place]) {
-                        let known = self.follow(distance.data(), state.data_mut(), place);
-                        found |= known;
-                        left |= !known;
-                    }
+        for n in 0..self.rows.len() {
+            let row = self.rows[n];
+            for place in row..row + nx {
+                if !has_source(state.data()[place]) && distance.data()[place].lane() < P::Lane::INFINITY {
+                    let known = self.follow(distance.data(), state.data_mut(), place);
+                    found |= known;
+                    left |= !known;
                 }
             }
+        }
+        // Chains end at ghosts, and in rows that have all sources.
+        for &row in &self.rows {
+            self.followed[row..][..nx].fill(true);
         }
         (found, left)
     }
 
     /// Follows the chain from a voxel; all voxels on it get the source at its end, if that is known.
     fn follow<P: Precision>(&mut self, distance: &[P], state: &mut [u32], from: usize) -> bool {
+        if self.followed[from] {
+            return false;
+        }
+        let mut next = self.parents.parent(distance, from);
+        if let Some(parent) = next.filter(|&parent| has_source(state[parent])) {
+            state[from] = source_of(state[parent]);
+            return true;
+        }
         self.chain.clear();
-        let mut at = from;
-        while !has_source(state[at]) && !self.followed[at] {
+        self.chain.push(from);
+        self.followed[from] = true;
+        let mut source = NO_SOURCE;
+        while let Some(at) = next {
+            source = source_of(state[at]);
+            if source != NO_SOURCE || self.followed[at] {
+                break;
+            }
             self.followed[at] = true;
             self.chain.push(at);
-            let Some(parent) = self.parent(distance, at) else { break };
-            at = parent;
+            next = self.parents.parent(distance, at);
         }
-        let source = source_of(state[at]);
         self.chain.iter().for_each(|&place| state[place] = source);
         source != NO_SOURCE
     }
+}
 
-    /// The neighbour that a voxel takes its source from.
-    fn parent<P: Precision>(&self, distance: &[P], place: usize) -> Option<usize> {
-        let here = distance[place].lane();
-        let mut best = (f64::INFINITY, None);
-        for (n, &(step, length)) in self.steps.iter().enumerate() {
-            let beside = place.wrapping_add_signed(step);
-            let value = distance[beside].lane().magnitude();
-            // Of equal distances the lower place freezes first: those are the first 13 steps.
-            if value < here || (value == here && n < 13) {
-                let way = value.f64() + length;
-                if way < best.0 {
-                    best = (way, Some(beside));
-                }
+/// Whether any of these voxels has no source.
+fn lacks(states: &[u32]) -> bool {
+    states.iter().fold(false, |any, &state| any | !has_source(state))
+}
+
+/// Fills voxels that tracing left without a source, as far as that is known in this tile. While it goes on their states
+/// carry the bit of fixed voxels, whose distances have a sign: they may still fall. Returns whether any state changed, and
+/// whether the tile has such voxels.
+pub fn fill<P: Precision>(distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> (bool, bool) {
+    let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
+    let values = distance.data();
+    let steps = [1, pitch as isize, (pitch * pitch) as isize].map(|step| [-step, step]);
+    let (mut changed, mut filled) = (false, false);
+    loop {
+        let mut falls = false;
+        for place in
+            (1..=nz).flat_map(|z| (1..=ny).flat_map(move |y| (1..=nx).map(move |x| (z * pitch + y) * pitch + x)))
+        {
+            let (here, kept) = (values[place].lane(), state.data()[place]);
+            let is_filled = kept == NO_SOURCE || kept & FIXED != 0;
+            let has_distance = here < P::Lane::INFINITY && !here.is_marked();
+            if !(has_distance && is_filled) {
+                continue;
+            }
+            filled = true;
+            let beside = steps.as_flattened().iter().map(|&step| place.wrapping_add_signed(step));
+            let told = beside.filter(|&beside| values[beside].lane().magnitude() <= here);
+            let lowest = told.map(|beside| source_of(state.data()[beside])).min().unwrap_or(NO_SOURCE);
+            if lowest < source_of(kept) {
+                state.data_mut()[place] = lowest | FIXED;
+                falls = true;
             }
         }
-        best.1
+        changed |= falls;
+        if !falls {
+            return (changed, filled);
+        }
     }
 }

@@ -7,6 +7,7 @@ use crate::exec::{Stage, Workers};
 use crate::grid::Slot;
 use crate::kernel::distance::initialise::{NO_SOURCE, fix_voxels};
 use crate::kernel::distance::method::DistanceMethod;
+use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::triangles;
 use crate::store::BrickArray;
 
@@ -66,11 +67,12 @@ pub(super) struct Seeded {
     pub(super) triangle_distances: u64,
 }
 
-/// Fixes voxels of this rank's bricks.
+/// Fixes voxels of this rank's bricks; `kept`, where it is given, gets the sources that fix them.
 pub(super) fn initialise<M: DistanceMethod>(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
     array: &BrickArray<M::State>,
+    kept: Option<&BrickArray<u32>>,
     start: Start,
 ) -> Result<Seeded> {
     let set = array.set();
@@ -101,6 +103,10 @@ pub(super) fn initialise<M: DistanceMethod>(
         if known > 0 {
             array.write(slot, |out| write_seeds::<M>(fixed, told, out));
             array.refresh_faces(slot);
+        }
+        if let Some(kept) = kept.filter(|_| count > 0) {
+            kept.write(slot, |out| write_seeds::<ShapeDistance<'_>>(fixed, told, out));
+            kept.refresh_faces(slot);
         }
         Ok((count, known, distances))
     })?;

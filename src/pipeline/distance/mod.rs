@@ -16,6 +16,7 @@ mod sign;
 mod solvers;
 mod sources;
 mod sweep;
+mod sweep_sources;
 mod textbook;
 mod trace;
 

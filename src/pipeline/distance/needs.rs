@@ -17,6 +17,8 @@ pub struct Needs {
 
 /// Bytes of a voxel of the tiles of one thread: the tile, its layout along diagonals (twice as long), coordinates.
 const TILE_BYTES: u64 = 48;
+/// Bytes of a voxel of one thread where sources are found beside distances: tiles of both, chains, or ghosts and what fell.
+const TRACE_BYTES: u64 = 24;
 /// Bytes of a voxel while sources are entered: distance and source of those that fix it, and of those it is told of.
 const SEED_BYTES: u64 = 24;
 /// Bytes kept of each brick: its lock, its state, its places in tables.
@@ -36,16 +38,20 @@ impl DistanceSettings {
         let brick = grid.brick_len() as u64;
         let faces = 6 * (self.brick * self.brick) as u64;
         let row = self.method.solver::<P>();
-        let element = row.state_bytes + if self.keeps_sources() { row.source_bytes } else { 0 };
-        let buffers = threads.max(ranks) as u64 * brick * (TILE_BYTES + SEED_BYTES + element);
+        let apart = if self.keeps_sources() { row.source_bytes } else { 0 };
+        let element = row.state_bytes + apart;
+        let traced = if apart > 0 { TRACE_BYTES } else { 0 };
+        let buffers = threads.max(ranks) as u64 * brick * (TILE_BYTES + SEED_BYTES + traced + element);
         let cuts = ranks.saturating_sub(1) as u64;
         let of_brick = BRICK_BYTES + cuts * RANK_BYTES;
         let held = buffers + grid.len().saturating_mul(of_brick) + sets.len() as u64 * SOURCE_BYTES;
         let held = held.saturating_add(self.heap_bytes::<P>(geometry));
         // On either side of a cut lie ghosts, a plane of bricks at most, of which only faces are stored.
         let plane = grid.counts()[0].unsigned_abs().saturating_mul(grid.counts()[1].unsigned_abs());
-        let ghosts = plane.saturating_mul(2 * cuts).saturating_mul(faces * element);
-        let scratch = grid.len().saturating_mul((brick + faces) * element).saturating_add(ghosts);
+        // Along with sweeps the faces of sources are kept a second time, as they were before.
+        let swept = if matches!(self.schedule, Schedule::Sweep { .. }) { apart } else { 0 };
+        let ghosts = plane.saturating_mul(2 * cuts).saturating_mul(faces * (element + swept));
+        let scratch = grid.len().saturating_mul((brick + faces) * element + faces * swept).saturating_add(ghosts);
         let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
         Needs { held, scratch, seconds }
     }

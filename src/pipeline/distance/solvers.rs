@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::field::{Solved, Values};
 use super::front::advance_front;
 use super::initialise::{Seeded, Start, initialise};
-use super::sweep::sweep_all;
+use super::sweep::{Alone, sweep_all};
+use super::sweep_sources::TrackedSweeps;
 use super::textbook::{heap_dijkstra, heap_marching};
 use super::trace::{SourceField, trace_sources};
 use super::{Options, Schedule, Sources};
@@ -18,7 +19,9 @@ use crate::kernel::distance::all_neighbours::AllNeighbours;
 use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
 use crate::kernel::distance::fast_marching::FastMarching;
 use crate::kernel::distance::fast_sweeping::FastSweeping;
+use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
+use crate::kernel::distance::parents::{Parents, ShortestWay, UpwindSum};
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::tracked::TrackedSource;
@@ -53,8 +56,6 @@ pub struct Solver<P> {
     pub textbook: Textbook,
     /// Whether it can look at all 26 neighbours.
     pub takes_all_neighbours: bool,
-    /// Whether it keeps the source of each voxel.
-    pub keeps_sources: bool,
     /// Edge of bricks that it is fastest with on large grids.
     pub brick: i64,
     /// Bytes of a voxel's state.
@@ -93,10 +94,9 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "fast sweeping, the Eikonal equation",
             textbook: Textbook::Sweeps,
             takes_all_neighbours: false,
-            keeps_sources: false,
             brick: 64,
             state_bytes: size_of::<P>() as u64,
-            source_bytes: 0,
+            source_bytes: 4,
             solve: fast_sweeping::<P>,
         },
         Solver {
@@ -104,7 +104,6 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "vector distance transform, Euclidean to a tracked source",
             textbook: Textbook::Sweeps,
             takes_all_neighbours: true,
-            keeps_sources: true,
             brick: 32,
             state_bytes: 4,
             source_bytes: 0,
@@ -115,7 +114,6 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "fast marching, the Eikonal equation",
             textbook: Textbook::Heap { bytes: size_of::<P>() as u64 + 4 + marching_heap::SCRATCH_BYTES },
             takes_all_neighbours: false,
-            keeps_sources: true,
             brick: 32,
             state_bytes: size_of::<P>() as u64,
             source_bytes: 4,
@@ -126,7 +124,6 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             about: "Dijkstra-Pythagoras, Euclidean to a tracked source",
             textbook: Textbook::Heap { bytes: 4 + dijkstra_heap::SCRATCH_BYTES },
             takes_all_neighbours: true,
-            keeps_sources: true,
             brick: 32,
             state_bytes: 4,
             source_bytes: 0,
@@ -187,8 +184,8 @@ fn fast_sweeping<'a, P: Precision>(
     let job = Job { stage, engine, sources, set, options };
     let spacing = sources.geometry.spacing;
     match schedule {
-        Schedule::Front => job.front(FastSweeping::<P, P::Fast>::new(spacing)),
-        Schedule::Sweep { iterations } => job.sweeps(FastSweeping::<P, f64>::new(spacing), iterations),
+        Schedule::Front => job.front_then_sources::<P, _, UpwindSum>(FastSweeping::<P, P::Fast>::new(spacing)),
+        Schedule::Sweep { iterations } => job.sweeps_with_sources(FastSweeping::<P, f64>::new(spacing), iterations),
     }
 }
 
@@ -227,7 +224,7 @@ fn fast_marching<'a, P: Precision>(
     let (geometry, positions) = (sources.geometry, sources.positions);
     let method = FastMarching::<P, P::Fast>::new(geometry.spacing);
     match (schedule, sources.sets) {
-        (Schedule::Front, _) => job.front_then_sources(method),
+        (Schedule::Front, _) => job.front_then_sources::<P, _, ShortestWay>(method),
         (_, Some(sets)) => job.heap_marching(method, &ShapeDistance::new(geometry, sets)),
         (_, None) => job.heap_marching(method, &VectorDistance::<f64>::new(geometry, positions)),
     }
@@ -264,8 +261,16 @@ impl<'a> Job<'_, 'a> {
     /// A method's start: its state with the voxels that sources fix.
     fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let seeded = initialise::<M>(self.stage, self.sources, &state, start)?;
+        let seeded = initialise::<M>(self.stage, self.sources, &state, None, start)?;
         Ok((state, seeded))
+    }
+
+    /// The start of a method that keeps no sources, and a field with those of its fixed voxels.
+    fn start_apart<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, BrickArray<u32>, Seeded)> {
+        let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
+        let sources = BrickArray::blank(self.engine.scratch(), self.set, NO_SOURCE)?;
+        let seeded = initialise::<M>(self.stage, self.sources, &state, Some(&sources), Start::Fixed)?;
+        Ok((state, sources, seeded))
     }
 
     fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
@@ -277,20 +282,38 @@ impl<'a> Job<'_, 'a> {
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<M>(Start::Fixed)?;
-        sweep_all(self.stage, &method, &state, &seeded.bricks, iterations)?;
+        sweep_all(self.stage, &method, &state, &mut Alone(self.set), &seeded.bricks, iterations)?;
         Ok(self.solved(method, state, &seeded))
     }
 
+    /// Distances, and along with them their sources, where these are asked for.
+    fn sweeps_with_sources<P: Precision>(
+        &self,
+        method: FastSweeping<P, f64>,
+        iterations: u32,
+    ) -> Result<Solved<'a, P>> {
+        if !self.options.sources {
+            return self.sweeps(method, iterations);
+        }
+        let (state, sources, seeded) = self.start_apart::<FastSweeping<P, f64>>()?;
+        let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &seeded.bricks)?;
+        sweep_all(self.stage, &method, &state, &mut tracked, &seeded.bricks, iterations)?;
+        drop(tracked);
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
+    }
+
     /// Distances, and then their sources, where these are asked for.
-    fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
-        let (state, seeded) = self.start::<M>(Start::Fixed)?;
+    fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a, R: Parents>(
+        &self,
+        method: M,
+    ) -> Result<Solved<'a, P>> {
+        if !self.options.sources {
+            return self.front(method);
+        }
+        let (state, sources, seeded) = self.start_apart::<M>()?;
         let geometry = self.sources.geometry;
         advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, self.options.farthest)?;
-        if !self.options.sources {
-            return Ok(self.solved(method, state, &seeded));
-        }
-        let (sources, traced) = self.start::<ShapeDistance<'_>>(Start::Fixed)?;
-        trace_sources(self.stage, geometry, &state, &sources, &traced.bricks)?;
+        trace_sources::<P, R>(self.stage, geometry, &state, &sources, &seeded.bricks)?;
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 

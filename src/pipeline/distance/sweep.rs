@@ -3,20 +3,74 @@
 
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers, sweep_waves};
-use crate::grid::{FACES, Slot};
+use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::distance::SWEEPS;
 use crate::kernel::distance::method::OrderedSweeps;
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
 
+/// What a visit of a brick left.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Visit {
+    /// Whether any voxel fell.
+    pub(super) changed: bool,
+    /// Whether the companion has work left in the brick.
+    pub(super) left: bool,
+}
+
+/// What goes along with the sweeps of a method.
+pub(super) trait Companion<M: OrderedSweeps>: Sync {
+    /// Buffers of one thread.
+    type Work: Send + 'static;
+
+    /// Buffers for bricks of `edge`^3 voxels.
+    fn work(edge: usize) -> Self::Work;
+
+    /// Sweeps a gathered tile.
+    fn sweep(&self, visit: Swept<'_, M, Self::Work>, slot: Slot, upward: [bool; 3]) -> Visit;
+
+    /// Bricks of a wave were visited.
+    fn after_wave(&mut self, _wave: &[(Slot, Visit)]) -> Result<()> {
+        Ok(())
+    }
+
+    /// A sweep is over.
+    fn after_sweep(&mut self, _stage: &Stage<'_>, _upward: [bool; 3]) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// A tile, the method that sweeps it, and the buffers that both have.
+pub(super) struct Swept<'t, M: OrderedSweeps, W> {
+    pub(super) method: &'t M,
+    pub(super) tile: &'t mut HaloTile<M::State>,
+    pub(super) work: &'t mut M::Work,
+    pub(super) along: &'t mut W,
+}
+
+/// Nothing goes along.
+pub(super) struct Alone<'a>(pub(super) &'a BrickSet);
+
+impl<M: OrderedSweeps> Companion<M> for Alone<'_> {
+    type Work = ();
+
+    fn work(_: usize) {}
+
+    fn sweep(&self, Swept { method, tile, work, .. }: Swept<'_, M, ()>, slot: Slot, upward: [bool; 3]) -> Visit {
+        let part = self.0.grid().brick_box(self.0.id(slot));
+        Visit { changed: method.sweep(tile, work, &part, upward), left: false }
+    }
+}
+
 /// Sweeps up to `iterations` times in all eight directions, or until an iteration changes nothing.
 ///
 /// `start` are this rank's bricks that hold fixed voxels. A brick in which a sweep changed nothing is passed over until one
 /// beside it changes: no sweep of any direction could change it.
-pub(super) fn sweep_all<M: OrderedSweeps>(
+pub(super) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
     stage: &Stage<'_>,
     method: &M,
     array: &BrickArray<M::State>,
+    companion: &mut C,
     start: &[Slot],
     iterations: u32,
 ) -> Result<()> {
@@ -24,7 +78,7 @@ pub(super) fn sweep_all<M: OrderedSweeps>(
     let grid = *set.grid();
     let plan = HaloPlan::new(grid, Reach::Faces);
     let edge = grid.edge() as usize;
-    let workers = Workers::new(move || (HaloTile::new(edge), M::work(edge)));
+    let workers = Workers::new(move || (HaloTile::new(edge), M::work(edge), C::work(edge)));
     let mut quiet = vec![true; set.len()];
     let wake = |quiet: &mut [bool], slot: Slot| {
         let beside = FACES.iter().filter_map(|face| set.neighbour(slot, face.offset()));
@@ -41,23 +95,24 @@ pub(super) fn sweep_all<M: OrderedSweeps>(
         for upward in SWEEPS {
             for mut wave in sweep_waves(&set, upward) {
                 wave.retain(|&slot| !quiet[slot as usize]);
-                let changed = stage.run(&wave, &workers, |(tile, work), &slot| {
+                let visited = stage.run(&wave, &workers, |(tile, work, along), &slot| {
                     plan.gather(array, slot, Boundary::Constant(M::UNKNOWN), tile);
-                    let changed = method.sweep(tile, work, &grid.brick_box(set.id(slot)), upward);
-                    if changed {
+                    let visit = companion.sweep(Swept { method, tile, work, along }, slot, upward);
+                    if visit.changed {
                         plan.scatter(tile, array, slot);
                     }
-                    Ok(changed)
+                    Ok((slot, visit))
                 })?;
-                for (&slot, &changed) in wave.iter().zip(&changed) {
-                    quiet[slot as usize] = !changed;
+                for &(slot, visit) in &visited {
+                    quiet[slot as usize] = !visit.changed;
                 }
-                let changed: Vec<Slot> =
-                    wave.iter().zip(&changed).filter(|(_, c)| **c).map(|(slot, _)| *slot).collect();
+                let changed: Vec<Slot> = visited.iter().filter(|(_, v)| v.changed).map(|(slot, _)| *slot).collect();
                 let changed_elsewhere = exchange.faces(array, &changed)?;
                 resting &= changed.is_empty();
                 changed.iter().chain(&changed_elsewhere).for_each(|&slot| wake(&mut quiet, slot));
+                companion.after_wave(&visited)?;
             }
+            companion.after_sweep(stage, upward)?;
         }
         stage.iterated(1, 0.0);
         if !stage.comm().any(!resting)? {

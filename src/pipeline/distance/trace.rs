@@ -1,6 +1,7 @@
-//! Sources for methods that keep distances only: found after the distances, in a field of their own (`kernel::distance::trace`).
+//! Sources for methods that keep distances only, in a field of their own: for the `front` schedule found after the distances
+//! (`kernel::distance::trace`), for `sweep` what `sweep_sources` left pending.
 //!
-//! Bricks that hold fixed voxels come first, then those beside bricks in which sources were found, as long as any is
+//! Bricks in which something may be found come first, then those beside bricks in which something was, as long as any is
 //! missing there. Bricks with a face, edge or corner in common never run at the same time, so what a round does not
 //! depend on threads; what is found does not even depend on the rounds.
 
@@ -8,14 +9,15 @@ use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{Box3, Geometry, NEIGHBOURS_26, Slot};
 use crate::kernel::distance::initialise::NO_SOURCE;
+use crate::kernel::distance::parents::Parents;
 use crate::kernel::distance::precision::Precision;
-use crate::kernel::distance::trace::Tracer;
+use crate::kernel::distance::trace::{Tracer, fill};
 use crate::kernel::distance::vector_distance::FIXED;
 use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
 
 /// Carries sources from the fixed voxels on the bricks in `start` along finished distances.
-pub(super) fn trace_sources<P: Precision>(
+pub(super) fn trace_sources<P: Precision, R: Parents>(
     stage: &Stage<'_>,
     geometry: &Geometry,
     distances: &BrickArray<P>,
@@ -23,52 +25,99 @@ pub(super) fn trace_sources<P: Precision>(
     start: &[Slot],
 ) -> Result<()> {
     let set = distances.set().clone();
-    let grid = *set.grid();
-    let plan = HaloPlan::new(grid, Reach::All);
-    let edge = grid.edge() as usize;
-    let tracer = Tracer::new(geometry, edge);
-    let workers = Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), tracer.clone()));
-    let colour = |slot: Slot| grid.coords(set.id(slot)).iter().fold(0, |colour, at| colour << 1 | (at & 1));
-    // 0 for bricks that are due, else infinite: what ranks tell each other.
-    let mut due = vec![f64::INFINITY; set.len()];
-    // Nobody was told of their fixed voxels yet.
-    let mut untold = vec![false; set.len()];
-    let mut complete: Vec<bool> = (0..set.len() as Slot).map(|slot| distances.unwritten(slot).is_some()).collect();
-    for &slot in start {
-        (due[slot as usize], untold[slot as usize]) = (0.0, true);
-    }
+    let plan = HaloPlan::new(*set.grid(), Reach::All);
+    let edge = set.grid().edge() as usize;
     let exchange = Exchange::new(stage.comm(), &set, &plan)?;
     exchange.faces(distances, &set.owned().collect::<Vec<_>>())?;
     exchange.faces(states, start)?;
-    while stage.comm().any(due.contains(&0.0))? {
-        for turn in 0..8 {
-            let is_due = |slot: &Slot| due[*slot as usize] == 0.0 && colour(*slot) == turn;
-            let wave: Vec<Slot> = set.owned().filter(is_due).collect();
-            let traced = stage.run(&wave, &workers, |(distance, state, tracer), &slot| {
-                plan.gather(distances, slot, Boundary::Constant(P::UNKNOWN), distance);
-                plan.gather(states, slot, Boundary::Constant(NO_SOURCE), state);
-                let (found, left) = tracer.trace(distance, state);
-                if found {
-                    plan.scatter(state, states, slot);
-                }
-                Ok((found, left))
-            })?;
-            for (&slot, (found, left)) in wave.iter().zip(traced) {
-                due[slot as usize] = f64::INFINITY;
-                complete[slot as usize] = !left;
-                if found || std::mem::take(&mut untold[slot as usize]) {
-                    let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
-                    beside.for_each(|n| due[n as usize] = 0.0);
-                }
-            }
-            exchange.faces(states, &wave)?;
-            exchange.lowest(&mut due)?;
-            for slot in set.owned().filter(|&slot| complete[slot as usize]) {
-                due[slot as usize] = f64::INFINITY;
-            }
+    let tracer = Tracer::<R>::new(geometry, edge);
+    let workers = Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), tracer.clone()));
+    let gather = |distance: &mut HaloTile<P>, state: &mut HaloTile<u32>, slot: Slot| {
+        plan.gather(distances, slot, Boundary::Constant(P::UNKNOWN), distance);
+        plan.gather(states, slot, Boundary::Constant(NO_SOURCE), state);
+    };
+    let complete = (0..set.len() as Slot).map(|slot| distances.unwritten(slot).is_some()).collect();
+    let mut rounds = Rounds::new(states, &exchange, complete);
+    rounds.begin(start, true);
+    rounds.run(stage, &workers, |(distance, state, tracer), slot| {
+        gather(distance, state, slot);
+        let (found, left) = tracer.trace(distance, state);
+        if found {
+            plan.scatter(state, states, slot);
+        }
+        (found, left)
+    })?;
+    let left: Vec<Slot> = set.owned().filter(|&slot| !rounds.complete[slot as usize]).collect();
+    if !stage.comm().any(!left.is_empty())? {
+        return Ok(());
+    }
+    rounds.begin(&left, false);
+    rounds.run(stage, &workers, |(distance, state, _), slot| {
+        gather(distance, state, slot);
+        let (changed, filled) = fill(distance, state);
+        if changed {
+            plan.scatter(state, states, slot);
+        }
+        (changed, filled)
+    })
+}
+
+/// Rounds over bricks that are due, until none is.
+pub(super) struct Rounds<'a> {
+    states: &'a BrickArray<u32>,
+    exchange: &'a Exchange<'a>,
+    /// 0 for bricks that are due, else infinite: what ranks tell each other.
+    due: Vec<f64>,
+    /// Nobody was told of what these bricks hold yet.
+    untold: Vec<bool>,
+    /// Bricks in which nothing is missing.
+    complete: Vec<bool>,
+}
+
+impl<'a> Rounds<'a> {
+    pub(super) fn new(states: &'a BrickArray<u32>, exchange: &'a Exchange<'a>, complete: Vec<bool>) -> Self {
+        let bricks = complete.len();
+        Self { states, exchange, due: vec![f64::INFINITY; bricks], untold: vec![false; bricks], complete }
+    }
+
+    /// Makes bricks due; with `untold` also those beside them, afterwards, whether anything is found in them or not.
+    pub(super) fn begin(&mut self, start: &[Slot], untold: bool) {
+        for &slot in start {
+            (self.due[slot as usize], self.untold[slot as usize]) = (0.0, untold);
         }
     }
-    Ok(())
+
+    /// `visit` finds what it can in a brick; it tells whether it found anything, and whether anything is left.
+    pub(super) fn run<W: Send>(
+        &mut self,
+        stage: &Stage<'_>,
+        workers: &Workers<W>,
+        visit: impl Fn(&mut W, Slot) -> (bool, bool) + Sync,
+    ) -> Result<()> {
+        let set = self.states.set().clone();
+        let colour = |slot: Slot| set.grid().coords(set.id(slot)).iter().fold(0, |colour, at| colour << 1 | (at & 1));
+        while stage.comm().any(self.due.contains(&0.0))? {
+            for turn in 0..8 {
+                let is_due = |slot: &Slot| self.due[*slot as usize] == 0.0 && colour(*slot) == turn;
+                let wave: Vec<Slot> = set.owned().filter(is_due).collect();
+                let visited = stage.run(&wave, workers, |work, &slot| Ok(visit(work, slot)))?;
+                for (&slot, (found, left)) in wave.iter().zip(visited) {
+                    self.due[slot as usize] = f64::INFINITY;
+                    self.complete[slot as usize] = !left;
+                    if found || std::mem::take(&mut self.untold[slot as usize]) {
+                        let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
+                        beside.for_each(|n| self.due[n as usize] = 0.0);
+                    }
+                }
+                self.exchange.faces(self.states, &wave)?;
+                self.exchange.lowest(&mut self.due)?;
+                for slot in set.owned().filter(|&slot| self.complete[slot as usize]) {
+                    self.due[slot as usize] = f64::INFINITY;
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// A field of states, read as the indices of sources.
