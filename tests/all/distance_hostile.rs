@@ -211,7 +211,7 @@ fn grids_that_make_no_sense_are_refused() {
         ("--spacing 0.1 --origin nan,0,0 --shape 4,4,4", 2, &["--origin is NaN"]),
         // 10^15 voxels, which no machine holds; what they would take is told.
         (
-            &format!("{exact} 100000,100000,100000"),
+            &format!("{exact} 100000,100000,100000 --brick 64"),
             2,
             &["1 000 000 000 000 000 voxels", "iB of memory", "TiB of temporary fields", "give at least --memory"],
         ),
