@@ -126,8 +126,8 @@ fn inside(geometry: &Geometry, mut cloud: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
 }
 
 /// Nearly every voxel has its nearest source: all but 1 in 1000, none farther off than a quarter of a voxel, or with 26
-/// neighbours an eighth of the longest spacing; voxels that points fix have it without exception. On Sponge & Sphere one point of the sphere is walled in by the voxels that its
-/// neighbours fix; the front tells voxels around of it.
+/// neighbours an eighth of the longest spacing; voxels that points fix have it without exception. On Sponge & Sphere one
+/// point of the sphere is walled in by the voxels that its neighbours fix; the front tells voxels around of it.
 #[test]
 fn euclidean_methods_find_nearly_every_nearest_source() {
     let lab = Lab::new(2);

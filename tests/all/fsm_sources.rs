@@ -159,26 +159,28 @@ fn inexact(geometry: &Geometry, cloud: &[[f64; 3]], sources: &[Option<usize>]) -
 }
 
 /// Sources are carried along steps to one of 26 neighbours, not along characteristics, so a voxel may get one that is near,
-/// not nearest: seldom in a cloud that fills the volume, for half of the voxels far from a dense surface. Both schedules alike.
+/// not nearest: seldom in a cloud that fills the volume, for half of the voxels far from a dense surface. Both schedules
+/// alike; FMM, which takes the shortest way, does better.
 #[test]
 fn most_sources_are_the_nearest_ones() {
     let lab = Lab::new(2);
     let pair = sponge_and_sphere().concat();
-    let mut cases = vec![("Sponge & Sphere".to_string(), grid_around(&pair, 0.05), pair, 0.6)];
-    for (seed, spacing, share) in [(0, [0.5; 3], 0.08), (1, [0.4, 0.4, 1.3], 0.16)] {
+    let mut cases = vec![("Sponge & Sphere".to_string(), grid_around(&pair, 0.05), pair, 0.53)];
+    for (seed, spacing, share) in [(0, [0.5; 3], 0.06), (1, [0.4, 0.4, 1.3], 0.135)] {
         let geometry = grid([70, 64, 50], spacing);
         let cloud = random_cloud(&geometry, 100, seed);
         cases.push((format!("100 points, spacing {spacing:?}"), geometry, cloud, share));
     }
     for (name, geometry, cloud, allowed) in &cases {
+        let fmm = solve::<f32>(&lab, geometry, cloud, 16, Method::FMM, Schedule::Front);
+        let (of_fmm, _) = inexact(geometry, cloud, &fmm.sources);
         for schedule in [SWEEP, Schedule::Front] {
             let found = solve::<f32>(&lab, geometry, cloud, 16, Method::FSM, schedule);
             let (share, most) = inexact(geometry, cloud, &found.sources);
-            println!("{name}, {schedule:?}: {share} of the voxels, {most} spacings at most");
-            assert!(share < *allowed, "{name}, {schedule:?}: {share} of the voxels, {most} spacings at most");
+            let what = format!("{name}, {schedule:?}: {share} of the voxels, {of_fmm} by fmm, {most} spacings at most");
+            println!("{what}");
+            assert!(share < *allowed && of_fmm < share, "{what}");
         }
-        let fmm = solve::<f32>(&lab, geometry, cloud, 16, Method::FMM, Schedule::Front);
-        println!("{name}, fmm: {:?}", inexact(geometry, cloud, &fmm.sources));
     }
 }
 

@@ -134,8 +134,8 @@ proptest! {
     ) {
         let problem = Problem::random(shape, spacing, part * spacing[0], 0.05 / spacing[0], seed);
         let (new, done) = problem.step(threads, tolerance);
-        // Forty visits a cell, of the thousand that it may take: steps much longer than a spacing need up to half of them.
-        prop_assert!(done.sor_iterations < 160, "{done:?}");
+        // 25 visits of four relaxations, of the thousand visits that a cell may take; a row of three cells needed 21.
+        prop_assert!(done.sor_iterations <= 100, "{done:?}");
         let residual = problem.residual(&new);
         prop_assert!(residual < tolerance + 5e-7, "{residual} for {tolerance}, {done:?}");
         let squares: f64 = new.iter().zip(&problem.u).map(|(n, o)| f64::from(n - o).powi(2)).sum();

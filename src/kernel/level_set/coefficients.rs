@@ -11,10 +11,7 @@
 use super::covolume::{Fields, Velocity};
 use super::gradients::{FaceNorms, Metric, whole_vectors};
 use super::mask::CellMask;
-use super::{CELL, GROWN, PLANE};
-
-/// Voxels of the rows of a plane at the grown cell's pitch, and one vector.
-pub(crate) const FLAT: usize = CELL * GROWN + CELL;
+use super::{CELL, FLAT, GROWN, PLANE};
 
 /// What one plane of voxels gets, row y from `y * GROWN` on: the coefficients towards the neighbours across -x, +x, -y, +y,
 /// -z, +z, then `M_p`. One array, not seven: nothing else can overlap it, which the vectoriser has to know.

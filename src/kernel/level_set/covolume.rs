@@ -16,13 +16,13 @@
 //! a few planes. Cost: 12 tetrahedra norms and about 60 operations per voxel.
 
 use super::coefficients::{
-    Coefficients, FLAT, NO_COEFFICIENTS, PlaneNorms, add_means, close, coefficients, mean_norms, normalise, old_values,
+    Coefficients, NO_COEFFICIENTS, PlaneNorms, add_means, close, coefficients, mean_norms, normalise, old_values,
     spread,
 };
 use super::gradients::{FaceNorms, Metric, faces, vertex_plane};
 use super::mask::CellMask;
 use super::scheme::write_plane;
-use super::{CELL, GROWN, PLANE};
+use super::{CELL, FLAT, GROWN, PLANE};
 
 /// What moves the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

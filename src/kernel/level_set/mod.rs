@@ -23,5 +23,7 @@ pub const CELL_LEN: usize = CELL * CELL * CELL;
 pub(crate) const GROWN: usize = CELL + 2;
 /// Voxels of one plane of the grown cell.
 pub(crate) const PLANE: usize = GROWN * GROWN;
+/// Voxels of a plane of the cell, its rows at the grown cell's pitch, and one vector.
+pub(crate) const FLAT: usize = CELL * GROWN + CELL;
 /// Voxels of the grown cell.
 pub(crate) const GROWN_LEN: usize = GROWN * PLANE;

@@ -8,8 +8,7 @@
 //! [z][colour][y][layer][x / 2]     colour: (x + y + z) % 2; layers: w across -x, +x, -y, +y, -z, +z, then r
 //! ```
 
-use super::coefficients::FLAT;
-use super::{CELL, CELL_LEN, GROWN};
+use super::{CELL, CELL_LEN, FLAT, GROWN};
 
 /// Values per voxel: six weights and the right side.
 pub const SCHEME_LAYERS: usize = 7;

@@ -5,8 +5,9 @@ use super::Sources;
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::Slot;
-use crate::kernel::distance::initialise::{NO_SOURCE, fix_voxels};
+use crate::kernel::distance::initialise::fix_voxels;
 use crate::kernel::distance::method::DistanceMethod;
+use crate::kernel::distance::seeds::{Seeds, write_states};
 use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::triangles;
 use crate::store::BrickArray;
@@ -32,30 +33,6 @@ pub(super) enum Start {
     /// Where a method keeps sources, voxels beside them too; and of all these points a fixed voxel has the nearest, also
     /// one that does not fix it.
     Told,
-}
-
-/// What sources make of one brick.
-struct Seeds {
-    squared: Vec<f64>,
-    source: Vec<u32>,
-}
-
-/// A voxel that no point is near to.
-const NONE: (f64, u32) = (f64::INFINITY, NO_SOURCE);
-
-impl Seeds {
-    fn new(len: usize) -> Self {
-        Self { squared: vec![f64::INFINITY; len], source: vec![NO_SOURCE; len] }
-    }
-
-    fn clear(&mut self) {
-        self.squared.fill(f64::INFINITY);
-        self.source.fill(NO_SOURCE);
-    }
-
-    fn count(&self) -> u64 {
-        self.source.iter().filter(|&&s| s != NO_SOURCE).count() as u64
-    }
 }
 
 /// What the sources made of this rank's bricks.
@@ -101,11 +78,11 @@ pub(super) fn initialise<M: DistanceMethod>(
         }
         let (count, known) = (fixed.count(), fixed.count() + told.count());
         if known > 0 {
-            array.write(slot, |out| write_seeds::<M>(fixed, told, out));
+            array.write(slot, |out| write_states::<M>(fixed, told, out));
             array.refresh_faces(slot);
         }
         if let Some(kept) = kept.filter(|_| count > 0) {
-            kept.write(slot, |out| write_seeds::<ShapeDistance<'_>>(fixed, told, out));
+            kept.write(slot, |out| write_states::<ShapeDistance<'_>>(fixed, told, out));
             kept.refresh_faces(slot);
         }
         Ok((count, known, distances))
@@ -116,19 +93,4 @@ pub(super) fn initialise<M: DistanceMethod>(
         fixed_voxels: counts.iter().map(|(fixed, _, _)| fixed).sum(),
         triangle_distances: counts.iter().map(|(_, _, distances)| distances).sum(),
     })
-}
-
-fn write_seeds<M: DistanceMethod>(fixed: &Seeds, told: &Seeds, out: &mut [M::State]) {
-    for (at, out) in out.iter_mut().enumerate() {
-        let nearest = |seeds: &Seeds| (seeds.squared[at], seeds.source[at]);
-        let (fixing, beside) = (nearest(fixed), if told.source.is_empty() { NONE } else { nearest(told) });
-        *out = match (fixing.1 == NO_SOURCE, beside.1 == NO_SOURCE) {
-            (false, _) => {
-                let (squared, source) = if beside < fixing { beside } else { fixing };
-                M::fixed(squared, source)
-            }
-            (true, false) => M::told(beside.1).unwrap_or(M::UNKNOWN),
-            (true, true) => M::UNKNOWN,
-        };
-    }
 }
