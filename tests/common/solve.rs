@@ -3,7 +3,7 @@
 use strandline::grid::{Box3, Geometry, PointBins};
 use strandline::kernel::distance::Neighbours;
 use strandline::kernel::distance::initialise::NO_SOURCE;
-use strandline::pipeline::distance::{Method, Options, Schedule, Sources, Textbook};
+use strandline::pipeline::distance::{self, Method, Options, Schedule, Sources, Textbook};
 
 use super::lab::{Lab, dense};
 use super::textbook::Stored;
@@ -77,8 +77,7 @@ pub(crate) fn solve_with<P: Stored>(
     let bins = PointBins::new(*set.grid(), geometry, cloud);
     let sources = Sources::cloud(geometry, cloud, &bins);
     let stage = lab.engine.stage("distance", 0);
-    let row = method.solver::<P>();
-    let solved = (row.solve)(&stage, &lab.engine, &sources, &set, schedule, options).expect("room for a field");
+    let solved = distance::solve::<P>(&stage, &sources, &set, method, schedule, options).expect("room for a field");
     stage.finish();
     let loads = lab.engine.reports().last().map_or(0, |report| report.brick_loads);
     let part = Box3::from_shape(geometry.shape);

@@ -15,6 +15,7 @@ pub mod marching_heap;
 pub mod method;
 pub mod parents;
 pub mod precision;
+pub mod second_look;
 pub mod seeds;
 pub mod shape_distance;
 pub mod sweep_sources;

@@ -12,6 +12,7 @@ mod job;
 mod needs;
 mod output;
 mod ranks;
+mod second_look;
 mod sign;
 mod solvers;
 mod sources;

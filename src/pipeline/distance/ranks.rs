@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use super::second_look::with_second_look;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;
 use crate::exec::{HaloPlan, Ownership, Reach, Stage};
@@ -35,13 +36,15 @@ pub fn solve<'a, P: Precision>(
     })?;
     let joined = Cut { grid: *set.grid(), ownership };
     let sum = |of: fn(&Solved<'a, P>) -> u64| parts.iter().map(of).sum();
-    Ok(Solved {
+    let solved = Solved {
         values: joined.join(parts.iter().map(|part| part.values.clone()).collect()),
         sources: joined.join(parts.iter().map(|part| part.sources.clone()).collect()),
         fixed: joined.join(parts.iter().map(|part| part.fixed.clone()).collect()),
         fixed_voxels: sum(|part| part.fixed_voxels),
         triangle_distances: sum(|part| part.triangle_distances),
-    })
+    };
+    let looks_again = schedule == Schedule::Front && solver.tracks_sources();
+    Ok(if looks_again { with_second_look(solved, sources, options) } else { solved })
 }
 
 /// How a field is cut.

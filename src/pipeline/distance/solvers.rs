@@ -73,6 +73,12 @@ const SMALL_BRICK: i64 = 32;
 const FEWEST_BRICKS: u64 = 512;
 
 impl<P> Solver<P> {
+    /// Whether a voxel's state is its nearest source, from which the distance follows.
+    #[must_use]
+    pub fn tracks_sources(&self) -> bool {
+        self.source_bytes == 0
+    }
+
     /// Edge of the bricks that a grid is cut into where nobody asks for another. It follows from the shape alone, so
     /// that a run can be repeated on another machine.
     #[must_use]
