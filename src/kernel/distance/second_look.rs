@@ -142,7 +142,9 @@ impl<A: Real> pulp::NullaryFnOnce for Bends<'_, A> {
                 let nearer = (distance - t).larger(zero);
                 nearer * nearer + nearer * nearer
             });
-            bent[i] = u32::from((here[i] < A::INFINITY) & ((straight <= kept) | (second <= even)) & (kept > zero));
+            // Without branches, so that lanes stay together.
+            let unsure = u32::from(straight <= kept) | u32::from(second <= even);
+            bent[i] = unsure & u32::from(here[i] < A::INFINITY) & u32::from(kept > zero);
         }
     }
 }

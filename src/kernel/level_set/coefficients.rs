@@ -178,14 +178,13 @@ pub(crate) fn old_values(u: &[f32], (z, rows): (usize, [usize; 2]), out: &mut Co
     out[6][start..][..len].copy_from_slice(&u[(z + 1) * PLANE + GROWN + 1 + start..][..len]);
 }
 
-/// Divides coefficients and old values by the diagonal, `1 + sum c`.
+/// Divides coefficients by the diagonal, `1 + sum c`.
 #[inline(always)]
 pub(crate) fn normalise(rows: [usize; 2], out: &mut Coefficients) {
     let (start, len) = flat(rows);
-    let [c0, c1, c2, c3, c4, c5, right] = out;
+    let [c0, c1, c2, c3, c4, c5, _] = out;
     let (c0, c1, c2) = (&mut c0[start..][..len], &mut c1[start..][..len], &mut c2[start..][..len]);
     let (c3, c4, c5) = (&mut c3[start..][..len], &mut c4[start..][..len], &mut c5[start..][..len]);
-    let right = &mut right[start..][..len];
     for n in 0..len {
         let inverse = 1.0 / (1.0 + c0[n] + c1[n] + c2[n] + c3[n] + c4[n] + c5[n]);
         c0[n] *= inverse;
@@ -194,7 +193,6 @@ pub(crate) fn normalise(rows: [usize; 2], out: &mut Coefficients) {
         c3[n] *= inverse;
         c4[n] *= inverse;
         c5[n] *= inverse;
-        right[n] *= inverse;
     }
 }
 

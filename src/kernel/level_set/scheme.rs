@@ -1,16 +1,17 @@
-//! How the scheme of a cell lies in memory: the linear system `u_p = r_p + sum w_pq u_q` (algorithms: section 5).
+//! How the scheme of a cell lies in memory: the linear system
+//! `u_p = old_p + sum w_pq (u_q - old_p)` (algorithms: section 5).
 //!
 //! Relaxation corrects one colour at a time, and along a row every second voxel has the same colour. So each row of 16
 //! voxels is kept as two halves, even x and odd x, and a half fills a vector with one colour alone. What the solver
 //! reads one after the other lies so too:
 //!
 //! ```text
-//! [z][colour][y][layer][x / 2]     colour: (x + y + z) % 2; layers: w across -x, +x, -y, +y, -z, +z, then r
+//! [z][colour][y][layer][x / 2]     colour: (x + y + z) % 2; layers: w across -x, +x, -y, +y, -z, +z, then old
 //! ```
 
 use super::{CELL, CELL_LEN, FLAT, GROWN};
 
-/// Values per voxel: six weights and the right side.
+/// Values per voxel: six weights and the old value.
 pub const SCHEME_LAYERS: usize = 7;
 /// Values of a scheme.
 pub const SCHEME_LEN: usize = SCHEME_LAYERS * CELL_LEN;

@@ -1,4 +1,7 @@
-//! Red-black successive over-relaxation of `u_p = r_p + sum w_pq u_q` inside one cell (Kósa 2015, sec. 3.5).
+//! Red-black successive over-relaxation of `u_p = u_p_old + sum w_pq (u_q - u_p_old)` inside one cell (Kósa 2015, sec. 3.5).
+//!
+//! Written in differences, which are exact where they are small: a constant stays to the last bit however long the step,
+//! where weights that sum to one but for their rounding would pull it away.
 //!
 //! A cell is relaxed a few times with its ghosts held, then handed back; cells of even and odd parity take turns, so
 //! that two cells of one turn share no face. Cells are fixed on the grid, so neither bricks nor threads nor ranks
@@ -135,16 +138,17 @@ impl Halves {
             half(own, at - PLANE / 2),
             half(own, at + PLANE / 2),
         ];
-        let mut sum = *half(weights, 6 * HALF);
+        let old = half(weights, 6 * HALF);
+        let mut here = *half(own, at);
+        let mut sum: [f32; HALF] = std::array::from_fn(|i| old[i] - here[i]);
         for (layer, neighbour) in neighbours.into_iter().enumerate() {
             let weights = half(weights, layer * HALF);
             for i in 0..HALF {
-                sum[i] += weights[i] * neighbour[i];
+                sum[i] += weights[i] * (neighbour[i] - old[i]);
             }
         }
-        let mut here = *half(own, at);
         for i in 0..HALF {
-            sum[i] = turns[parity][i] * (sum[i] - here[i]);
+            sum[i] *= turns[parity][i];
         }
         for i in 0..HALF {
             squares[i] += sum[i] * sum[i];
@@ -230,9 +234,9 @@ mod tests {
             }
             let here = (p[2] + 1) * PLANE + (p[1] + 1) * GROWN + p[0] + 1;
             let around = [here - 1, here + 1, here - GROWN, here + GROWN, here - PLANE, here + PLANE];
-            let start = weights(6, p);
-            let solution = (0..6).fold(start, |sum, q| sum + weights(q, p) * u[around[q]]);
-            u[here] = (u[here] + omega * (solution - u[here])).clamp(0.0, 1.0);
+            let old = weights(6, p);
+            let way = (0..6).fold(old - u[here], |sum, q| sum + weights(q, p) * (u[around[q]] - old));
+            u[here] = (u[here] + omega * way).clamp(0.0, 1.0);
         }
     }
 
