@@ -1,5 +1,6 @@
 //! Whole distance fields, the Cube experiment (Kósa & Mikula 2023, Table 2): nanoseconds per voxel from the cloud in
-//! memory to the finished field, and visits per brick; with and without sources, by both schedules where sweeps are one.
+//! memory to the finished field, and visits per brick; with and without sources, by both schedules where sweeps are
+//! one.
 //!
 //! ```sh
 //! cargo bench --bench distance_field                     # 289^3, all methods, bricks of 32 and 64, 2 threads

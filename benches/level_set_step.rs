@@ -1,8 +1,9 @@
 //! Time steps of the level set on a spherical shell, as the papers' program does them and as ours does.
 //!
 //! Plain: f64, one thread, for each voxel of the band the 24 norms as printed, six coefficients and a diagonal kept in
-//! lists, SOR along the band's list. Both stop a step at the same root mean square of corrections; both have the image's
-//! term. Prints nanoseconds for each band voxel and step, and errors against the plain program solved to 1e-9. `cargo bench --bench level_set_step [-- RADIUS]`
+//! lists, SOR along the band's list. Both stop a step at the same root mean square of corrections; both have the
+//! image's term. Prints nanoseconds for each band voxel and step, and errors against the plain program solved to 1e-9.
+//! `cargo bench --bench level_set_step [-- RADIUS]`
 #![allow(missing_docs, dead_code)]
 
 #[path = "../tests/common/lab.rs"]

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::distance_args::DistanceJobArgs;
+use super::reconstruct_args::ReconstructArgs;
 use super::values::{
     Crop, Output, parse_crop, parse_pair, parse_size, parse_sweeping_method, parse_triple, sweeping_solvers_help,
 };
@@ -26,8 +27,13 @@ pub(super) enum Command {
     /// Compute the distance to point clouds and triangle meshes
     #[command(after_help = HELP_ON_DISTANCE)]
     Distance(Box<DistanceJobArgs>),
+    /// Reconstruct a closed surface from a point cloud, without normals
+    #[command(after_help = HELP_ON_DISTANCE)]
+    Reconstruct(Box<ReconstructArgs>),
     /// Segment the built-in stack of a plant embryo
     Demo(DemoArgs),
+    /// Measure a triangle mesh: volume, area, pieces, holes, and how far points lie from it
+    Measure(MeasureArgs),
     /// Tell what an input or output is: shape, axes, spacing, unit, type
     Info(InfoArgs),
 }
@@ -52,7 +58,9 @@ pub(super) struct SegmentArgs {
     #[command(flatten)]
     pub(super) picture: ImageArgs,
     #[command(flatten)]
-    pub(super) level_set: LevelSetArgs,
+    pub(super) motion: MotionArgs,
+    #[command(flatten)]
+    pub(super) pull: PullArgs,
     #[command(flatten)]
     pub(super) distance: DistanceArgs,
     #[command(flatten)]
@@ -94,22 +102,13 @@ pub(super) struct ImageArgs {
 /// How the surface moves.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Level set")]
-pub(super) struct LevelSetArgs {
+pub(super) struct MotionArgs {
     /// Weight of curvature, a length; smooths the surface [default: 0.1 of the smallest spacing]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(super) delta: Option<f64>,
     /// Weight of the pull towards the points [default: 1]
     #[arg(long, value_name = "W", allow_hyphen_values = true)]
     pub(super) theta: Option<f64>,
-    /// Weight of the pull towards the image's edges; 0 leaves the image out [default: 0.3]
-    #[arg(long, value_name = "W", allow_hyphen_values = true)]
-    pub(super) rho: Option<f64>,
-    /// Contrast of the edge detector, for intensities from 0 to 1 [default: 650]
-    #[arg(long, value_name = "K", allow_hyphen_values = true)]
-    pub(super) k: Option<f64>,
-    /// Width of the smoothing before edges are looked for, a length [default: 2 of the smallest spacing]
-    #[arg(long, value_name = "D", allow_hyphen_values = true)]
-    pub(super) sigma: Option<f64>,
     /// Distance of the start surface from the points, a length [default: just beyond their largest hole]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(super) beta: Option<f64>,
@@ -131,6 +130,21 @@ pub(super) struct LevelSetArgs {
     /// Time steps at most [default: 60]
     #[arg(long, value_name = "N")]
     pub(super) max_steps: Option<u32>,
+}
+
+/// How the image pulls at the surface.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Level set")]
+pub(super) struct PullArgs {
+    /// Weight of the pull towards the image's edges; 0 leaves the image out [default: 0.3]
+    #[arg(long, value_name = "W", allow_hyphen_values = true)]
+    pub(super) rho: Option<f64>,
+    /// Contrast of the edge detector, for intensities from 0 to 1 [default: 650]
+    #[arg(long, value_name = "K", allow_hyphen_values = true)]
+    pub(super) k: Option<f64>,
+    /// Width of the smoothing before edges are looked for, a length [default: 2 of the smallest spacing]
+    #[arg(long, value_name = "D", allow_hyphen_values = true)]
+    pub(super) sigma: Option<f64>,
 }
 
 /// How distance is computed.
@@ -174,8 +188,9 @@ pub(super) struct OutputArgs {
     /// Write the report once more, as a file of its own
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
-    /// Write the surface once more, as a file of its own; with several objects FILE-1.ply, FILE-2.ply, ...
-    #[arg(long, value_name = "FILE.ply")]
+    /// Write the surface once more, in a file of its own, in the format of its name; with several objects FILE-1.ply,
+    /// FILE-2.ply, ...
+    #[arg(long, value_name = "FILE.ply|obj|stl|vtp")]
     pub(super) mesh: Option<PathBuf>,
     /// Draw three slices through the objects with their outlines
     #[arg(long, value_name = "FILE.png")]
@@ -202,6 +217,19 @@ pub(super) struct DemoArgs {
     /// Print nothing but errors
     #[arg(short, long)]
     pub(super) quiet: bool,
+}
+
+/// Measure a triangle mesh.
+#[derive(Debug, Args)]
+pub(super) struct MeasureArgs {
+    /// Triangle mesh: PLY, OFF, STL, OBJ
+    pub(super) mesh: PathBuf,
+    /// Points whose distances from the mesh are measured; of a mesh its vertices
+    #[arg(long, value_name = "CLOUD")]
+    pub(super) points: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub(super) json: bool,
 }
 
 /// Tell what an input or output is.

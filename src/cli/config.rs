@@ -3,12 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
-use super::args::{DistanceArgs, Edge, ImageArgs, LevelSetArgs, OverlapArg, ResourceArgs, StopArg};
+use super::args::{Edge, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, StopArg};
 use super::text::bytes;
 use super::values::Output;
 use crate::error::{Error, Result};
 use crate::exec::machine_memory;
+use crate::pipeline::distance::Method;
 use crate::pipeline::evolve::Stop;
+use crate::pipeline::motion::Motion;
+use crate::pipeline::reconstruct::ReconstructSettings;
 use crate::pipeline::segment::{Overlap, SegmentSettings};
 
 /// What a run may use.
@@ -24,28 +27,20 @@ const BRICKS: std::ops::RangeInclusive<i64> = 16..=512;
 const MOST_THREADS: usize = 1024;
 
 /// The settings of a segmentation.
-pub(super) fn settings(
-    image: &ImageArgs,
-    level_set: &LevelSetArgs,
-    distance: &DistanceArgs,
-    resources: &ResourceArgs,
-) -> Result<SegmentSettings> {
+pub(super) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
     let defaults = SegmentSettings::default();
-    let l = level_set;
-    Ok(SegmentSettings {
-        method: distance.method,
-        theta: checked("--theta", l.theta.unwrap_or(defaults.theta), AT_LEAST_ZERO)?,
-        rho: checked("--rho", l.rho.unwrap_or(defaults.rho), AT_LEAST_ZERO)?,
-        delta: optional("--delta", l.delta, AT_LEAST_ZERO)?,
-        k: checked("--k", l.k.unwrap_or(defaults.k), AT_LEAST_ZERO)?,
-        sigma: optional("--sigma", l.sigma, AT_LEAST_ZERO)?,
-        beta: optional("--beta", l.beta, ABOVE_ZERO)?,
-        tau: optional("--tau", l.tau, ABOVE_ZERO)?,
-        epsilon: optional("--epsilon", l.epsilon, ABOVE_ZERO)?,
-        omega: checked("--omega", l.omega.unwrap_or(defaults.omega), BETWEEN_ZERO_AND_TWO)?,
-        stop: stop(l, defaults.stop)?,
-        max_steps: l.max_steps.unwrap_or(defaults.max_steps),
+    let (image, pull) = (&args.picture, &args.pull);
+    let edges = Motion {
+        rho: checked("--rho", pull.rho.unwrap_or(defaults.motion.rho), AT_LEAST_ZERO)?,
         normalised: image.edge == Edge::Normalised,
+        ..defaults.motion
+    };
+    Ok(SegmentSettings {
+        method: args.distance.method,
+        motion: motion(&args.motion, edges)?,
+        k: checked("--k", pull.k.unwrap_or(defaults.k), AT_LEAST_ZERO)?,
+        sigma: optional("--sigma", pull.sigma, AT_LEAST_ZERO)?,
+        beta: optional("--beta", args.motion.beta, ABOVE_ZERO)?,
         caps: !image.no_caps,
         percentiles: percentiles(image.percentiles)?,
         overlap: match image.overlap {
@@ -54,7 +49,31 @@ pub(super) fn settings(
             OverlapArg::First => Overlap::First,
             OverlapArg::Last => Overlap::Last,
         },
-        brick: brick(resources.brick.unwrap_or(defaults.brick))?,
+        brick: brick(args.resources.brick.unwrap_or(defaults.brick))?,
+    })
+}
+
+/// The settings of a reconstruction.
+pub(super) fn reconstruct_settings(args: &MotionArgs, method: Method) -> Result<ReconstructSettings> {
+    let defaults = ReconstructSettings::default();
+    Ok(ReconstructSettings {
+        method,
+        motion: motion(args, defaults.motion)?,
+        beta: optional("--beta", args.beta, ABOVE_ZERO)?,
+    })
+}
+
+/// How the surface is to move; what was not typed as in `defaults`.
+fn motion(args: &MotionArgs, defaults: Motion) -> Result<Motion> {
+    Ok(Motion {
+        theta: checked("--theta", args.theta.unwrap_or(defaults.theta), AT_LEAST_ZERO)?,
+        delta: optional("--delta", args.delta, AT_LEAST_ZERO)?,
+        tau: optional("--tau", args.tau, ABOVE_ZERO)?,
+        epsilon: optional("--epsilon", args.epsilon, ABOVE_ZERO)?,
+        omega: checked("--omega", args.omega.unwrap_or(defaults.omega), BETWEEN_ZERO_AND_TWO)?,
+        stop: stop(args, defaults.stop)?,
+        max_steps: args.max_steps.unwrap_or(defaults.max_steps),
+        ..defaults
     })
 }
 
@@ -76,9 +95,9 @@ fn optional(flag: &str, value: Option<f64>, range: Range) -> Result<Option<f64>>
     value.map(|value| checked(flag, value, range)).transpose()
 }
 
-fn stop(level_set: &LevelSetArgs, default: Stop) -> Result<Stop> {
-    let tolerance = optional("--tol", level_set.tol, ABOVE_ZERO)?;
-    Ok(match (level_set.stop, default) {
+fn stop(args: &MotionArgs, default: Stop) -> Result<Stop> {
+    let tolerance = optional("--tol", args.tol, ABOVE_ZERO)?;
+    Ok(match (args.stop, default) {
         (StopArg::Surface, Stop::Surface(limit)) => Stop::Surface(tolerance.unwrap_or(limit)),
         (StopArg::Surface, Stop::L2(_)) => Stop::Surface(tolerance.unwrap_or(0.02)),
         (StopArg::L2, _) => Stop::L2(tolerance.unwrap_or(L2_TOLERANCE)),
@@ -103,9 +122,9 @@ pub(super) fn brick(edge: i64) -> Result<i64> {
 }
 
 /// A spacing from the command line.
-pub(super) fn spacing(given: Option<[f64; 3]>) -> Result<Option<[f64; 3]>> {
+pub(super) fn spacing(flag: &str, given: Option<[f64; 3]>) -> Result<Option<[f64; 3]>> {
     if let Some([x, y, z]) = given.filter(|h| h.iter().any(|&v| checked("", v, ABOVE_ZERO).is_err())) {
-        return Err(Error::usage(format!("--image-spacing is {x},{y},{z}; give three lengths, each more than 0")));
+        return Err(Error::usage(format!("{flag} is {x},{y},{z}; give lengths, each more than 0")));
     }
     Ok(given)
 }
@@ -173,7 +192,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::cli::args::{Cli, Command, SegmentArgs};
+    use crate::cli::args::{Cli, Command};
 
     fn typed(flags: &str) -> Box<SegmentArgs> {
         let words = "strandline segment image.tif --points marks.csv -o none".split(' ');
@@ -184,7 +203,7 @@ mod tests {
 
     fn meant(flags: &str) -> Result<SegmentSettings> {
         let args = typed(flags);
-        settings(&args.picture, &args.level_set, &args.distance, &args.resources)
+        settings(&args)
     }
 
     #[test]
@@ -198,18 +217,18 @@ mod tests {
         let help = Cli::command().find_subcommand_mut("segment").unwrap().render_long_help().to_string();
         let defaults = SegmentSettings::default();
         for (value, what) in [
-            (defaults.theta, "towards the points"),
-            (defaults.rho, "leaves the image out"),
+            (defaults.motion.theta, "towards the points"),
+            (defaults.motion.rho, "leaves the image out"),
             (defaults.k, "intensities from 0 to 1"),
-            (defaults.omega, "between 0 and 2"),
-            (f64::from(defaults.max_steps), "Time steps at most"),
+            (defaults.motion.omega, "between 0 and 2"),
+            (f64::from(defaults.motion.max_steps), "Time steps at most"),
         ] {
             let line = help.lines().find(|line| line.contains(what)).unwrap_or_else(|| panic!("{what}: {help}"));
             assert!(line.contains(&format!("[default: {value}]")), "{line}");
         }
         assert!(help.contains("[default: 64;") && defaults.brick == 64);
         assert!(help.contains("[default: 0.1,99.9]") && defaults.percentiles == [0.1, 99.9]);
-        assert!(help.contains("0.02 for surface") && defaults.stop == Stop::Surface(0.02));
+        assert!(help.contains("0.02 for surface") && defaults.motion.stop == Stop::Surface(0.02));
     }
 
     #[test]
@@ -219,26 +238,28 @@ mod tests {
              --max-steps 10 --method fsm --edge plain --percentiles 1,99 --no-caps --overlap last --brick 32",
         );
         let expected = SegmentSettings {
-            method: crate::pipeline::distance::Method::FSM,
-            theta: 2.0,
-            rho: 3.0,
-            delta: Some(1.0),
+            method: Method::FSM,
+            motion: Motion {
+                theta: 2.0,
+                rho: 3.0,
+                normalised: false,
+                delta: Some(1.0),
+                tau: Some(7.0),
+                epsilon: Some(8.0),
+                omega: 1.5,
+                stop: Stop::L2(9.0),
+                max_steps: 10,
+            },
             k: 4.0,
             sigma: Some(5.0),
             beta: Some(6.0),
-            tau: Some(7.0),
-            epsilon: Some(8.0),
-            omega: 1.5,
-            stop: Stop::L2(9.0),
-            max_steps: 10,
-            normalised: false,
             caps: false,
             percentiles: [1.0, 99.0],
             overlap: Overlap::Last,
             brick: 32,
         };
         assert_eq!(settings.unwrap(), expected);
-        assert_eq!(meant("--stop l2").unwrap().stop, Stop::L2(L2_TOLERANCE));
+        assert_eq!(meant("--stop l2").unwrap().motion.stop, Stop::L2(L2_TOLERANCE));
     }
 
     #[test]
@@ -272,7 +293,7 @@ mod tests {
             assert!(error.exit_code() == 2 && error.to_string().starts_with(flag), "{flags}: {error}");
         }
         for given in [[0.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, f64::NAN], [f64::INFINITY, 1.0, 1.0]] {
-            assert!(spacing(Some(given)).unwrap_err().to_string().contains("--image-spacing"));
+            assert!(spacing("--image-spacing", Some(given)).unwrap_err().to_string().contains("--image-spacing"));
         }
     }
 }

@@ -57,11 +57,12 @@ pub(super) struct GridArgs {
 pub(super) struct FieldArgs {
     #[arg(long, value_name = "NAME", value_parser = parse_method, default_value = "vdt", help = solvers_help())]
     pub(super) method: Method,
-    /// Order of the bricks: as distance reaches them; or the textbook's order, bit for bit: passes over all bricks (fsm,
-    /// vdt), one heap over the whole volume in memory (fmm, dp)
+    /// Order of the bricks: as distance reaches them; or the textbook's order, bit for bit: passes over all bricks
+    /// (fsm, vdt), one heap over the whole volume in memory (fmm, dp)
     #[arg(long, value_enum, default_value_t = ScheduleArg::Front)]
     pub(super) schedule: ScheduleArg,
-    /// Whose sources a voxel is offered with vdt and dp: the 6 neighbours across its faces, or all 26, which loses fewer
+    /// Whose sources a voxel is offered with vdt and dp: the 6 neighbours across its faces, or all 26, which loses
+    /// fewer
     #[arg(long, value_name = "6|26", value_parser = parse_neighbours, default_value = "6")]
     pub(super) neighbours: Neighbours,
     /// Iterations of eight passes each with --schedule sweep; fewer when one changes nothing

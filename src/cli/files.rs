@@ -6,6 +6,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use super::config::folder_of;
+use crate::error::{Error, Result};
+use crate::io::mesh_export::{FORMATS, Format};
 
 /// Writes a file through `write`; it gets its name, and replaces what had it, only when all is written.
 pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
@@ -24,8 +26,17 @@ pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<&File>)
     Ok(())
 }
 
-/// Copies a file, whole or not at all.
-pub(super) fn copy_whole(from: &Path, to: &Path) -> io::Result<()> {
-    let mut source = File::open(from)?;
-    write_whole(to, |sink| io::copy(&mut source, sink).map(|_| ()))
+/// Writes a finished PLY mesh in the format that the name of `to` asks for, whole or not at all.
+pub(super) fn export_mesh(ply: &Path, to: &Path) -> Result<()> {
+    let format = mesh_format(to)?;
+    write_whole(to, |sink| format.export(ply, sink))
+        .map_err(|error| Error::from_io("the mesh cannot be written", &error).at(to))
+}
+
+/// The format of a mesh that is to be written.
+pub(super) fn mesh_format(path: &Path) -> Result<&'static Format> {
+    Format::of(path).ok_or_else(|| {
+        let endings: Vec<String> = FORMATS.iter().map(|format| format!(".{}", format.extension)).collect();
+        Error::usage(format!("ends like no format of meshes; give a name that ends in {}", endings.join(", "))).at(path)
+    })
 }

@@ -62,7 +62,7 @@ fn exact(shape: [i64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Geometr
 }
 
 /// Refuses what no index could count.
-fn check_counts(counts: [f64; 3]) -> Result<()> {
+pub(super) fn check_counts(counts: [f64; 3]) -> Result<()> {
     let voxels: f64 = counts.iter().product();
     if counts.iter().any(|&n| n >= 1e9) || voxels >= 1e18 {
         let [x, y, z] = counts;

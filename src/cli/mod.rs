@@ -13,7 +13,10 @@ mod files;
 mod grid;
 mod info;
 mod input;
+mod measure;
 mod picture;
+mod reconstruct;
+mod reconstruct_args;
 mod report;
 mod segment;
 mod signals;
@@ -60,7 +63,9 @@ fn execute(cli: Cli, typed: &[String]) -> Result<()> {
     match cli.command {
         Command::Segment(args) => segment::run(&args, typed),
         Command::Distance(args) => distance::run(&args, typed),
+        Command::Reconstruct(args) => reconstruct::run(&args, typed),
         Command::Demo(args) => demo::run(&args, typed),
+        Command::Measure(args) => measure::run(&args),
         Command::Info(args) => info::run(&args),
     }
 }

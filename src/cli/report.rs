@@ -122,16 +122,36 @@ struct Object {
 
 /// Distances of the marks from the surface.
 #[derive(Clone, Copy, Debug, Serialize)]
-struct Hausdorff {
+pub(super) struct Hausdorff {
     mean: f64,
     max: f64,
 }
 
+impl From<crate::kernel::surface::Hausdorff> for Hausdorff {
+    fn from(found: crate::kernel::surface::Hausdorff) -> Self {
+        Self { mean: found.mean, max: found.max }
+    }
+}
+
 /// The cloud's largest hole.
 #[derive(Clone, Copy, Debug, Serialize)]
-struct Hole {
+pub(super) struct Hole {
     width: f64,
     place_xyz: [f64; 3],
+}
+
+impl From<crate::pipeline::enclosure::Hole> for Hole {
+    fn from(hole: crate::pipeline::enclosure::Hole) -> Self {
+        Self { width: hole.width, place_xyz: hole.place }
+    }
+}
+
+/// The rule that ends a time loop, and its limit.
+pub(super) fn stop_rule(stop: Stop) -> (&'static str, f64) {
+    match stop {
+        Stop::Surface(limit) => ("surface", limit),
+        Stop::L2(limit) => ("l2", limit),
+    }
 }
 
 fn zyx<T: Copy>([x, y, z]: [T; 3]) -> [T; 3] {
@@ -151,25 +171,22 @@ impl Grid {
 
 impl Solver {
     pub(super) fn new(settings: &SegmentSettings, geometry: &Geometry) -> Self {
-        let (stop, tol) = match settings.stop {
-            Stop::Surface(tol) => ("surface", tol),
-            Stop::L2(tol) => ("l2", tol),
-        };
+        let (stop, tol) = stop_rule(settings.motion.stop);
         Self {
             method: settings.method.name(),
-            theta: settings.theta,
-            rho: settings.rho,
-            delta: settings.delta_on(geometry),
+            theta: settings.motion.theta,
+            rho: settings.motion.rho,
+            delta: settings.motion.delta_on(geometry),
             k: settings.k,
             sigma: settings.sigma_on(geometry),
             beta: settings.beta,
-            tau: settings.tau_on(geometry),
-            epsilon: settings.epsilon_on(geometry),
-            omega: settings.omega,
+            tau: settings.motion.tau_on(geometry),
+            epsilon: settings.motion.epsilon_on(geometry),
+            omega: settings.motion.omega,
             stop,
             tol,
-            max_steps: settings.max_steps,
-            edge: if settings.normalised { "normalised" } else { "plain" },
+            max_steps: settings.motion.max_steps,
+            edge: if settings.motion.normalised { "normalised" } else { "plain" },
             caps: settings.caps,
             percentiles: settings.percentiles,
             overlap: match settings.overlap {
@@ -210,10 +227,10 @@ impl Object {
             closed: object.measures.is_closed(),
             components: object.measures.components,
             triangles: object.measures.triangles,
-            hausdorff: object.hausdorff.map(|h| Hausdorff { mean: h.mean, max: h.max }),
+            hausdorff: object.hausdorff.map(Into::into),
             cloud_points: object.cloud_points,
             beta: object.beta,
-            hole: object.hole.map(|hole| Hole { width: hole.width, place_xyz: hole.place }),
+            hole: object.hole.map(Into::into),
             band_voxels: object.band_voxels,
             time_steps: object.evolution.steps,
             sor_iterations: object.evolution.sor_iterations,

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::args::SegmentArgs;
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
-use super::files::copy_whole;
+use super::files::{export_mesh, mesh_format};
 use super::input::{Marks, crop_box, open_stack, read_marks};
 use super::report::{Found, Grid, Report, Settings, Solver, crop_xyz};
 use super::text::{bytes, duration, grouped, number, triple};
@@ -64,13 +64,14 @@ impl Job {
     pub(super) fn new(command: &'static str, names: Names, args: SegmentArgs, typed: &[String]) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
-        let settings = config::settings(&args.picture, &args.level_set, &args.distance, &args.resources)?;
-        let spacing = config::spacing(args.picture.image_spacing)?;
+        let settings = config::settings(&args)?;
+        let spacing = config::spacing("--image-spacing", args.picture.image_spacing)?;
         config::check_outputs(
             &args.output.output,
             &[&args.output.report, &args.output.mesh, &args.output.picture],
             args.output.overwrite,
         )?;
+        args.output.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = config::resources(&args.resources, args.output.store())?;
         let voice = match (args.output.quiet, args.output.verbose) {
             (true, _) => Voice::Quiet,
@@ -221,8 +222,7 @@ impl Job {
                 let several = outcome.objects.len() > 1;
                 let name = if several { format!("object-{}.ply", object.label) } else { "surface.ply".into() };
                 let target = if several { numbered(path, object.label) } else { path.clone() };
-                copy_whole(&folder.join("meshes").join(name), &target)
-                    .map_err(|error| Error::from_io("the mesh cannot be written", &error).at(&target))?;
+                export_mesh(&folder.join("meshes").join(name), &target)?;
             }
         }
         if let Some(path) = &output.picture {
@@ -281,15 +281,15 @@ impl Job {
             self.stack.element().name(),
             triple(g.spacing),
             triple(g.origin),
-            number(s.theta),
-            number(s.rho),
-            number(s.delta_on(g)),
+            number(s.motion.theta),
+            number(s.motion.rho),
+            number(s.motion.delta_on(g)),
             number(s.k),
             number(s.sigma_on(g)),
             s.beta.map_or("automatic".into(), number),
-            number(s.tau_on(g)),
-            number(s.epsilon_on(g)),
-            number(s.omega),
+            number(s.motion.tau_on(g)),
+            number(s.motion.epsilon_on(g)),
+            number(s.motion.omega),
             s.brick,
             self.resources.threads
         )

@@ -1,8 +1,8 @@
 //! `Comm`: what ranks say to each other. One rank is a case of many: [`SelfComm`] is all there is to say to oneself.
 //!
-//! Every rank runs the same program on its own bricks. All of them make the same calls in the same order: after each wave
-//! of bricks (neighbours on other ranks need the faces that changed), for each sum that decides something, and before a
-//! shared decision. Messages are bytes, little-endian, so that they may leave the process.
+//! Every rank runs the same program on its own bricks. All of them make the same calls in the same order: after each
+//! wave of bricks (neighbours on other ranks need the faces that changed), for each sum that decides something, and
+//! before a shared decision. Messages are bytes, little-endian, so that they may leave the process.
 
 use crate::error::Result;
 
@@ -52,8 +52,8 @@ pub trait Comm: Send + Sync {
         Ok(self.gather(vec![u8::from(value)])?.concat().contains(&1))
     }
 
-    /// The sum of all ranks' partial sums, given per cell in grid order and added in that order in f64: a rank's cells come
-    /// after those of the ranks before it, so the bits are those of one rank that has them all.
+    /// The sum of all ranks' partial sums, given per cell in grid order and added in that order in f64: a rank's cells
+    /// come after those of the ranks before it, so the bits are those of one rank that has them all.
     ///
     /// # Errors
     /// When another rank is gone.

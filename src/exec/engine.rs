@@ -278,7 +278,8 @@ impl<W: Send> Workers<W> {
         Self { idle: Mutex::default(), make: Box::new(make) }
     }
 
-    fn with<R>(&self, f: impl FnOnce(&mut W) -> R) -> R {
+    /// Lends out a set that is idle, or a new one.
+    pub fn with<R>(&self, f: impl FnOnce(&mut W) -> R) -> R {
         let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut worker = idle.unwrap_or_else(|| (self.make)());
         let result = f(&mut worker);

@@ -1,5 +1,5 @@
-//! `Exchange`: what neighbouring ranks tell each other between waves: the faces of bricks that the other's halos read, and
-//! the values that enter the other's bricks. It knows who reads what; [`Comm`] carries it.
+//! `Exchange`: what neighbouring ranks tell each other between waves: the faces of bricks that the other's halos read,
+//! and the values that enter the other's bricks. It knows who reads what; [`Comm`] carries it.
 //!
 //! ```text
 //! faces   | brick u64 | faces u8, a bit for each | edge^2 values for each of these |  brick ...
@@ -52,8 +52,8 @@ impl<'a> Exchange<'a> {
         Ok(Self { comm, set: set.clone(), peers, readers, ghosts })
     }
 
-    /// Tells the others the faces of this rank's `bricks`, and writes what they tell into the faces of ghosts. Returns those
-    /// ghosts. Bricks that nobody else reads, or that nothing was written to yet, are passed over.
+    /// Tells the others the faces of this rank's `bricks`, and writes what they tell into the faces of ghosts. Returns
+    /// those ghosts. Bricks that nobody else reads, or that nothing was written to yet, are passed over.
     ///
     /// # Errors
     /// When another rank is gone.
@@ -177,7 +177,8 @@ mod tests {
         (x + 40 * (y + 40 * z)) as f32
     }
 
-    /// What `tile` holds for each voxel of the brick and the ghosts that the plan fills is what the whole volume has there.
+    /// What `tile` holds for each voxel of the brick and the ghosts that the plan fills is what the whole volume has
+    /// there.
     fn assert_halo(tile: &HaloTile<f32>, valid: &Box3, shape: [i64; 3], reach: Reach) {
         for (y, z) in valid.grow(1).rows() {
             for x in valid.lo[0] - 1..=valid.hi[0] {

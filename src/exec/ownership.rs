@@ -1,7 +1,7 @@
 //! `Ownership`: which rank owns which brick.
 //!
-//! A rank owns a run of brick numbers. Numbers run along x, then y, then z, so a run is a slab of the domain with steps at
-//! its ends; and whatever is summed in grid order is summed rank by rank. Cuts could be moved to where shards of an
+//! A rank owns a run of brick numbers. Numbers run along x, then y, then z, so a run is a slab of the domain with steps
+//! at its ends; and whatever is summed in grid order is summed rank by rank. Cuts could be moved to where shards of an
 //! output end, so that each shard has one rank that writes it: all that follows asks [`Ownership::owner`] only.
 
 use std::ops::Range;
@@ -19,8 +19,8 @@ pub struct Ownership {
 }
 
 impl Ownership {
-    /// Gives each of so many ranks as many bricks of the set as any other, or one more; none to some where there are fewer
-    /// bricks than ranks.
+    /// Gives each of so many ranks as many bricks of the set as any other, or one more; none to some where there are
+    /// fewer bricks than ranks.
     #[must_use]
     pub fn balanced(set: &BrickSet, ranks: usize) -> Self {
         let cut = |rank: usize| set.ids().get(set.len() * rank / ranks).copied().unwrap_or(set.grid().len());

@@ -8,7 +8,8 @@ use super::thread_comm::ThreadComm;
 use crate::error::{Error, Result};
 
 impl Stage<'_> {
-    /// Runs `work` on each of the engine's ranks, and counts what they do as this stage's. Results are in order of ranks.
+    /// Runs `work` on each of the engine's ranks, and counts what they do as this stage's. Results are in order of
+    /// ranks.
     ///
     /// One rank is the engine itself. Of several, each has its share of the threads and its own files; they share the
     /// window, because they share the memory of one process. What a rank gets from others it gets through its
@@ -30,7 +31,8 @@ impl Stage<'_> {
                 let run = move || {
                     let comm: Arc<dyn Comm> = Arc::new(comm);
                     let done = run_rank(engine, &comm, work).map_err(fail).ok();
-                    // Only now do others learn that this rank is gone, so the first error is the one that ended the run.
+                    // Only now do others learn that this rank is gone, so the first error is the one that ended the
+                    // run.
                     drop(comm);
                     done
                 };

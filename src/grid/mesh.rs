@@ -2,8 +2,8 @@
 
 use crate::error::{Error, Result};
 
-/// The most sources that a distance field can tell apart: indices have 31 bits, of which the highest 257 mean none, or one
-/// that is not known yet.
+/// The most sources that a distance field can tell apart: indices have 31 bits, of which the highest 257 mean none, or
+/// one that is not known yet.
 pub const MOST_SOURCES: usize = (u32::MAX >> 1) as usize - 256;
 
 /// A triangle mesh in physical coordinates. A triangle's index is the source number that distance fields carry.
@@ -119,7 +119,8 @@ impl TriangleMesh {
     }
 
     /// For each vertex the lowest number of a vertex at the same place.
-    fn welded(&self) -> Vec<u32> {
+    #[must_use]
+    pub fn welded(&self) -> Vec<u32> {
         // Adding 0 makes one of the two zeros, which are equal but have different bits.
         let key = |v: u32| self.vertices[v as usize].map(|x| (x + 0.0).to_bits());
         let mut order: Vec<u32> = (0..self.vertices.len() as u32).collect();

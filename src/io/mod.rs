@@ -2,6 +2,7 @@
 
 mod input;
 mod mesh;
+pub mod mesh_export;
 pub mod mesh_ply;
 pub mod ome_zarr;
 mod ply;

@@ -54,13 +54,13 @@ pub trait Stack: PlaneSource {
 pub struct Format {
     /// What a stack of this format is called.
     pub name: &'static str,
-    /// How names of such files usually end, without the dot. What is of no format by its content, but ends so, is opened
-    /// as one: its reader says best what is wrong with it.
+    /// How names of such files usually end, without the dot. What is of no format by its content, but ends so, is
+    /// opened as one: its reader says best what is wrong with it.
     pub extensions: &'static [&'static str],
     /// Whether what lies at a path, which exists, is of this format by its content.
     pub sniff: fn(&Path) -> bool,
-    /// Opens one channel and time and reads what the file says of itself; no plane is decoded. Fails with an input error
-    /// that names the file and says what is wrong.
+    /// Opens one channel and time and reads what the file says of itself; no plane is decoded. Fails with an input
+    /// error that names the file and says what is wrong.
     pub open: fn(&Path, Select) -> Result<Box<dyn Stack>>,
 }
 

@@ -1,9 +1,9 @@
 //! The time loop of the level set over the cells of the band (algorithms: section 5, "Time loop"; section 10).
 //!
 //! A step assembles the scheme of each cell from the old values and relaxes it, from where the last two steps point to;
-//! cells of even and odd parity take turns, and those that needed corrections, or stand beside one that did, are taken up
-//! again until the corrections are small. A scheme is made again at each visit: most cells are visited once a step, and
-//! writing it to memory and reading it back would cost as much.
+//! cells of even and odd parity take turns, and those that needed corrections, or stand beside one that did, are taken
+//! up again until the corrections are small. A scheme is made again at each visit: most cells are visited once a step,
+//! and writing it to memory and reading it back would cost as much.
 
 use super::band::{Band, read_mask};
 use crate::error::Result;
@@ -38,8 +38,8 @@ pub struct TimeLoop {
     pub max_steps: u32,
     /// Over-relaxation.
     pub omega: f32,
-    /// A step is solved when no cell was left with corrections above this (root mean square), what those beside it passed
-    /// on since counted in.
+    /// A step is solved when no cell was left with corrections above this (root mean square), what those beside it
+    /// passed on since counted in.
     pub solver_tolerance: f64,
 }
 
@@ -268,8 +268,8 @@ impl Solver<'_> {
         Ok((Step { speed, l2 }, visited))
     }
 
-    /// True when the corrections that a cell was left with, and those for what moved beside it since, which is unknown to
-    /// it, may exceed the tolerance (root mean square).
+    /// True when the corrections that a cell was left with, and those for what moved beside it since, which is unknown
+    /// to it, may exceed the tolerance (root mean square).
     fn is_due(&self, visits: &[Visit], unknown: &[f64], slot: Slot) -> bool {
         let here = &visits[slot as usize];
         let corrections = here.left.sqrt() + GHOST_WEIGHT * unknown[slot as usize];

@@ -1,13 +1,18 @@
 //! What is solved, and in which order.
 
 pub mod band;
+mod cell_needs;
 pub mod distance;
+pub mod enclosure;
 pub mod evolve;
 pub mod image_terms;
 pub mod ingest;
 pub mod intensity;
 pub mod marks;
+pub mod motion;
 pub mod pyramid;
+pub mod reconstruct;
 pub mod segment;
 pub mod surface;
 pub mod tagging;
+pub mod vicinity;

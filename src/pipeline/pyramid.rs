@@ -1,4 +1,5 @@
-//! Writes a field as a multiscale image: level 0 shard by shard from its source, each coarser level from the one before.
+//! Writes a field as a multiscale image: level 0 shard by shard from its source, each coarser level from the one
+//! before.
 
 use std::sync::Arc;
 

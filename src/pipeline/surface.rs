@@ -1,15 +1,44 @@
 //! The surface u = 1/2 of a solved band as a mesh, with its measures: brick by brick, welded in grid order.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickId, Geometry};
-use crate::kernel::surface::{MarchingCubes, Measures, Patch, SurfaceMeasure, Triangle, Welder, cells_of_brick};
-use crate::store::{BoxSource, BrickArray, MeshSink};
+use crate::io::mesh_ply::PlyWriter;
+use crate::kernel::surface::{
+    Hausdorff, MarchingCubes, Measures, Patch, SurfaceMeasure, Triangle, Welder, cells_of_brick,
+};
+use crate::store::{BoxSource, BrickArray, MeshSink, NoMesh};
 
 /// Bricks whose patches are made in parallel before they are welded in order.
 const BATCH: usize = 256;
+
+/// Draws the closed surface of `u`, as a PLY file where `mesh` names one; measures it, and how far `points` lie from
+/// it.
+///
+/// # Errors
+/// When the file cannot be written or the run is interrupted.
+pub fn draw(
+    stage: &Stage<'_>,
+    u: &BrickArray<f32>,
+    geometry: &Geometry,
+    points: &[[f64; 3]],
+    mesh: Option<&Path>,
+) -> Result<(Measures, Option<Hausdorff>)> {
+    let measures = match mesh {
+        Some(path) => {
+            let mut mesh = PlyWriter::create(path, geometry.unit.as_deref())?;
+            let measures = extract(stage, u, geometry, &mut mesh)?;
+            mesh.finish()?;
+            measures
+        }
+        None => extract(stage, u, geometry, &mut NoMesh)?,
+    };
+    let distances = distances_to(stage, u, geometry, points)?;
+    Ok((measures, Hausdorff::of(distances.into_iter().flatten())))
+}
 
 /// Sends the closed surface of `u` to `sink` and measures it.
 ///
@@ -28,7 +57,8 @@ pub fn extract(
     let mut measure = SurfaceMeasure::new(centre);
     let shape = geometry.shape;
     let workers = Workers::new(move || (MarchingCubes::new(shape, 0.5), Vec::new()));
-    // A surface may pass between a brick that is not stored and the one above it, so the bricks below stored ones count.
+    // A surface may pass between a brick that is not stored and the one above it, so the bricks below stored ones
+    // count.
     let bricks: Vec<BrickId> = (0..grid.len()).filter(|&id| holds_surface(u, id)).collect();
     for batch in bricks.chunks(BATCH) {
         let patches = stage.run(batch, &workers, |(cubes, values), &id| {

@@ -36,14 +36,20 @@ pub struct Tagging {
     pub basins: Vec<Basin>,
 }
 
-/// Floods the grid from its border and finds the basins that persist.
+/// Floods the grid from its border and finds the basins that are so many times as deep as their saddle.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
-pub fn tag(stage: &Stage<'_>, engine: &Engine, sources: &Sources<'_>, distance: &BrickArray<f32>) -> Result<Tagging> {
+pub fn tag(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'_>,
+    distance: &BrickArray<f32>,
+    ratio: f32,
+) -> Result<Tagging> {
     let mut far = FarRegions::new(distance.set(), distance.absent(0));
     let level = flood_all(stage, engine, distance, &mut far)?;
-    let (mut basins, pieces) = find_basins(stage, engine, distance, &level, &far)?;
+    let (mut basins, pieces) = find_basins(stage, engine, [distance, &level], &far, ratio)?;
     locate_saddles(stage, sources, [distance, &level], &pieces, &mut basins)?;
     basins.sort_by(|a, b| b.depth.total_cmp(&a.depth).then(b.voxels.cmp(&a.voxels)));
     Ok(Tagging { level, basins })
@@ -169,9 +175,9 @@ fn wake_neighbours(set: &BrickSet, slot: Slot, level: &mut BrickArray<f32>, far:
 fn find_basins(
     stage: &Stage<'_>,
     engine: &Engine,
-    distance: &BrickArray<f32>,
-    level: &BrickArray<f32>,
+    [distance, level]: [&BrickArray<f32>; 2],
     far: &FarRegions,
+    ratio: f32,
 ) -> Result<(Vec<Basin>, Pieces)> {
     let set = distance.set();
     let labels: BrickArray<u16> = BrickArray::with_faces(engine.scratch(), set)?;
@@ -202,7 +208,7 @@ fn find_basins(
     }));
     let mut joins = Joins::new(pieces);
     join_bricks(&mut joins, &labels, &first, far, far_first);
-    let (whole, basin) = joins.persisting();
+    let (whole, basin) = joins.persisting(ratio);
     let found = |p: &Piece| Basin { voxels: p.voxels, depth: p.depth, saddle: p.saddle, place: [0; 3] };
     let far = (0..set.grid().len()).map(|id| far_first.wrapping_add(far.region[id as usize])).collect();
     Ok((whole.iter().map(found).collect(), Pieces { labels, first, far, basin }))

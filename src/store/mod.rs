@@ -1,4 +1,5 @@
-//! A field on disk: bricks in memory-mapped scratch files, and the traits by which boxes of voxels are read and written.
+//! A field on disk: bricks in memory-mapped scratch files, and the traits by which boxes of voxels are read and
+//! written.
 
 mod brick_array;
 mod element;

@@ -8,8 +8,8 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-/// Bytes that are dropped together. The system may map a whole huge page of its page cache at one fault, so segments are
-/// as large as those and aligned to them: else pages would become resident that nobody accounts for.
+/// Bytes that are dropped together. The system may map a whole huge page of its page cache at one fault, so segments
+/// are as large as those and aligned to them: else pages would become resident that nobody accounts for.
 pub(super) const SEGMENT_BYTES: usize = 2 << 20;
 
 const DROPPED: u8 = 0;

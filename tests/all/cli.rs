@@ -30,7 +30,7 @@ fn help_and_version_are_complete() {
     let bench = Bench::new(&Ball::small());
     assert_eq!(bench.succeed("-V"), format!("strandline {}\n", env!("CARGO_PKG_VERSION")));
     let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
-    for (command, at_least) in [("segment", 30), ("distance", 20)] {
+    for (command, at_least) in [("segment", 30), ("distance", 20), ("reconstruct", 17)] {
         let help = bench.succeed(&format!("help {command}"));
         let flags: Vec<&str> = help
             .lines()
@@ -48,7 +48,7 @@ fn help_and_version_are_complete() {
         }
         assert!(help.lines().all(|line| line.chars().count() <= 100));
     }
-    for command in ["segment", "distance", "demo", "info"] {
+    for command in ["segment", "distance", "reconstruct", "measure", "demo", "info"] {
         assert!(bench.succeed("help").contains(command) && readme.contains(&format!("\n| `{command}` |")), "{command}");
     }
 }

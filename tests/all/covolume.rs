@@ -1,5 +1,5 @@
-//! The assembled co-volume scheme against the formulas as printed (Kósa 2015, sec. 3.3; Kósa PhD, eq. 3.12-3.18), in f64,
-//! one voxel and 24 tetrahedra at a time; gradients also against fields whose gradient is known.
+//! The assembled co-volume scheme against the formulas as printed (Kósa 2015, sec. 3.3; Kósa PhD, eq. 3.12-3.18), in
+//! f64, one voxel and 24 tetrahedra at a time; gradients also against fields whose gradient is known.
 
 use strandline::kernel::image::edge_detector::edge_detector;
 use strandline::kernel::level_set::covolume::{Fields, Planes, Velocity, assemble, mean_gradient};

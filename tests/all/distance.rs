@@ -1,5 +1,5 @@
-//! Distance fields against the printed triple loops over the whole volume (Kósa & Mikula 2023, Alg. 1-3, 7), bit for bit,
-//! and against the exact distance to every point.
+//! Distance fields against the printed triple loops over the whole volume (Kósa & Mikula 2023, Alg. 1-3, 7), bit for
+//! bit, and against the exact distance to every point.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! Distances to real meshes against libigl, through `scripts/check_mesh_distance.py`: exact beside the surface, nearly so
-//! elsewhere, signs right.
+//! Distances to real meshes against libigl, through `scripts/check_mesh_distance.py`: exact beside the surface, nearly
+//! so elsewhere, signs right.
 
 #![allow(clippy::unwrap_used)]
 

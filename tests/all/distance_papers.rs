@@ -122,8 +122,9 @@ fn sponge_and_sphere_fix_the_printed_numbers_of_voxels() {
     }
 }
 
-/// Every voxel belongs to one of the two clouds: by the exact nearest point but for ties and for what Alg. 1 fixes where
-/// distances are Euclidean; where they solve the Eikonal equation to first order (Alg. 8), within a voxel of there.
+/// Every voxel belongs to one of the two clouds: by the exact nearest point but for ties and for what Alg. 1 fixes
+/// where distances are Euclidean; where they solve the Eikonal equation to first order (Alg. 8), within a voxel of
+/// there.
 #[test]
 fn sponge_and_sphere_share_all_voxels() {
     let lab = Lab::new(2);

@@ -1,5 +1,5 @@
-//! Sources of FSM. With `--schedule sweep` those of Alg. 7 (Kósa & Mikula 2023), bit for bit: on clouds in `distance`, on
-//! meshes here. With `front` they follow from the finished distances alone, whatever the layout.
+//! Sources of FSM. With `--schedule sweep` those of Alg. 7 (Kósa & Mikula 2023), bit for bit: on clouds in `distance`,
+//! on meshes here. With `front` they follow from the finished distances alone, whatever the layout.
 
 use std::collections::BTreeSet;
 
@@ -80,8 +80,8 @@ fn meshes_and_clouds_give_the_bits_of_the_triple_loop() {
     }
 }
 
-/// The values of a field are the same whether sources are wanted or not. With sources a sweep has more to do than to visit
-/// bricks in their turn: what lies in bricks whose turn is still to come is resolved afterwards.
+/// The values of a field are the same whether sources are wanted or not. With sources a sweep has more to do than to
+/// visit bricks in their turn: what lies in bricks whose turn is still to come is resolved afterwards.
 #[test]
 fn sources_change_no_distance() {
     let geometry = grid([45, 38, 41], [0.1, 0.13, 0.11]);
@@ -123,8 +123,8 @@ fn the_front_has_sources_along_its_distances() {
     }
 }
 
-/// In half precision 2048 + 1 is 2048: beyond, all distances are equal, and no neighbour is nearer than another. The lowest
-/// source that reaches such a voxel is its source.
+/// In half precision 2048 + 1 is 2048: beyond, all distances are equal, and no neighbour is nearer than another. The
+/// lowest source that reaches such a voxel is its source.
 #[test]
 fn no_voxel_stays_without_a_source_where_distances_are_lost_in_rounding() {
     let geometry = Geometry { shape: [5000, 2, 1], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
@@ -142,8 +142,8 @@ fn no_voxel_stays_without_a_source_where_distances_are_lost_in_rounding() {
     }
 }
 
-/// The share of voxels whose source is not the nearest one of those that fix voxels, and by how much it is farther at most,
-/// in spacings.
+/// The share of voxels whose source is not the nearest one of those that fix voxels, and by how much it is farther at
+/// most, in spacings.
 fn inexact(geometry: &Geometry, cloud: &[[f64; 3]], sources: &[Option<usize>]) -> (f64, f64) {
     let fixing: BTreeSet<usize> = textbook::fixing_sources(geometry, cloud).into_iter().flatten().collect();
     let tree = RTree::bulk_load(fixing.into_iter().map(|s| cloud[s]).collect());
@@ -158,9 +158,9 @@ fn inexact(geometry: &Geometry, cloud: &[[f64; 3]], sources: &[Option<usize>]) -
     (wrong as f64 / sources.len() as f64, most)
 }
 
-/// Sources are carried along steps to one of 26 neighbours, not along characteristics, so a voxel may get one that is near,
-/// not nearest: seldom in a cloud that fills the volume, for half of the voxels far from a dense surface. Both schedules
-/// alike; FMM, which takes the shortest way, does better.
+/// Sources are carried along steps to one of 26 neighbours, not along characteristics, so a voxel may get one that is
+/// near, not nearest: seldom in a cloud that fills the volume, for half of the voxels far from a dense surface. Both
+/// schedules alike; FMM, which takes the shortest way, does better.
 #[test]
 fn most_sources_are_the_nearest_ones() {
     let lab = Lab::new(2);

@@ -1,9 +1,9 @@
 //! The rooms of `docs/architecture.md`, as a table that fails the build.
 //!
 //! Reads every file under `src/` and takes the first segment after every `crate::`, braces opened, comments and string
-//! contents left out. A room may name itself and the rooms below it. Beside that each room has words that it may not use, and
-//! every file opens with a `//!` head and stays under [`LONGEST_FILE`] lines. It does not see what macros of other
-//! crates expand to. The unit cases below hold the checker to what it must catch.
+//! contents left out. A room may name itself and the rooms below it. Beside that each room has words that it may not
+//! use, and every file opens with a `//!` head and stays under [`LONGEST_FILE`] lines. It does not see what macros of
+//! other crates expand to. The unit cases below hold the checker to what it must catch.
 
 use std::fs;
 use std::path::{Path, PathBuf};

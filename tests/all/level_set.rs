@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 use strandline::grid::{BrickGrid, Geometry, PointBins};
 use strandline::kernel::level_set::CELL;
 use strandline::kernel::level_set::covolume::Velocity;
+use strandline::kernel::level_set::persistence::PERSISTENCE;
 use strandline::kernel::surface::{MarchingCubes, Measures, Patch, PatchIndex, SurfaceMeasure, Welder, cells_of_brick};
 use strandline::pipeline::band::{Reaches, make_band};
 use strandline::pipeline::distance::{Method, Sources, cloud_distance};
@@ -62,7 +63,7 @@ fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
     let stage = lab.engine.stage("sponge", 0);
     let distance =
         cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, f32::INFINITY).expect("room in scratch");
-    let tagging = tag(&stage, &lab.engine, &sources, &distance).expect("room in scratch");
+    let tagging = tag(&stage, &lab.engine, &sources, &distance, PERSISTENCE).expect("room in scratch");
     let reaches = Reaches { beta: 0.25, inner: 0.5, outer: 0.5 };
     let mut band = make_band(&stage, &lab.engine, &distance, &tagging.level, &reaches).expect("room in scratch");
     let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta))

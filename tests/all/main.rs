@@ -19,6 +19,8 @@ mod mesh_ply;
 mod mesh_sources;
 mod points;
 mod ranks;
+mod reconstruct;
+mod reconstruct_cli;
 mod surfaces;
 mod triangle_distance;
 mod wavefront;

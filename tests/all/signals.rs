@@ -38,8 +38,8 @@ fn every_stage_heeds_signals() {
         "write image",
     ];
     assert_eq!(stages, wanted);
-    // The line at which a stage ends is said right before the next one begins: that one is interrupted. Before the first
-    // one the settings are said; after the last one nothing is left but to put the output in its place.
+    // The line at which a stage ends is said right before the next one begins: that one is interrupted. Before the
+    // first one the settings are said; after the last one nothing is left but to put the output in its place.
     for (number, line) in lines.iter().enumerate().skip(lines.len() - 1 - stages.len()) {
         let (signal, code) = if number % 2 == 0 { ("INT", 130) } else { ("TERM", 143) };
         let mut run = Held::start(bench.command(RUN));

@@ -1,5 +1,5 @@
-//! The printed loops over a whole volume (Kósa & Mikula 2023, Alg. 1-3 and 7, errata of the descending loops), plain and in
-//! the printed order: nothing is shared with the program.
+//! The printed loops over a whole volume (Kósa & Mikula 2023, Alg. 1-3 and 7, errata of the descending loops), plain
+//! and in the printed order: nothing is shared with the program.
 //!
 //! Bits follow from the order of operations, so the arithmetic of one update is stated here as the program states it in
 //! its documentation: in f64, counted from the smallest neighbour, rounded once to the stored type.
@@ -119,9 +119,9 @@ fn upwind(near: [f64; 3], spacing: [f64; 3]) -> (f64, [usize; 3], [f64; 2]) {
     (near[i] + (mean_of_three + root) * (1.0 / three), axes, [one, near[i] + x])
 }
 
-/// Alg. 7, lines 8 to 20: what the neighbours' values make of a voxel, the offset that its source is taken from, and the
-/// offset of the smallest neighbour. Of two equal neighbours along an axis Alg. 7 names the upper one first. An axis enters
-/// when the solution without it is above its neighbour, both as they are stored.
+/// Alg. 7, lines 8 to 20: what the neighbours' values make of a voxel, the offset that its source is taken from, and
+/// the offset of the smallest neighbour. Of two equal neighbours along an axis Alg. 7 names the upper one first. An
+/// axis enters when the solution without it is above its neighbour, both as they are stored.
 fn update<P: Stored>(geometry: &Geometry, v: [i64; 3], value: impl Fn([i64; 3]) -> f64) -> (f64, [i64; 3], [i64; 3]) {
     let n = PlainGrid::around(v).map(value);
     let upper: [bool; 3] = std::array::from_fn(|a| n[2 * a + 1] <= n[2 * a]);
@@ -162,8 +162,8 @@ pub(crate) fn fsm_with_sources<P: Stored>(
     fsm_from(geometry, (d, fixing), iterations)
 }
 
-/// Alg. 7 from given fixed voxels, those that have a source: distances and sources, both updated in place; where the voxel
-/// at the sum of the offsets has no source yet, that of the smallest neighbour.
+/// Alg. 7 from given fixed voxels, those that have a source: distances and sources, both updated in place; where the
+/// voxel at the sum of the offsets has no source yet, that of the smallest neighbour.
 pub(crate) fn fsm_from<P: Stored>(
     geometry: &Geometry,
     (mut d, mut s): (Vec<P>, Vec<Option<usize>>),

@@ -54,10 +54,10 @@ impl ShardLayout {
     }
 }
 
-/// Compresses the chunks of one array: plain Zstandard for single bytes, bytes grouped by significance (blosc's shuffle)
-/// and Zstandard for wider types. Measured on noisy images, distances and labels, both at their first level: plain
-/// packs noisy 8-bit images by 1.43 against blosc's 1.30, shuffled noise of 16 bit by 2.0 against 1.6, distances by
-/// 1.34 against 1.15; higher levels cost two to five times the time for a few per cent.
+/// Compresses the chunks of one array: plain Zstandard for single bytes, bytes grouped by significance (blosc's
+/// shuffle) and Zstandard for wider types. Measured on noisy images, distances and labels, both at their first level:
+/// plain packs noisy 8-bit images by 1.43 against blosc's 1.30, shuffled noise of 16 bit by 2.0 against 1.6, distances
+/// by 1.34 against 1.15; higher levels cost two to five times the time for a few per cent.
 #[derive(Clone, Debug)]
 pub(super) struct ChunkCodec {
     compressor: Arc<dyn BytesToBytesCodecTraits>,

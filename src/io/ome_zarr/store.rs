@@ -43,8 +43,8 @@ impl ImageWriter {
 }
 
 impl StoreWriter {
-    /// Begins the store that is to lie at `path`. With `overwrite` a store that is there already is replaced, at the end.
-    /// What killed runs left in the making of the same store is removed.
+    /// Begins the store that is to lie at `path`. With `overwrite` a store that is there already is replaced, at the
+    /// end. What killed runs left in the making of the same store is removed.
     ///
     /// # Errors
     /// `Usage` when something is at `path` that may not be replaced, or the folder it is to lie in does not exist; `Failed`

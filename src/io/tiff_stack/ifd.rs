@@ -1,4 +1,5 @@
-//! The container: header, chain of page directories (IFDs) and tag values (TIFF 6.0 section 2, BigTIFF), read with pread.
+//! The container: header, chain of page directories (IFDs) and tag values (TIFF 6.0 section 2, BigTIFF), read with
+//! pread.
 //!
 //! The `tiff` crate walks the chain once per decoder and buffers what it meets; here a page is found again from its
 //! offset alone, so that any number of threads share one open file, and declared counts never decide an allocation.

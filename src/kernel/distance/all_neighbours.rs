@@ -1,4 +1,5 @@
-//! VDT that looks at the sources of all 26 neighbours (Danielsson 1980; the papers went from 26 to 6: Kósa & Mikula 2023).
+//! VDT that looks at the sources of all 26 neighbours (Danielsson 1980; the papers went from 26 to 6: Kósa & Mikula
+//! 2023).
 //!
 //! State, distances and ties are those of `vector_distance`; of equally near sources the first counts, z slowest. Rows
 //! of a tile are swept one voxel after the other: what is beside a voxel across an edge may be ahead of it or behind,
@@ -71,8 +72,8 @@ impl<S: TrackedSource> AllNeighbours<S> {
         best.0
     }
 
-    /// The axes along which a voxel of the tile that was passed before is nearer to the source at place `at` than to its
-    /// own: of a neighbour's offset the slowest axis decides whether it was.
+    /// The axes along which a voxel of the tile that was passed before is nearer to the source at place `at` than to
+    /// its own: of a neighbour's offset the slowest axis decides whether it was.
     fn carried_back(
         &self,
         state: &[u32],

@@ -50,7 +50,8 @@ impl<A: Real> Buckets<A> {
         }
     }
 
-    /// Takes the places of the first bucket that has any; they may come back into the same one. False when all is empty.
+    /// Takes the places of the first bucket that has any; they may come back into the same one. False when all is
+    /// empty.
     pub(crate) fn take(&mut self, places: &mut Vec<u32>) -> bool {
         places.clear();
         while let Some(list) = self.lists.get_mut(self.turn) {

@@ -5,10 +5,10 @@
 //! tile, from ghosts and fixed voxels, is marched through it in order of value: all voxels of a bucket hand their
 //! values on together (a group, Kim 2001, doi:10.1137/S1064827500367130), so that the neighbours to be updated can be
 //! taken by whole vectors and each only once. Where a group was not causal a voxel falls again: the march ends when
-//! none can, in the fixed point of the update, which FSM swept to convergence has too, but for rounding. For f32 fields,
-//! computed in f32, that is within 8 units in the last place of the textbook's heap (`marching_heap`, f64) with equal
-//! spacing, and within 64 with spacings of 6 : 1, over random clouds (tests: `wavefront`). In and out: a
-//! grown tile of distances (physical units, infinity where nothing is known), the sign bit set on fixed voxels. Halo 1,
+//! none can, in the fixed point of the update, which FSM swept to convergence has too, but for rounding. For f32
+//! fields, computed in f32, that is within 8 units in the last place of the textbook's heap (`marching_heap`, f64) with
+//! equal spacing, and within 64 with spacings of 6 : 1, over random clouds (tests: `wavefront`). In and out: a grown
+//! tile of distances (physical units, infinity where nothing is known), the sign bit set on fixed voxels. Halo 1,
 //! faces. Scratch: about 12 bytes a voxel. Each voxel costs about two updates, whatever the shape of the front.
 
 use super::buckets::Buckets;

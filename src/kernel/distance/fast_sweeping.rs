@@ -36,7 +36,8 @@ trait Record {
     /// Whether voxels of a diagonal are taken in the order of the sweep too.
     const ORDERED: bool;
 
-    /// Those of a vector whose bits are 1 in `falls` fell, from those beside them; `more` axes entered beside the first.
+    /// Those of a vector whose bits are 1 in `falls` fell, from those beside them; `more` axes entered beside the
+    /// first.
     fn fell<L: Real, const N: usize>(
         &mut self,
         falls: &[u32; N],
@@ -228,8 +229,8 @@ impl<P: Precision, A: Real> FastSweeping<P, A> {
         changed
     }
 
-    /// As [`OrderedSweeps::sweep`]; `fell` becomes the voxels that fell, those whose sources others take before these, as
-    /// in the triple loop.
+    /// As [`OrderedSweeps::sweep`]; `fell` becomes the voxels that fell, those whose sources others take before these,
+    /// as in the triple loop.
     pub fn sweep_telling(
         &self,
         tile: &mut HaloTile<P>,

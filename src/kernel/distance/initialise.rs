@@ -22,7 +22,8 @@ impl Cube {
     /// The corners of the point's cell (Alg. 1).
     pub const CELL: Self = Self { margin: [0; 3], snaps: false };
 
-    /// So many voxels larger on every side, along each axis; a point on a grid point counts as one in the cell above it.
+    /// So many voxels larger on every side, along each axis; a point on a grid point counts as one in the cell above
+    /// it.
     #[must_use]
     pub fn grown(self, voxels: [i64; 3]) -> Self {
         if voxels == [0; 3] {

@@ -12,8 +12,8 @@ pub trait Parents: Clone + Send + Sync + 'static {
     /// The rule for tiles of `edge`^3 voxels of a grid.
     fn new(geometry: &Geometry, edge: usize) -> Self;
 
-    /// Looks at the rows of a grown tile of distances, halo 1, all 26 directions, that start at these places; sign bit on
-    /// fixed voxels.
+    /// Looks at the rows of a grown tile of distances, halo 1, all 26 directions, that start at these places; sign bit
+    /// on fixed voxels.
     fn look<P: Precision>(&mut self, _distance: &HaloTile<P>, _rows: &[usize]) {}
 
     /// The place of the parent of the voxel at a place of that tile.
@@ -26,8 +26,8 @@ fn step([x, y, z]: [i64; 3], edge: usize) -> isize {
     (z as isize * pitch + y as isize) * pitch + x as isize
 }
 
-/// FMM (Kósa & Mikula 2023, Alg. 8): when a voxel freezes, the frozen one of its 26 neighbours with the smallest sum of its
-/// distance and the way to it. Voxels freeze in order of distance, of equal ones in order of their places.
+/// FMM (Kósa & Mikula 2023, Alg. 8): when a voxel freezes, the frozen one of its 26 neighbours with the smallest sum of
+/// its distance and the way to it. Voxels freeze in order of distance, of equal ones in order of their places.
 #[derive(Clone, Debug)]
 pub struct ShortestWay {
     /// Steps to the 26 neighbours in the buffer, and their lengths.
@@ -58,8 +58,8 @@ impl Parents for ShortestWay {
     }
 }
 
-/// FSM (Kósa & Mikula 2023, Alg. 7, on finished distances): the voxel at the sum of the offsets of those neighbours that
-/// enter the update, where its distance is smaller; else the first of these neighbours.
+/// FSM (Kósa & Mikula 2023, Alg. 7, on finished distances): the voxel at the sum of the offsets of those neighbours
+/// that enter the update, where its distance is smaller; else the first of these neighbours.
 #[derive(Clone, Debug)]
 pub struct UpwindSum {
     axes: Axes<f64>,

@@ -2,14 +2,13 @@
 //!
 //! Sources travel from neighbour to neighbour, so a source is lost on a voxel at the tip of its Voronoi cell where the
 //! tip is thinner than a voxel (Danielsson 1980): no neighbour has it to offer. Voxels two steps away do. Where that
-//! can be is seen from distances alone. A source at distance e from a voxel is at squared distances that sum to
-//! 2 e^2 + 2 h^2 from the two neighbours on an axis, neither of which is farther from its own source: so where a pair of
+//! can be is seen from distances alone. A source at distance e from a voxel is at squared distances that sum to 2 e^2 +
+//! 2 h^2 from the two neighbours on an axis, neither of which is farther from its own source: so where a pair of
 //! neighbours has more than 2 (d - t)^2 + 2 h^2, no source is nearer than d - t. On the faces of Voronoi cells a pair
 //! along the face has it. The pair may have lost sources itself, at a ridge along the axis; so a second pair must not
 //! fall off either: its sum must be more than 2 (d - k)^2. What is left are the edges and corners where cells meet, few
-//! voxels of all.
-//! In: source indices, [`NO_SOURCE`] where none is known, halo 2 on all 26 sides; out: source indices. Ties keep the
-//! source that was there; of equally near others the first in `[z][y][x]` order is taken.
+//! voxels of all. In: source indices, [`NO_SOURCE`] where none is known, halo 2 on all 26 sides; out: source indices.
+//! Ties keep the source that was there; of equally near others the first in `[z][y][x]` order is taken.
 
 use super::initialise::NO_SOURCE;
 use super::precision::Real;
@@ -18,134 +17,180 @@ use crate::grid::{Box3, Geometry};
 
 /// How far around a voxel others are asked.
 pub const MARGIN: i64 = 2;
+/// How much farther sources must be carried than they count, in voxels: those that may come to count, and what they ask.
+pub const REACH: i64 = MARGIN + 1;
 /// How much nearer a source may be without being looked for, t above, in the smallest spacing.
 const TOLERANCE: f64 = 0.05;
 /// By how much a second pair of neighbours may fall off, k above, in the smallest spacing.
 const RIDGE: f64 = 0.02;
 
-/// Looks again at the voxels of `part`: `found` are the sources of `known`, dense `[z][y][x]`, which is `part` with
-/// [`MARGIN`] voxels more on every side as far as the grid goes; `out`, dense over `part`, gets the nearer ones.
-pub fn look_again<S: TrackedSource>(
-    sources: &S,
-    geometry: &Geometry,
-    known: &Box3,
-    found: &[u32],
-    part: &Box3,
-    out: &mut [u32],
-) {
-    let squared = Squared::new(sources, known, found, part);
-    let width = part.shape()[0] as usize;
-    let mut bent = vec![0; width];
-    for ((y, z), out) in part.rows().zip(out.chunks_exact_mut(width)) {
-        out.copy_from_slice(&found[known.offset_of([part.lo[0], y, z])..][..width]);
-        squared.bends(geometry, [y, z], &mut bent);
-        for (x, out) in (part.lo[0]..).zip(out).zip(&bent).filter_map(|(voxel, &bent)| (bent != 0).then_some(voxel)) {
-            *out = nearest(sources, known, found, [x, y, z], *out);
+/// The voxels that are looked at, and what is known of them and of those around.
+#[derive(Clone, Copy, Debug)]
+pub struct Look<'a> {
+    /// The grid.
+    pub geometry: &'a Geometry,
+    /// The voxels that are looked at.
+    pub part: &'a Box3,
+    /// `part` with [`MARGIN`] voxels more on every side, as far as the grid goes.
+    pub known: &'a Box3,
+    /// The sources of `known`, dense `[z][y][x]`.
+    pub found: &'a [u32],
+    /// The farthest distance that counts: voxels a spacing beyond are not looked at. Sources were carried [`REACH`]
+    /// voxels farther.
+    pub farthest: f64,
+}
+
+/// What a look ends with, dense `[z][y][x]` over its part.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// The nearer sources.
+    pub sources: Vec<u32>,
+    /// The squared distances to them; infinite where none is known.
+    pub squared: Vec<f64>,
+    /// Squared distances of the part and of the voxels one step beyond, rounded.
+    grown: Vec<f32>,
+    /// Voxels of a row where something may have been lost.
+    bent: Vec<u32>,
+}
+
+impl Seen {
+    /// Looks again at all voxels of a part.
+    pub fn look<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
+        let Look { geometry, part, .. } = *look;
+        self.measure(sources, look);
+        let [width, height, _] = part.shape().map(|n| n as usize);
+        let limit = (look.farthest + geometry.max_spacing()).powi(2);
+        for (plane, z) in (part.lo[2]..part.hi[2]).enumerate() {
+            self.bends(geometry, part, z);
+            let bent = std::mem::take(&mut self.bent);
+            for (n, _) in bent.iter().enumerate().filter(|(_, bent)| **bent != 0) {
+                let at = plane * width * height + n;
+                if self.squared[at] < limit {
+                    let voxel = [part.lo[0] + (n % width) as i64, part.lo[1] + (n / width) as i64, z];
+                    let kept = (self.sources[at], self.squared[at]);
+                    (self.sources[at], self.squared[at]) = nearest(sources, look, voxel, kept);
+                }
+            }
+            self.bent = bent;
         }
+    }
+
+    /// Fills in the sources as they are, and how far they are.
+    fn measure<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
+        let Look { part, known, found, .. } = *look;
+        let grown = part.grow(1);
+        self.sources.resize(part.len(), NO_SOURCE);
+        self.squared.resize(part.len(), f64::INFINITY);
+        self.grown.clear();
+        self.grown.resize(grown.len(), f32::INFINITY);
+        let within = grown.intersect(known);
+        let (width, own) = (within.shape()[0] as usize, part.shape()[0] as usize);
+        let first = (part.lo[0] - within.lo[0]) as usize;
+        let mut row = vec![0.0; width];
+        for (y, z) in within.rows() {
+            let found = &found[known.offset_of([within.lo[0], y, z])..][..width];
+            sources.squared_row(found, [within.lo[0], y, z], &mut row);
+            let grown = &mut self.grown[grown.offset_of([within.lo[0], y, z])..][..width];
+            grown.iter_mut().zip(&row).for_each(|(rounded, squared)| *rounded = *squared as f32);
+            if (part.lo[1]..part.hi[1]).contains(&y) && (part.lo[2]..part.hi[2]).contains(&z) {
+                let at = part.offset_of([part.lo[0], y, z]);
+                self.sources[at..][..own].copy_from_slice(&found[first..][..own]);
+                self.squared[at..][..own].copy_from_slice(&row[first..][..own]);
+            }
+        }
+    }
+
+    /// Says for each voxel of a plane of the part whether a nearer source may have been lost.
+    fn bends(&mut self, geometry: &Geometry, part: &Box3, z: i64) {
+        let grown = part.grow(1);
+        let [width, height, _] = part.shape().map(|n| n as usize);
+        self.bent.resize(width * height, 0);
+        pulp::Arch::new().dispatch(Bends {
+            squared: &self.grown,
+            first: grown.offset_of([part.lo[0], part.lo[1], z]),
+            strides: [1, width + 2, (width + 2) * (height + 2)],
+            apart: geometry.spacing.map(|h| (2.0 * h * h) as f32),
+            tolerance: [TOLERANCE, RIDGE].map(|t| (t * geometry.min_spacing()) as f32),
+            width,
+            bent: &mut self.bent,
+        });
     }
 }
 
-/// Where voxels lie, as distances are computed from.
-fn place<S: TrackedSource>(sources: &S, voxel: [i64; 3]) -> [S::Number; 3] {
-    std::array::from_fn(|a| sources.coordinate(a, voxel[a]))
-}
-
-/// The nearest of the sources around a voxel, whose own is `kept`.
-fn nearest<S: TrackedSource>(sources: &S, known: &Box3, found: &[u32], voxel: [i64; 3], kept: u32) -> u32 {
-    let here = place(sources, voxel);
-    let (mut best, mut least) = (kept, sources.squared(here, kept));
-    let mut asked = kept;
-    let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(known);
+/// The nearest of the sources around a voxel, which has the one that is `kept`, and its squared distance.
+fn nearest<S: TrackedSource>(sources: &S, look: &Look<'_>, voxel: [i64; 3], kept: (u32, f64)) -> (u32, f64) {
+    let (mut best, mut asked) = (kept, kept.0);
+    let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(look.known);
     let width = around.shape()[0] as usize;
     for (y, z) in around.rows() {
-        for &source in &found[known.offset_of([around.lo[0], y, z])..][..width] {
+        for &source in &look.found[look.known.offset_of([around.lo[0], y, z])..][..width] {
             if source == asked || source == NO_SOURCE {
                 continue;
             }
             asked = source;
-            let squared = sources.squared(here, source);
-            if squared < least {
-                (best, least) = (source, squared);
+            let squared = sources.distance_squared(source, voxel);
+            if squared < best.1 {
+                best = (source, squared);
             }
         }
     }
     best
 }
 
-/// Squared distances of a box of voxels and of those one step beyond; infinite where nothing is known.
-struct Squared<A> {
-    grown: Box3,
-    values: Vec<A>,
-}
-
-impl<A: Real> Squared<A> {
-    fn new<S: TrackedSource<Number = A>>(sources: &S, known: &Box3, found: &[u32], part: &Box3) -> Self {
-        let grown = part.grow(1);
-        let mut values = vec![A::INFINITY; grown.len()];
-        let within = grown.intersect(known);
-        let width = within.shape()[0] as usize;
-        for (y, z) in within.rows() {
-            let row = &mut values[grown.offset_of([within.lo[0], y, z])..][..width];
-            let found = &found[known.offset_of([within.lo[0], y, z])..][..width];
-            for ((x, squared), &source) in (within.lo[0]..).zip(row).zip(found) {
-                *squared = sources.squared(place(sources, [x, y, z]), source);
-            }
-        }
-        Self { grown, values }
-    }
-
-    /// Says for each voxel of a row whether a nearer source may have been lost.
-    fn bends(&self, geometry: &Geometry, [y, z]: [i64; 2], bent: &mut [u32]) {
-        let [nx, ny, _] = self.grown.shape().map(|n| n as usize);
-        let at = self.grown.offset_of([self.grown.lo[0] + 1, y, z]);
-        let strides = [1, nx, nx * ny];
-        let row = |at: usize| &self.values[at..][..bent.len()];
-        pulp::Arch::new().dispatch(Bends {
-            here: row(at),
-            beside: strides.map(|stride| [row(at - stride), row(at + stride)]),
-            apart: geometry.spacing.map(|h| A::of(2.0 * h * h)),
-            tolerance: [TOLERANCE, RIDGE].map(|t| A::of(t * geometry.min_spacing())),
-            bent,
-        });
-    }
-}
-
-/// A row of squared distances and those beside it, compared for each vector unit.
-struct Bends<'a, A> {
-    here: &'a [A],
-    beside: [[&'a [A]; 2]; 3],
-    apart: [A; 3],
+/// A plane of squared distances and those beside it, compared for each vector unit.
+struct Bends<'a> {
+    squared: &'a [f32],
+    /// Where the plane's first voxel lies, and how far its neighbours along each axis are from it.
+    first: usize,
+    strides: [usize; 3],
+    apart: [f32; 3],
     /// t and k.
-    tolerance: [A; 2],
+    tolerance: [f32; 2],
+    width: usize,
     bent: &'a mut [u32],
 }
 
-impl<A: Real> pulp::NullaryFnOnce for Bends<'_, A> {
+impl pulp::NullaryFnOnce for Bends<'_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Self { here, beside: [x, y, z], apart, tolerance, bent } = self;
-        let count = bent.len();
-        let [here, xl, xu, yl, yu, zl, zu] = [here, x[0], x[1], y[0], y[1], z[0], z[1]].map(|row| &row[..count]);
-        let zero = A::default();
-        let pair = |lower: A, upper: A| {
-            let sum = lower + upper;
-            if sum < A::INFINITY { sum } else { zero }
-        };
-        for i in 0..count {
-            let [a, b, c] = [pair(xl[i], xu[i]), pair(yl[i], yu[i]), pair(zl[i], zu[i])];
-            let straight = (a - apart[0]).larger(b - apart[1]).larger(c - apart[2]);
-            let second = a.smaller(b).larger(a.larger(b).smaller(c));
-            let distance = here[i].root();
-            let [kept, even] = tolerance.map(|t| {
-                let nearer = (distance - t).larger(zero);
-                nearer * nearer + nearer * nearer
-            });
-            // Without branches, so that lanes stay together.
-            let unsure = u32::from(straight <= kept) | u32::from(second <= even);
-            bent[i] = unsure & u32::from(here[i] < A::INFINITY) & u32::from(kept > zero);
+        let Self { squared, first, strides, apart, tolerance, width, bent } = self;
+        for (y, bent) in bent.chunks_exact_mut(width).enumerate() {
+            let at = first + y * strides[1];
+            let row = |at: usize| &squared[at..][..width];
+            let beside = strides.map(|stride| [row(at - stride), row(at + stride)]);
+            bends_of_row(row(at), beside, apart, tolerance, bent);
         }
+    }
+}
+
+#[inline(always)]
+fn bends_of_row(
+    here: &[f32],
+    [[xl, xu], [yl, yu], [zl, zu]]: [[&[f32]; 2]; 3],
+    apart: [f32; 3],
+    tolerance: [f32; 2],
+    bent: &mut [u32],
+) {
+    let count = bent.len();
+    let [here, xl, xu, yl, yu, zl, zu] = [here, xl, xu, yl, yu, zl, zu].map(|row| &row[..count]);
+    let pair = |lower: f32, upper: f32| {
+        let sum = lower + upper;
+        if sum < f32::INFINITY { sum } else { 0.0 }
+    };
+    for i in 0..count {
+        let [a, b, c] = [pair(xl[i], xu[i]), pair(yl[i], yu[i]), pair(zl[i], zu[i])];
+        let straight = (a - apart[0]).larger(b - apart[1]).larger(c - apart[2]);
+        let second = a.smaller(b).larger(a.larger(b).smaller(c));
+        let distance = here[i].root();
+        let [kept, even] = tolerance.map(|t| {
+            let nearer = (distance - t).larger(0.0);
+            nearer * nearer + nearer * nearer
+        });
+        // Without branches, so that lanes stay together.
+        let unsure = u32::from(straight <= kept) | u32::from(second <= even);
+        bent[i] = unsure & u32::from(here[i] < f32::INFINITY) & u32::from(kept > 0.0);
     }
 }
 
@@ -153,6 +198,7 @@ impl<A: Real> pulp::NullaryFnOnce for Bends<'_, A> {
 mod tests {
     use super::*;
     use crate::grid::FACES;
+    use crate::kernel::distance::method::DistanceMethod;
     use crate::kernel::distance::vector_distance::VectorDistance;
 
     const EDGE: i64 = 14;
@@ -178,6 +224,12 @@ mod tests {
         part.rows().flat_map(move |(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]))
     }
 
+    fn looked(method: &VectorDistance<'_, f32>, geometry: &Geometry, known: &Box3, found: &[u32], part: &Box3) -> Seen {
+        let mut seen = Seen::default();
+        seen.look(method, &Look { geometry, part, known, found, farthest: f64::INFINITY });
+        seen
+    }
+
     /// The nearest points of a voxel, the very nearest first.
     fn ranked(cloud: &[[f64; 3]], voxel: [i64; 3]) -> Vec<(f64, u32)> {
         let here = geometry().position(voxel);
@@ -190,11 +242,10 @@ mod tests {
     #[test]
     fn a_lost_source_is_found_two_steps_away() {
         let (grid, cloud) = (geometry(), cloud());
-        let (method, all) = (VectorDistance::<f64>::new(&grid, &cloud), grid.domain());
+        let (method, all) = (VectorDistance::<f32>::new(&grid, &cloud), grid.domain());
+        let look = |found: &[u32]| looked(&method, &grid, &all, found, &all);
         let exact: Vec<u32> = voxels(all).map(|v| ranked(&cloud, v)[0].1).collect();
-        let mut out = exact.clone();
-        look_again(&method, &grid, &all, &exact, &all, &mut out);
-        assert_eq!(out, exact, "an exact field stays as it is");
+        assert_eq!(look(&exact).sources, exact, "an exact field stays as it is");
         let mut lost = 0;
         for v in voxels(all.grow(-2)) {
             let nearest = ranked(&cloud, v);
@@ -206,8 +257,7 @@ mod tests {
             }
             let mut found = exact.clone();
             found[all.offset_of(v)] = nearest[1].1;
-            look_again(&method, &grid, &all, &found, &all, &mut out);
-            assert_eq!(out, exact, "{v:?}");
+            assert_eq!(look(&found).sources, exact, "{v:?}");
             lost += 1;
         }
         assert!(lost > 0, "the cloud has no thin tips");
@@ -221,18 +271,19 @@ mod tests {
         let rank = |n: i64| usize::from(n % 7 == 0);
         let known = |n: i64, s: u32| if n % 31 == 0 { NO_SOURCE } else { s };
         let found: Vec<u32> = voxels(all).zip(0..).map(|(v, n)| known(n, ranked(&cloud, v)[rank(n)].1)).collect();
-        let mut whole = found.clone();
-        look_again(&method, &grid, &all, &found, &all, &mut whole);
+        let whole = looked(&method, &grid, &all, &found, &all).sources;
         assert!(whole.iter().zip(&found).any(|(a, b)| a != b));
         for part in
             [Box3::new([0, 3, 5], [7, 4, 14]), Box3::new([6, 6, 6], [7, 7, 7]), Box3::new([9, 0, 2], [14, 14, 9])]
         {
             let known = part.grow(MARGIN).intersect(&all);
             let around: Vec<u32> = voxels(known).map(|v| found[all.offset_of(v)]).collect();
-            let mut out = vec![NO_SOURCE; part.len()];
-            look_again(&method, &grid, &known, &around, &part, &mut out);
+            let seen = looked(&method, &grid, &known, &around, &part);
             let expected: Vec<u32> = voxels(part).map(|v| whole[all.offset_of(v)]).collect();
-            assert_eq!(out, expected, "{part:?}");
+            assert_eq!(seen.sources, expected, "{part:?}");
+            for ((v, &source), &squared) in voxels(part).zip(&seen.sources).zip(&seen.squared) {
+                assert_eq!(squared.sqrt(), method.distance(source, v), "{v:?}");
+            }
         }
     }
 }

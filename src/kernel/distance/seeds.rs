@@ -1,8 +1,8 @@
 //! The sources that fix the voxels of one brick, or that these are told of, and the states that follow from them
 //! (Kósa & Mikula 2023, Alg. 1; algorithms: section 2).
 //!
-//! Arrays are dense `[z][y][x]` over a brick. Of what fixes a voxel and what it is told of it starts from the nearer; of
-//! equal distances from the lower index.
+//! Arrays are dense `[z][y][x]` over a brick. Of what fixes a voxel and what it is told of it starts from the nearer;
+//! of equal distances from the lower index.
 
 use super::initialise::NO_SOURCE;
 use super::method::DistanceMethod;
@@ -39,7 +39,8 @@ impl Seeds {
     }
 }
 
-/// The states of voxels that are `fixed`, and of others that are `told` of a source (which may have no voxels: none is).
+/// The states of voxels that are `fixed`, and of others that are `told` of a source (which may have no voxels: none
+/// is).
 pub fn write_states<M: DistanceMethod>(fixed: &Seeds, told: &Seeds, out: &mut [M::State]) {
     for (at, out) in out.iter_mut().enumerate() {
         let nearest = |seeds: &Seeds| (seeds.squared[at], seeds.source[at]);

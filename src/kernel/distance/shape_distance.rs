@@ -43,6 +43,11 @@ impl<'a> ShapeDistance<'a> {
         triangle.map_or(f64::INFINITY, |triangle| triangle.distance_squared(here))
     }
 
+    /// The squared distance of a voxel to a source; infinite to none.
+    pub(super) fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {
+        self.squared(self.geometry.position(voxel), source)
+    }
+
     /// The nearest of the kept source and of those beside that were not asked yet.
     fn nearest(&self, state: &[u32], asked: &mut Asked, at: usize, strides: [usize; 3], here: [f64; 3]) -> u32 {
         let due = std::mem::take(&mut asked.due[at]);
@@ -124,8 +129,8 @@ impl<'a> ShapeDistance<'a> {
 pub struct Asked {
     /// Squared distances to the kept sources; NaN where nobody asked yet.
     squared: Vec<f64>,
-    /// The sides, a bit each, whose sources changed since a voxel asked them. Its own only comes nearer: whoever was not
-    /// nearer before need not be asked again.
+    /// The sides, a bit each, whose sources changed since a voxel asked them. Its own only comes nearer: whoever was
+    /// not nearer before need not be asked again.
     due: Vec<u8>,
 }
 
@@ -193,7 +198,7 @@ impl DistanceMethod for ShapeDistance<'_> {
     }
 
     fn distance(&self, state: u32, voxel: [i64; 3]) -> f64 {
-        self.squared(self.geometry.position(voxel), state).sqrt()
+        self.distance_squared(state, voxel).sqrt()
     }
 
     fn source(state: u32) -> Option<u32> {

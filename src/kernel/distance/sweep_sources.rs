@@ -1,11 +1,13 @@
-//! Sources of the voxels that fell in a sweep of FSM (Kósa & Mikula 2023, Alg. 7; algorithms: section 4), brick by brick.
+//! Sources of the voxels that fell in a sweep of FSM (Kósa & Mikula 2023, Alg. 7; algorithms: section 4), brick by
+//! brick.
 //!
 //! In the triple loop a voxel copies the source of one of 26 neighbours, as it is at that moment: its new one where the
 //! neighbour comes before it in the order of the loop, else the one it had before the sweep. Tiles are swept in another
 //! order, in which a neighbour that comes before may lie in a tile whose turn is still to come: (+1, -1, 0) in a sweep
-//! upward. Such a voxel is left *pending*, and so is one that copies from it; they are resolved when all tiles were swept.
-//! In: the voxels that fell, in an order that puts those first that come first for their neighbours in the same tile; the
-//! sources of a brick, `[z][y][x]`; ghosts as they are now and as they were before the sweep. Out: the brick's sources.
+//! upward. Such a voxel is left *pending*, and so is one that copies from it; they are resolved when all tiles were
+//! swept. In: the voxels that fell, in an order that puts those first that come first for their neighbours in the same
+//! tile; the sources of a brick, `[z][y][x]`; ghosts as they are now and as they were before the sweep. Out: the
+//! brick's sources.
 
 use super::diagonals::MOST_LANES;
 use super::initialise::NO_SOURCE;
@@ -17,8 +19,8 @@ use crate::tile::HaloTile;
 /// Voxels that fell in a sweep, of a run along a diagonal of their tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fell {
-    /// Where the first of the run lies in the tile, from 0. From one to the next x falls by 1, and y rises or, in sweeps of
-    /// opposite directions along x and y, falls by 1.
+    /// Where the first of the run lies in the tile, from 0. From one to the next x falls by 1, and y rises or, in
+    /// sweeps of opposite directions along x and y, falls by 1.
     pub(crate) first: [i16; 3],
     /// Bit n that the n-th of the run fell.
     pub(crate) which: u16,
@@ -122,8 +124,8 @@ impl SweepSources {
         (0..3).map(|a| if self.upward[a] { offset[a] } else { -offset[a] }).sum::<i64>() < 0
     }
 
-    /// Gives the voxels that fell in a brick with room for `edge`^3, `valid` of them in the domain, their sources. Ghosts
-    /// now are known in tiles upwind. Returns whether any voxel is left pending.
+    /// Gives the voxels that fell in a brick with room for `edge`^3, `valid` of them in the domain, their sources.
+    /// Ghosts now are known in tiles upwind. Returns whether any voxel is left pending.
     pub fn take(&self, fell: &[Fell], brick: &mut [u32], edge: usize, valid: [usize; 3], ghosts: &Ghosts) -> bool {
         let around = Around { brick, edge, valid, ghosts, all: false };
         let step = |way: &Way| {

@@ -1,13 +1,13 @@
-//! Sources for finished distances, tile by tile: each voxel has a *parent* (`parents`), and its source is the one of the
-//! fixed voxel at the end of the chain of parents.
+//! Sources for finished distances, tile by tile: each voxel has a *parent* (`parents`), and its source is the one of
+//! the fixed voxel at the end of the chain of parents.
 //!
-//! Here chains are followed inside a tile, to voxels and ghosts whose source is known. In: grown tiles of distances (sign
-//! bit on fixed voxels) and of source states. Out: the states. Halo 1, all 26 directions. Scratch: a few bytes a voxel.
-//! What is found does not depend on the order in which tiles come.
+//! Here chains are followed inside a tile, to voxels and ghosts whose source is known. In: grown tiles of distances
+//! (sign bit on fixed voxels) and of source states. Out: the states. Halo 1, all 26 directions. Scratch: a few bytes a
+//! voxel. What is found does not depend on the order in which tiles come.
 //!
-//! Where distances are so large that a step is lost in rounding, neighbours are equal, and a voxel may have no parent. Such
-//! voxels, and those whose chains lead to them, are *filled* in the end: among the sources that reach one through such
-//! voxels, on a way on which distances never fall, it gets the lowest.
+//! Where distances are so large that a step is lost in rounding, neighbours are equal, and a voxel may have no parent.
+//! Such voxels, and those whose chains lead to them, are *filled* in the end: among the sources that reach one through
+//! such voxels, on a way on which distances never fall, it gets the lowest.
 
 use super::initialise::NO_SOURCE;
 use super::parents::Parents;
@@ -36,8 +36,8 @@ impl<R: Parents> Tracer<R> {
         Self { parents: R::new(geometry, edge), rows: Vec::new(), followed, chain: Vec::new() }
     }
 
-    /// Gives voxels their sources where the chain ends at a known one. Returns whether any got one, and whether any that
-    /// has a distance is left without.
+    /// Gives voxels their sources where the chain ends at a known one. Returns whether any got one, and whether any
+    /// that has a distance is left without.
     pub fn trace<P: Precision>(&mut self, distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> (bool, bool) {
         let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
         let rows = (1..=nz).flat_map(|z| (1..=ny).map(move |y| (z * pitch + y) * pitch + 1));
@@ -99,8 +99,8 @@ fn lacks(states: &[u32]) -> bool {
 }
 
 /// Fills voxels that tracing left without a source, as far as that is known in this tile. While it goes on their states
-/// carry the bit of fixed voxels, whose distances have a sign: they may still fall. Returns whether any state changed, and
-/// whether the tile has such voxels.
+/// carry the bit of fixed voxels, whose distances have a sign: they may still fall. Returns whether any state changed,
+/// and whether the tile has such voxels.
 pub fn fill<P: Precision>(distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> (bool, bool) {
     let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
     let values = distance.data();

@@ -1,5 +1,5 @@
-//! What the methods that track sources share: how far a voxel is from one, in which arithmetic, and which source a state
-//! names. A method that carries sources in another order than VDT's is written once for points and for triangles.
+//! What the methods that track sources share: how far a voxel is from one, in which arithmetic, and which source a
+//! state names. A method that carries sources in another order than VDT's is written once for points and for triangles.
 
 use super::initialise::NO_SOURCE;
 use super::method::DistanceMethod;
@@ -17,6 +17,17 @@ pub trait TrackedSource: DistanceMethod<State = u32> {
 
     /// The squared distance of a place to the source of a state; infinite to none.
     fn squared(&self, here: [Self::Number; 3], state: u32) -> Self::Number;
+
+    /// The squared distance of a voxel to a source, physical units, in f64: of which [`DistanceMethod::distance`] is the
+    /// root.
+    fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64;
+
+    /// Those of a row of voxels along x, the first at `start`, each to its own source.
+    fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
+        for ((x, out), &source) in (start[0]..).zip(out).zip(sources) {
+            *out = self.distance_squared(source, [x, start[1], start[2]]);
+        }
+    }
 }
 
 /// The source of a state, [`NO_SOURCE`] where it has none.
@@ -42,6 +53,14 @@ impl<A: Real> TrackedSource for VectorDistance<'_, A> {
     fn squared(&self, here: [A; 3], state: u32) -> A {
         squared(here, self.point(state))
     }
+
+    fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {
+        self.distance_squared(source, voxel)
+    }
+
+    fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
+        self.squared_row(sources, start, out);
+    }
 }
 
 impl TrackedSource for ShapeDistance<'_> {
@@ -53,5 +72,9 @@ impl TrackedSource for ShapeDistance<'_> {
 
     fn squared(&self, here: [f64; 3], state: u32) -> f64 {
         self.squared(here, state)
+    }
+
+    fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {
+        self.distance_squared(source, voxel)
     }
 }

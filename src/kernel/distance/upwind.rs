@@ -1,13 +1,14 @@
-//! The upwind (Godunov) solution of `|grad d| = 1` at a voxel (algorithms: section 3), and which neighbours it is made of,
-//! which says where the voxel's source comes from (Kósa & Mikula 2023, Alg. 7, lines 8 to 20; algorithms: section 4).
+//! The upwind (Godunov) solution of `|grad d| = 1` at a voxel (algorithms: section 3), and which neighbours it is made
+//! of, which says where the voxel's source comes from (Kósa & Mikula 2023, Alg. 7, lines 8 to 20; algorithms: section
+//! 4).
 //!
-//! With `a_s` the smaller neighbour along axis s, the solution is the x with `sum (((x - a_s)^+) / h_s)^2 = 1`, taken with
-//! one, two, then three axes in order of a. Of two equal neighbours along an axis the upper one counts, which Alg. 7 names
-//! first; of equal axes x comes before y before z, as its sorting leaves them. An axis counts as entered when the solution
-//! without it, rounded as it would be stored, is above its neighbour (lines 15 and 18): rounding must not let in one that
-//! is just as far, or symmetric sources would get unequal shares. The source is the one of the voxel at the sum of the
-//! offsets of the neighbours that entered; where that voxel has none (the paper is silent there), the one of the first,
-//! smallest, of these neighbours.
+//! With `a_s` the smaller neighbour along axis s, the solution is the x with `sum (((x - a_s)^+) / h_s)^2 = 1`, taken
+//! with one, two, then three axes in order of a. Of two equal neighbours along an axis the upper one counts, which Alg.
+//! 7 names first; of equal axes x comes before y before z, as its sorting leaves them. An axis counts as entered when
+//! the solution without it, rounded as it would be stored, is above its neighbour (lines 15 and 18): rounding must not
+//! let in one that is just as far, or symmetric sources would get unequal shares. The source is the one of the voxel at
+//! the sum of the offsets of the neighbours that entered; where that voxel has none (the paper is silent there), the
+//! one of the first, smallest, of these neighbours.
 
 use super::precision::{Precision, Real};
 
@@ -108,14 +109,14 @@ pub(crate) fn godunov<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>)
     solve::<A, ISOTROPIC>(near, k).value
 }
 
-/// The neighbours that entered a voxel's upwind solution: bit a that the upper one along axis a counts, bit 3 + a that axis
-/// a entered, from bit 6 on the axis that was first.
+/// The neighbours that entered a voxel's upwind solution: bit a that the upper one along axis a counts, bit 3 + a that
+/// axis a entered, from bit 6 on the axis that was first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Upwind(pub(crate) u8);
 
 impl Upwind {
-    /// For neighbours in the order -x, +x, -y, +y, -z, +z, when so many axes entered beside the first. Without branches:
-    /// bits of whole lanes.
+    /// For neighbours in the order -x, +x, -y, +y, -z, +z, when so many axes entered beside the first. Without
+    /// branches: bits of whole lanes.
     #[inline(always)]
     pub(crate) fn new<L: Real>([xl, xu, yl, yu, zl, zu]: [L; 6], more: u32) -> Self {
         let is = u32::from;

@@ -41,6 +41,35 @@ impl<'a, A: Real> VectorDistance<'a, A> {
         A::of(if A::KEEPS_WORLD { self.geometry.origin[axis] + step } else { step })
     }
 
+    /// The squared distance of a voxel to the source of a state, in f64; infinite to none.
+    #[inline]
+    pub(super) fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
+        let position = self.positions.get((state & !FIXED) as usize);
+        position.map_or(f64::INFINITY, |&p| squared_distance(self.geometry.position(voxel), p))
+    }
+
+    /// Those of a row of voxels along x, the first at `start`, each to its own source; the same bits.
+    pub(super) fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
+        // Looked up first and computed afterwards: lookups come one by one, sums a vector at a time.
+        const AT_A_TIME: usize = 16;
+        let [_, y, z] = self.geometry.position(start);
+        let chunks = sources.chunks(AT_A_TIME).zip(out.chunks_mut(AT_A_TIME));
+        for (n, (sources, out)) in chunks.enumerate() {
+            let mut from = [[f64::INFINITY; AT_A_TIME]; 3];
+            let mut here = [0.0; AT_A_TIME];
+            for (i, &source) in sources.iter().enumerate() {
+                if let Some(p) = self.positions.get((source & !FIXED) as usize) {
+                    (from[0][i], from[1][i], from[2][i]) = (p[0], p[1], p[2]);
+                }
+                here[i] = self.geometry.position([start[0] + (n * AT_A_TIME + i) as i64, 0, 0])[0];
+            }
+            for (i, out) in out.iter_mut().enumerate() {
+                let (dx, dy, dz) = (here[i] - from[0][i], y - from[1][i], z - from[2][i]);
+                *out = dx * dx + dy * dy + dz * dz;
+            }
+        }
+    }
+
     pub(super) fn point(&self, state: u32) -> [A; 3] {
         self.points.get((state & !FIXED) as usize).copied().unwrap_or([A::INFINITY; 3])
     }
@@ -312,8 +341,7 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
     }
 
     fn distance(&self, state: u32, voxel: [i64; 3]) -> f64 {
-        let position = self.positions.get((state & !FIXED) as usize);
-        position.map_or(f64::INFINITY, |&p| squared_distance(self.geometry.position(voxel), p).sqrt())
+        self.distance_squared(state, voxel).sqrt()
     }
 
     fn source(state: u32) -> Option<u32> {

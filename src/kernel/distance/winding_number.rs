@@ -2,11 +2,11 @@
 //! by a hierarchy with the dipole approximation (Barill, Dickson, Schmidt, Levin & Jacobson 2018,
 //! doi:10.1145/3197517.3201337).
 //!
-//! w(q) is the sum over triangles of the signed solid angle under which q sees them, over 4 pi (van Oosterom &
-//! Strackee 1983). For a closed outward mesh it is 1 inside and 0 outside, and falls off smoothly across the holes of an
-//! open one; w > 1/2 is the usual rule for inside. Triangles far away, as a group, act like dipoles about their middle:
-//! with p their area-weighted centre, r = p - q, n the normal, d = x - p, and integrals over the group
-//! N = int n, C = int d (x) n, Q(r) = int (d . r)^2 (n . r), V = int |d|^2 n + 2 (d . n) d, to the second order
+//! w(q) is the sum over triangles of the signed solid angle under which q sees them, over 4 pi (van Oosterom & Strackee
+//! 1983). For a closed outward mesh it is 1 inside and 0 outside, and falls off smoothly across the holes of an open
+//! one; w > 1/2 is the usual rule for inside. Triangles far away, as a group, act like dipoles about their middle: with
+//! p their area-weighted centre, r = p - q, n the normal, d = x - p, and integrals over the group N = int n, C = int d
+//! (x) n, Q(r) = int (d . r)^2 (n . r), V = int |d|^2 n + 2 (d . n) d, to the second order
 //!
 //! ```text
 //! 4 pi w ~ (N . r + trace C) / |r|^3 - (3 r^T C r + 3/2 V . r) / |r|^5 + 15/2 Q(r) / |r|^7
@@ -212,7 +212,8 @@ fn longest_axis(members: &[Member]) -> usize {
 }
 
 /// The signed solid angle under which a point sees a triangle (van Oosterom & Strackee 1983,
-/// doi:10.1109/TBME.1983.325207), positive from behind: from where its corners turn clockwise. 0 in the triangle's plane.
+/// doi:10.1109/TBME.1983.325207), positive from behind: from where its corners turn clockwise. 0 in the triangle's
+/// plane.
 #[must_use]
 pub fn solid_angle(corners: [[f64; 3]; 3], point: [f64; 3]) -> f64 {
     let [a, b, c] = corners.map(|corner| sub(corner, point));

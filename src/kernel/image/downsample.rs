@@ -1,7 +1,7 @@
 //! One step of a resolution pyramid: blocks of voxels become one voxel, by mean (intensities) or by mode (labels).
 //!
-//! Output voxel `i` covers the source voxels `i * factor .. (i + 1) * factor`; at the far end of an axis whose extent is
-//! no multiple of the factor it covers those that exist. Blocks know nothing of each other, so a pyramid may be made
+//! Output voxel `i` covers the source voxels `i * factor .. (i + 1) * factor`; at the far end of an axis whose extent
+//! is no multiple of the factor it covers those that exist. Blocks know nothing of each other, so a pyramid may be made
 //! box by box with the same bits as in one piece, as long as every box starts on a multiple of the factors.
 
 use crate::grid::Box3;
@@ -50,8 +50,8 @@ pub fn mean<T: Element>(source: &[T], source_shape: [i64; 3], factors: [i64; 3],
 
 /// The most frequent value of every block of `factors` voxels.
 ///
-/// Among equally frequent values the background (zero) gives way, and of the others the smallest is taken: so a structure
-/// one voxel thin does not vanish at the first step, and the result depends on no order.
+/// Among equally frequent values the background (zero) gives way, and of the others the smallest is taken: so a
+/// structure one voxel thin does not vanish at the first step, and the result depends on no order.
 ///
 /// # Panics
 /// When a slice's length does not fit its shape, or a factor is not positive.

@@ -1,8 +1,8 @@
 //! Pictures of slices: a grey image in a window of intensities, the outlines of labels drawn over it in colour.
 //!
 //! Between pixels grey values are interpolated linearly. A point belongs to the label with the largest share of the
-//! pixels around it, weighted by a Gaussian: outlines are smooth curves close to the labels' edges. Objects too thin for
-//! that keep the edges of their pixels, so that nothing is smoothed away.
+//! pixels around it, weighted by a Gaussian: outlines are smooth curves close to the labels' edges. Objects too thin
+//! for that keep the edges of their pixels, so that nothing is smoothed away.
 
 use std::collections::BTreeMap;
 
@@ -54,7 +54,8 @@ pub fn percentile_window(values: &[f32], low: f64, high: f64) -> [f32; 2] {
     if white > black { [black, white] } else { [black, black + 1.0] }
 }
 
-/// Draws a slice with `scale` pixels to a slice's pixel along its rows; `window` are the intensities of black and white.
+/// Draws a slice with `scale` pixels to a slice's pixel along its rows; `window` are the intensities of black and
+/// white.
 ///
 /// # Panics
 /// When the slices do not fit their size, the size is zero, or scale or aspect is not positive.

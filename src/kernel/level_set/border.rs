@@ -1,4 +1,5 @@
-//! The six outermost layers of a cell, and how far they moved while it was relaxed: what its neighbours do not know yet.
+//! The six outermost layers of a cell, and how far they moved while it was relaxed: what its neighbours do not know
+//! yet.
 
 use super::{CELL, GROWN};
 use crate::grid::{FACES, Face};

@@ -4,17 +4,18 @@
 //! c_pq = tau / h_s^2 * ( max(theta (d_q - d_p) + r_p (g_q - g_p), 0) + delta / 4 * M_p * S_pq )
 //! ```
 //!
-//! for all voxels and faces of the plane's rows, solved or not, open or not: as in `gradients`, everything runs along flat
-//! planes at the grown cell's pitch, and what lies between the rows is computed and not read. `scheme` picks out of it.
-//! In: grown cells of d and g, planes of norms. Out: seven planes. Cost: about 60 operations and two roots per voxel.
+//! for all voxels and faces of the plane's rows, solved or not, open or not: as in `gradients`, everything runs along
+//! flat planes at the grown cell's pitch, and what lies between the rows is computed and not read. `scheme` picks out
+//! of it. In: grown cells of d and g, planes of norms. Out: seven planes. Cost: about 60 operations and two roots per
+//! voxel.
 
 use super::covolume::{Fields, Velocity};
 use super::gradients::{FaceNorms, Metric, whole_vectors};
 use super::mask::CellMask;
 use super::{CELL, FLAT, GROWN, PLANE};
 
-/// What one plane of voxels gets, row y from `y * GROWN` on: the coefficients towards the neighbours across -x, +x, -y, +y,
-/// -z, +z, then `M_p`. One array, not seven: nothing else can overlap it, which the vectoriser has to know.
+/// What one plane of voxels gets, row y from `y * GROWN` on: the coefficients towards the neighbours across -x, +x, -y,
+/// +y, -z, +z, then `M_p`. One array, not seven: nothing else can overlap it, which the vectoriser has to know.
 pub(crate) type Coefficients = [[f32; FLAT]; 7];
 /// Room for them.
 pub(crate) const NO_COEFFICIENTS: Coefficients = [[0.0; FLAT]; 7];
@@ -48,8 +49,8 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// Of the faces of `len` voxels from place `start` of a plane on: `x`, `y`, `z` are the planes of their lower faces and
-    /// `upper` the one of the upper z-faces.
+    /// Of the faces of `len` voxels from place `start` of a plane on: `x`, `y`, `z` are the planes of their lower faces
+    /// and `upper` the one of the upper z-faces.
     #[inline(always)]
     fn faces([x, y, z, upper]: [&'a [f32]; 4], start: usize, len: usize) -> Self {
         Self {

@@ -8,9 +8,9 @@
 //! r_p  = rho / |grad g_p|_eps   (rho where the edge term is not normalised)
 //! ```
 //!
-//! which is the printed scheme with `A_q / m = 1 / h_s` and the velocity written out. The solver gets it divided by
-//! the diagonal, `u_p = old_p + sum w_pq (u_q - old_p)` with `w = c / (1 + sum c)`: an average of `u_q` and `old_p`, so
-//! the maximum principle is plain to see. Voxels outside of the band have w = 0 and keep their value; faces on the domain's
+//! which is the printed scheme with `A_q / m = 1 / h_s` and the velocity written out. The solver gets it divided by the
+//! diagonal, `u_p = old_p + sum w_pq (u_q - old_p)` with `w = c / (1 + sum c)`: an average of `u_q` and `old_p`, so the
+//! maximum principle is plain to see. Voxels outside of the band have w = 0 and keep their value; faces on the domain's
 //! border have c = 0.
 //!
 //! In: grown cells of u, d, g (f32; d in physical units, g in 0..1). Halo 1, all 26 directions for u. Work buffers:

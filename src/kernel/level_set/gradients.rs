@@ -37,7 +37,8 @@ pub(crate) struct Metric {
 /// Rows of a plane that hold voxels or their upper vertices, as a flat length.
 const VERTICES: usize = (CELL + 1) * GROWN;
 
-/// The length of a flat piece made up to whole vectors, so that no remainder runs value by value. All planes reach so far.
+/// The length of a flat piece made up to whole vectors, so that no remainder runs value by value. All planes reach so
+/// far.
 #[inline(always)]
 pub(crate) fn whole_vectors(len: usize) -> usize {
     len.next_multiple_of(CELL)
@@ -107,7 +108,8 @@ fn tetrahedron(across: f32, z1: f32, z2: f32, mean: f32, inverse_edge: f32, inve
     across + along * along + inward * inward
 }
 
-/// Norms of the lower faces across `AXIS` of voxel plane `k`: place n holds the face between a voxel and the one below it.
+/// Norms of the lower faces across `AXIS` of voxel plane `k`: place n holds the face between a voxel and the one below
+/// it.
 ///
 /// Of y-faces the upper ones of the last row come with them; for z, `k == CELL` gives the upper ones of the last plane.
 /// `vertices` are the planes of vertices on both sides along z; for z-faces the plane itself, and again from its next

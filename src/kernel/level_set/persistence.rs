@@ -37,10 +37,10 @@ impl Joins {
         labels.iter().filter(|label| **label != 0).for_each(|&label| self.union(first + u32::from(label) - 1, piece));
     }
 
-    /// Adds up what was joined and keeps the basins that persist, in order of their roots; tells for each piece which of
-    /// them it is part of.
+    /// Adds up what was joined and keeps the basins so many times as deep as their saddle, in order of their roots; tells for each piece which
+    /// of them it is part of.
     #[must_use]
-    pub fn persisting(mut self) -> (Vec<Piece>, Vec<Option<u32>>) {
+    pub fn persisting(mut self, ratio: f32) -> (Vec<Piece>, Vec<Option<u32>>) {
         let roots: Vec<u32> = (0..self.parent.len() as u32).map(|n| self.root(n)).collect();
         let mut whole = self.pieces.clone();
         for (n, &root) in roots.iter().enumerate().filter(|(n, root)| *n as u32 != **root) {
@@ -50,7 +50,7 @@ impl Joins {
         }
         let (mut basins, mut names) = (Vec::new(), vec![None; whole.len()]);
         for (n, piece) in whole.iter().enumerate().filter(|(n, _)| roots[*n] == *n as u32) {
-            if piece.depth > 0.0 && piece.depth >= PERSISTENCE * piece.saddle {
+            if piece.depth > 0.0 && piece.depth >= ratio * piece.saddle {
                 names[n] = Some(basins.len() as u32);
                 basins.push(*piece);
             }
@@ -89,7 +89,7 @@ mod tests {
         let mut joins = Joins::new(pieces);
         joins.across([&[0, 1, 2, 1], &[1, 2, 1, 0]], [0, 2]);
         joins.beyond(&[0, 0, 2], 2, 4);
-        let (basins, names) = joins.persisting();
+        let (basins, names) = joins.persisting(PERSISTENCE);
         assert_eq!(basins, [piece(71, 2.5, 1.0)], "1.2 over 0.9 is noise");
         assert_eq!(names, [Some(0), None, None, Some(0), Some(0)]);
     }
@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn depth_twice_the_saddle_persists_and_no_depth_never_does() {
         let joins = Joins::new(vec![piece(1, 1.99, 1.0), piece(1, 2.0, 1.0), piece(9, 0.0, 0.0), piece(1, 1.0, 0.0)]);
-        let (basins, names) = joins.persisting();
+        let (basins, names) = joins.persisting(PERSISTENCE);
         assert_eq!(basins, [piece(1, 2.0, 1.0), piece(1, 1.0, 0.0)]);
         assert_eq!(names, [None, Some(0), None, Some(1)]);
     }

@@ -32,8 +32,8 @@ pub(crate) fn half_start(colour: usize, y: usize, z: usize) -> usize {
     ((z * 2 + colour) * CELL + y) * HALF_LEN
 }
 
-/// Writes the given rows of plane z, whose terms lie flat, row y from `y * GROWN` on: even and odd voxels go where their
-/// halves of the row are.
+/// Writes the given rows of plane z, whose terms lie flat, row y from `y * GROWN` on: even and odd voxels go where
+/// their halves of the row are.
 #[inline(always)]
 pub(crate) fn write_plane(scheme: &mut [f32], z: usize, rows: [usize; 2], terms: &[[f32; FLAT]; SCHEME_LAYERS]) {
     for y in rows[0]..rows[1] {

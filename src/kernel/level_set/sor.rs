@@ -1,7 +1,8 @@
-//! Red-black successive over-relaxation of `u_p = u_p_old + sum w_pq (u_q - u_p_old)` inside one cell (Kósa 2015, sec. 3.5).
+//! Red-black successive over-relaxation of `u_p = u_p_old + sum w_pq (u_q - u_p_old)` inside one cell (Kósa 2015, sec.
+//! 3.5).
 //!
-//! Written in differences, which are exact where they are small: a constant stays to the last bit however long the step,
-//! where weights that sum to one but for their rounding would pull it away.
+//! Written in differences, which are exact where they are small: a constant stays to the last bit however long the
+//! step, where weights that sum to one but for their rounding would pull it away.
 //!
 //! A cell is relaxed a few times with its ghosts held, then handed back; cells of even and odd parity take turns, so
 //! that two cells of one turn share no face. Cells are fixed on the grid, so neither bricks nor threads nor ranks

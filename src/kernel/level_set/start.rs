@@ -1,8 +1,8 @@
 //! The start of the time loop on one brick (algorithms: section 5, "Initial condition", "Narrow band").
 //!
-//! u = 0 where the flood reaches at threshold beta, 1 elsewhere. Solved are the voxels within `inner` of the cloud on the
-//! inside and within `outer` on the outside; all others keep their start value. Comparisons alone, voxel by voxel, so the
-//! result does not depend on how the volume is divided. No halo, no work buffers.
+//! u = 0 where the flood reaches at threshold beta, 1 elsewhere. Solved are the voxels within `inner` of the cloud on
+//! the inside and within `outer` on the outside; all others keep their start value. Comparisons alone, voxel by voxel,
+//! so the result does not depend on how the volume is divided. No halo, no work buffers.
 //!
 //! Bricks are dense `[z][y][x]` with row length and plane height `edge`; `valid` voxels along each axis are inside the
 //! domain. `d` is the distance to the cloud, `b` the flood's level; both f32, physical lengths.

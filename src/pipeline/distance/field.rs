@@ -82,21 +82,25 @@ pub(super) struct Values<M: DistanceMethod> {
     pub(super) method: M,
     pub(super) state: BrickArray<M::State>,
     pub(super) farthest: f64,
+    /// Kept from one read to the next: fresh memory would cost more than what is computed in it.
+    pub(super) buffers: Workers<Vec<M::State>>,
 }
 
 impl<M: DistanceMethod> Values<M> {
     /// Reads the state of a box and hands each voxel on, with its place in the box.
     fn each(&self, part: &Box3, mut f: impl FnMut(usize, M::State, [i64; 3])) -> Result<()> {
-        let mut states = vec![M::UNKNOWN; part.len()];
-        self.state.read_box(part, &mut states)?;
-        let mut at = 0;
-        for (y, z) in part.rows() {
-            for x in part.lo[0]..part.hi[0] {
-                f(at, states[at], [x, y, z]);
-                at += 1;
+        self.buffers.with(|states| {
+            states.resize(part.len().max(states.len()), M::UNKNOWN);
+            self.state.read_box(part, &mut states[..part.len()])?;
+            let mut at = 0;
+            for (y, z) in part.rows() {
+                for x in part.lo[0]..part.hi[0] {
+                    f(at, states[at], [x, y, z]);
+                    at += 1;
+                }
             }
-        }
-        Ok(())
+            Ok(())
+        })
     }
 }
 

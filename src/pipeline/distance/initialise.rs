@@ -30,8 +30,8 @@ fn told_margin(spacing: [f64; 3]) -> [i64; 3] {
 pub(super) enum Start {
     /// Only fixed voxels know of a source, as the textbook has it.
     Fixed,
-    /// Where a method keeps sources, voxels beside them too; and of all these points a fixed voxel has the nearest, also
-    /// one that does not fix it.
+    /// Where a method keeps sources, voxels beside them too; and of all these points a fixed voxel has the nearest,
+    /// also one that does not fix it.
     Told,
 }
 

@@ -17,7 +17,8 @@ pub struct Needs {
 
 /// Bytes of a voxel of the tiles of one thread: the tile, its layout along diagonals (twice as long), coordinates.
 const TILE_BYTES: u64 = 48;
-/// Bytes of a voxel of one thread where sources are found beside distances: tiles of both, chains, or ghosts and what fell.
+/// Bytes of a voxel of one thread where sources are found beside distances: tiles of both, chains, or ghosts and what
+/// fell.
 const TRACE_BYTES: u64 = 24;
 /// Bytes of a voxel while sources are entered: distance and source of those that fix it, and of those it is told of.
 const SEED_BYTES: u64 = 24;

@@ -1,4 +1,5 @@
-//! Writes a solved distance: the distance itself, the label of the nearest data set, the position of the nearest source.
+//! Writes a solved distance: the distance itself, the label of the nearest data set, the position of the nearest
+//! source.
 
 use super::{DistanceSettings, Solved};
 use crate::error::Result;

@@ -1,5 +1,5 @@
-//! A distance solved by the ranks of a run, each on its own bricks, and read as one field: whoever reads a brick reads it
-//! from the rank that owns it.
+//! A distance solved by the ranks of a run, each on its own bricks, and read as one field: whoever reads a brick reads
+//! it from the rank that owns it.
 
 use std::sync::Arc;
 
@@ -11,8 +11,9 @@ use crate::grid::{Box3, BrickGrid, BrickSet};
 use crate::kernel::distance::precision::Precision;
 use crate::store::{BoxSource, Element};
 
-/// Computes the distance to `sources` on the bricks of `set`, by a schedule; on all ranks of the stage's engine, of which
-/// the first alone keeps the one heap of a method that has one. Distances and sources do not depend on how many these are.
+/// Computes the distance to `sources` on the bricks of `set`, by a schedule; on all ranks of the stage's engine, of
+/// which the first alone keeps the one heap of a method that has one. Distances and sources do not depend on how many
+/// these are.
 ///
 /// # Errors
 /// When scratch runs out, the run is interrupted, or a rank ends early.

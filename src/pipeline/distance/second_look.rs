@@ -6,10 +6,11 @@ use std::sync::Arc;
 
 use super::{Options, Solved, Sources};
 use crate::error::Result;
+use crate::exec::Workers;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::precision::Precision;
-use crate::kernel::distance::second_look::{MARGIN, look_again};
+use crate::kernel::distance::second_look::{Look, MARGIN, Seen};
 use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::tracked::TrackedSource;
 use crate::kernel::distance::vector_distance::VectorDistance;
@@ -34,7 +35,8 @@ fn join<'a, P: Precision, S: TrackedSource + 'a>(
     method: S,
     options: Options,
 ) -> Solved<'a, P> {
-    let seen = Arc::new(SecondLook { method, geometry, found: solved.sources, farthest: options.farthest });
+    let buffers = Workers::new(Default::default);
+    let seen = Arc::new(SecondLook { method, geometry, found: solved.sources, farthest: options.farthest, buffers });
     Solved { values: seen.clone(), sources: seen, ..solved }
 }
 
@@ -44,6 +46,24 @@ struct SecondLook<'a, S> {
     geometry: &'a Geometry,
     found: Arc<dyn BoxSource<u32> + Send + 'a>,
     farthest: f64,
+    /// Kept from one read to the next: fresh memory would cost more than what is computed in it.
+    buffers: Workers<(Vec<u32>, Seen)>,
+}
+
+impl<S: TrackedSource> SecondLook<'_, S> {
+    /// Looks at a box and hands on what was seen.
+    fn see(&self, part: &Box3, then: impl FnOnce(&Seen)) -> Result<()> {
+        let (geometry, farthest) = (self.geometry, self.farthest);
+        let known = part.grow(MARGIN).intersect(&geometry.domain());
+        self.buffers.with(|(found, seen)| {
+            found.resize(known.len().max(found.len()), NO_SOURCE);
+            let found = &mut found[..known.len()];
+            self.found.read_box(&known, found)?;
+            seen.look(&self.method, &Look { geometry, part, known: &known, found, farthest });
+            then(seen);
+            Ok(())
+        })
+    }
 }
 
 impl<S: TrackedSource> BoxSource<u32> for SecondLook<'_, S> {
@@ -52,11 +72,7 @@ impl<S: TrackedSource> BoxSource<u32> for SecondLook<'_, S> {
     }
 
     fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
-        let known = part.grow(MARGIN).intersect(&self.geometry.domain());
-        let mut found = vec![NO_SOURCE; known.len()];
-        self.found.read_box(&known, &mut found)?;
-        look_again(&self.method, self.geometry, &known, &found, part, out);
-        Ok(())
+        self.see(part, |seen| out.copy_from_slice(&seen.sources))
     }
 }
 
@@ -66,14 +82,10 @@ impl<S: TrackedSource, P: Precision> BoxSource<P> for SecondLook<'_, S> {
     }
 
     fn read_box(&self, part: &Box3, out: &mut [P]) -> Result<()> {
-        let mut sources = vec![NO_SOURCE; part.len()];
-        self.read_box(part, &mut sources)?;
-        let width = part.shape()[0] as usize;
-        for ((y, z), (out, sources)) in part.rows().zip(out.chunks_mut(width).zip(sources.chunks(width))) {
-            for ((x, out), &source) in (part.lo[0]..).zip(out).zip(sources) {
-                *out = P::from_f64(self.method.distance(source, [x, y, z]).min(self.farthest));
+        self.see(part, |seen| {
+            for (out, squared) in out.iter_mut().zip(&seen.squared) {
+                *out = P::from_f64(squared.sqrt().min(self.farthest));
             }
-        }
-        Ok(())
+        })
     }
 }

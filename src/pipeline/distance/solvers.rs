@@ -12,7 +12,7 @@ use super::textbook::{heap_dijkstra, heap_marching};
 use super::trace::{SourceField, trace_sources};
 use super::{Options, Schedule, Sources};
 use crate::error::Result;
-use crate::exec::{Engine, Stage};
+use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{BrickGrid, BrickSet};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::all_neighbours::AllNeighbours;
@@ -23,6 +23,7 @@ use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::parents::{Parents, ShortestWay, UpwindSum};
 use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::second_look::REACH;
 use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::tracked::TrackedSource;
 use crate::kernel::distance::vector_distance::VectorDistance;
@@ -68,8 +69,8 @@ pub struct Solver<P> {
 
 /// Edge of the bricks of grids that are too small or too thin for larger ones.
 const SMALL_BRICK: i64 = 32;
-/// Fewer bricks than this are a small grid: what a brick at its border stores beyond it, and that a thread waits for the
-/// last brick of a wave, then cost more than larger bricks save.
+/// Fewer bricks than this are a small grid: what a brick at its border stores beyond it, and that a thread waits for
+/// the last brick of a wave, then cost more than larger bricks save.
 const FEWEST_BRICKS: u64 = 512;
 
 impl<P> Solver<P> {
@@ -281,8 +282,11 @@ impl<'a> Job<'_, 'a> {
 
     fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<M>(Start::Told)?;
-        let spacing = self.sources.geometry.spacing;
-        advance_front(self.stage, &method, &state, &seeded.bricks, spacing, self.options.farthest)?;
+        let geometry = self.sources.geometry;
+        // Where sources are looked at again, those beyond the last voxel that counts are asked too.
+        let beyond = if M::told(0).is_some() { geometry.length([REACH; 3]) } else { 0.0 };
+        let farthest = self.options.farthest + beyond;
+        advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, farthest)?;
         Ok(self.solved(method, state, &seeded))
     }
 
@@ -357,7 +361,8 @@ impl<'a> Job<'_, 'a> {
         state: BrickArray<M::State>,
         seeded: &Seeded,
     ) -> Solved<'a, P> {
-        let values = Arc::new(Values { method, state, farthest: self.options.farthest });
+        let buffers = Workers::new(Vec::new);
+        let values = Arc::new(Values { method, state, farthest: self.options.farthest, buffers });
         let Seeded { fixed_voxels, triangle_distances, .. } = *seeded;
         Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels, triangle_distances }
     }

@@ -12,7 +12,8 @@ pub struct Sources<'a> {
     pub positions: &'a [[f64; 3]],
     /// The points by brick.
     pub bins: &'a PointBins,
-    /// The voxels that points fix: by the last place of each data set's points, in order; none where all fix their cell.
+    /// The voxels that points fix: by the last place of each data set's points, in order; none where all fix their
+    /// cell.
     pub cubes: &'a [(u32, Cube)],
     /// Triangles, whose numbers follow those of the points.
     pub mesh: Option<(&'a TriangleMesh, &'a TriangleBins)>,
@@ -47,7 +48,8 @@ impl<'a> Sources<'a> {
         grid.bricks_in(&reach.intersect(&Box3::from_shape(grid.shape())))
     }
 
-    /// The points that may fix voxels of a brick, with their positions and cubes, these so many voxels larger all around.
+    /// The points that may fix voxels of a brick, with their positions and cubes, these so many voxels larger all
+    /// around.
     pub(super) fn points_seeding(
         &self,
         id: BrickId,

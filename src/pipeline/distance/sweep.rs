@@ -64,8 +64,8 @@ impl<M: OrderedSweeps> Companion<M> for Alone<'_> {
 
 /// Sweeps up to `iterations` times in all eight directions, or until an iteration changes nothing.
 ///
-/// `start` are this rank's bricks that hold fixed voxels. A brick in which a sweep changed nothing is passed over until one
-/// beside it changes: no sweep of any direction could change it.
+/// `start` are this rank's bricks that hold fixed voxels. A brick in which a sweep changed nothing is passed over until
+/// one beside it changes: no sweep of any direction could change it.
 pub(super) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
     stage: &Stage<'_>,
     method: &M,

@@ -1,8 +1,8 @@
 //! Sources along with the sweeps of FSM, bit for bit those of the triple loop (Kósa & Mikula 2023, Alg. 7).
 //!
-//! Bricks of sources are kept as they are now; of how they were before the sweep only faces are kept, which bricks beside
-//! them read. What a brick cannot know at its turn is resolved when the sweep is over, in rounds (`trace`); then the
-//! faces before the next sweep are made the ones now. Distances are swept as they are alone (`sweep`).
+//! Bricks of sources are kept as they are now; of how they were before the sweep only faces are kept, which bricks
+//! beside them read. What a brick cannot know at its turn is resolved when the sweep is over, in rounds (`trace`); then
+//! the faces before the next sweep are made the ones now. Distances are swept as they are alone (`sweep`).
 
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};

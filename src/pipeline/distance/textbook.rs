@@ -1,5 +1,6 @@
-//! FMM and DP in the textbook's order: the bricks of a field are gathered into one dense array, one heap marches over it
-//! (`kernel::distance::{marching_heap, dijkstra_heap}`), the bricks get their voxels back. On one thread of one rank.
+//! FMM and DP in the textbook's order: the bricks of a field are gathered into one dense array, one heap marches over
+//! it (`kernel::distance::{marching_heap, dijkstra_heap}`), the bricks get their voxels back. On one thread of one
+//! rank.
 
 use crate::error::Result;
 use crate::exec::Engine;

@@ -1,8 +1,8 @@
-//! Sources for methods that keep distances only, in a field of their own: for the `front` schedule found after the distances
-//! (`kernel::distance::trace`), for `sweep` what `sweep_sources` left pending.
+//! Sources for methods that keep distances only, in a field of their own: for the `front` schedule found after the
+//! distances (`kernel::distance::trace`), for `sweep` what `sweep_sources` left pending.
 //!
-//! Bricks in which something may be found come first, then those beside bricks in which something was, as long as any is
-//! missing there. Bricks with a face, edge or corner in common never run at the same time, so what a round does not
+//! Bricks in which something may be found come first, then those beside bricks in which something was, as long as any
+//! is missing there. Bricks with a face, edge or corner in common never run at the same time, so what a round does not
 //! depend on threads; what is found does not even depend on the rounds.
 
 use crate::error::Result;

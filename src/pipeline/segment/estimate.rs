@@ -4,12 +4,16 @@
 //! alive at one time. Everything is an upper bound but for objects whose search has to reach farther than its start:
 //! how far, only the flood can tell, and it is what the estimate is to be given before.
 
+use super::reach::first_reach;
 use super::settings::{Guides, SegmentSettings};
-use super::vicinity::{Vicinity, first_reach};
 use crate::grid::{Box3, BrickGrid};
 use crate::kernel::level_set::CELL_LEN;
-use crate::pipeline::evolve::KEPT_LAYERS;
+use crate::pipeline::cell_needs::{
+    COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, KEPT_BYTES, POINT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES,
+    STORED_CELL_BYTES, THREAD_BYTES,
+};
 use crate::pipeline::marks::{cloud_of, split};
+use crate::pipeline::vicinity::Vicinity;
 use crate::store::PlaneSource;
 
 /// What a run is expected to take.
@@ -17,8 +21,8 @@ use crate::store::PlaneSource;
 pub struct Estimate {
     /// Bytes that must be in memory at one time, beside the window of scratch pages.
     pub held: u64,
-    /// Bytes of scratch at one time, for objects that are closed within the first reach of their search; one whose cloud
-    /// has wider holes is solved among more cells and takes more.
+    /// Bytes of scratch at one time, for objects that are closed within the first reach of their search; one whose
+    /// cloud has wider holes is solved among more cells and takes more.
     pub scratch: u64,
     /// Bytes of scratch without which the run cannot even start to solve.
     pub least_scratch: u64,
@@ -30,25 +34,7 @@ pub struct Estimate {
     pub seconds: f64,
 }
 
-/// Scratch a voxel near the marks takes while its object is solved: two time levels, distance and edges, f32 with faces
-/// (3/8 more), flags, and what the time loop keeps of it. Presmoothing before that takes less, though it reaches farther.
-const SOLVE_BYTES: u64 = 24 + 4 * KEPT_LAYERS as u64;
-/// Scratch a voxel near the marks takes for the distance alone: state and result, with faces.
-const DISTANCE_BYTES: u64 = 11;
-/// What stays of it when the object is solved.
-const KEPT_BYTES: u64 = 6;
-/// Memory a cell takes whether stored or not: constant values and slots of all fields, bins.
-const GRID_CELL_BYTES: u64 = 80;
-/// Memory a stored cell takes beside its scratch: locks, waves, sums; its part of the mesh's bookkeeping.
-const STORED_CELL_BYTES: u64 = 1200;
-/// Memory a point of the cloud takes: its position, twice, and its place in the bins.
-const POINT_BYTES: u64 = 64;
-/// Buffers of one thread for cells and for patches of the surface.
-const THREAD_BYTES: u64 = 4 << 20;
-/// Voxels a thread holds to make a brick of a coarser level, and a chunk of a shard.
-const COARSE_VOXELS: u64 = 128 * 128 * 128 + 4 * 64 * 64 * 64;
-/// Seconds of one thread for a voxel near the marks, and for a voxel of the image.
-const SECONDS_PER_NEAR_VOXEL: f64 = 2.5e-6;
+/// Seconds of one thread for a voxel of the image.
 const SECONDS_PER_VOXEL: f64 = 6e-8;
 
 /// Estimates the segmentation of `crop` with `threads` threads; `writes` says whether there is an output.

@@ -11,12 +11,12 @@ mod estimate;
 mod labels;
 mod object;
 mod output;
+mod reach;
 mod settings;
-mod vicinity;
 
 pub use check::check_marks;
 pub use estimate::{Estimate, estimate};
 pub use labels::Overlap;
-pub use object::{Hole, ObjectReport};
+pub use object::ObjectReport;
 pub use output::{Outcome, segment};
 pub use settings::{Guides, SegmentSettings};

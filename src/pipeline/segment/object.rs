@@ -1,21 +1,18 @@
 //! One object: from its marks to the segmentation function on a box of its own.
 
-use std::sync::Arc;
-
+use super::reach::first_reach;
 use super::settings::SegmentSettings;
-use super::vicinity::{Vicinity, first_reach, voxel_bounds};
 use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::grey_range::GreyRange;
 use crate::kernel::surface::{Hausdorff, Measures};
-use crate::pipeline::band::{Band, Reaches, make_band};
-use crate::pipeline::distance::{Sources, cloud_distance};
+use crate::pipeline::band::Band;
+use crate::pipeline::enclosure::{Found, Hole, Search, enclose};
 use crate::pipeline::evolve::{Evolution, evolve};
 use crate::pipeline::image_terms::{EdgeSettings, edges, presmooth};
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::{ObjectMarks, cloud_of};
-use crate::pipeline::tagging::{Basin, Tagging, tag};
 use crate::store::{BoxSource, BrickArray, Element};
 
 /// The image as the objects see it.
@@ -26,15 +23,6 @@ pub(super) struct Picture<'a, T: Element> {
     pub range: GreyRange,
     /// Where it lies.
     pub geometry: &'a Geometry,
-}
-
-/// The hole through which a cloud would leak first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hole {
-    /// Its width: twice the saddle's distance to the cloud.
-    pub width: f64,
-    /// Where it is, world coordinates.
-    pub place: [f64; 3],
 }
 
 /// What is reported of a solved object.
@@ -80,12 +68,6 @@ pub(super) struct Solution {
     pub evolution: Evolution,
 }
 
-/// The start surface lies a little beyond the largest saddle, and at least so many smallest spacings from the cloud.
-const ABOVE_SADDLE: f64 = 1.05;
-const SMALLEST_BETA_VOXELS: f64 = 0.75;
-/// The band reaches at least so many mean spacings to either side of the cloud.
-const BAND_VOXELS: f64 = 4.0;
-
 /// Solves one object.
 ///
 /// # Errors
@@ -97,35 +79,31 @@ pub(super) fn solve<T: Element>(
     settings: &SegmentSettings,
 ) -> Result<Solution> {
     let cloud = cloud_of(marks, picture.geometry, settings.caps);
-    let enclosure = enclose(engine, picture.geometry, marks, &cloud, settings)?;
-    let Enclosure { geometry, window, distance, tagging, reaches } = enclosure;
-    let stage = engine.stage(&name("band", marks), tagging.level.set().len() as u64);
-    let mut band = make_band(&stage, engine, &distance, &tagging.level, &reaches)?;
-    stage.finish();
-    let hole = tagging
-        .basins
-        .iter()
-        .max_by(|a, b| a.saddle.total_cmp(&b.saddle))
-        .map(|basin| Hole { width: 2.0 * f64::from(basin.saddle), place: geometry.position(basin.place) });
-    drop((distance, tagging));
+    let suffix = format!(" {}", marks.object);
+    let search = Search {
+        grid: picture.geometry,
+        cloud: &cloud,
+        method: settings.method,
+        beta: settings.beta,
+        first_reach: first_reach(marks, picture.geometry, settings),
+        suffix: &suffix,
+    };
+    let enclosure = match enclose(engine, &search)? {
+        Found::Enclosed(enclosure) => enclosure,
+        Found::Leaks(saddle) => return Err(leak(marks, settings, saddle, picture.geometry)),
+        Found::Nothing => return Err(encloses_nothing(marks)),
+    };
+    let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
+    let beta = f64::from(enclosure.reaches.beta);
+    let mut band = enclosure.into_band(engine, &suffix)?;
     let edge_field = edge_field(engine, picture, marks, settings, &geometry, window, &band)?;
     let stage = engine.stage(&name("level set", marks), 0);
     stage.voxels(band.voxels);
-    let settings = settings.time_loop(&geometry);
-    let evolution = evolve(&stage, engine, &mut band, edge_field.as_ref(), geometry.spacing, &settings)?;
+    let time_loop = settings.motion.time_loop(&geometry);
+    let evolution = evolve(&stage, engine, &mut band, edge_field.as_ref(), geometry.spacing, &time_loop)?;
     stage.finish();
     let Band { u: [u, _], distance, voxels: band_voxels, .. } = band;
-    Ok(Solution {
-        geometry,
-        window,
-        u,
-        distance,
-        cloud_points: cloud.len() as u64,
-        beta: f64::from(reaches.beta),
-        hole,
-        band_voxels,
-        evolution,
-    })
+    Ok(Solution { geometry, window, u, distance, cloud_points: cloud.len() as u64, beta, hole, band_voxels, evolution })
 }
 
 fn name(what: &str, marks: &ObjectMarks) -> String {
@@ -141,7 +119,7 @@ fn edge_field<T: Element>(
     window: Box3,
     band: &Band,
 ) -> Result<Option<BrickArray<f32>>> {
-    if settings.rho == 0.0 {
+    if settings.motion.rho == 0.0 {
         return Ok(None);
     }
     let image = Normalised::new(picture.voxels, picture.range, window);
@@ -156,89 +134,20 @@ fn edge_field<T: Element>(
     Ok(Some(found))
 }
 
-/// A cloud that encloses something, on a grid that reaches far enough around it.
-struct Enclosure {
-    geometry: Geometry,
-    window: Box3,
-    distance: BrickArray<f32>,
-    tagging: Tagging,
-    reaches: Reaches,
-}
-
-/// Looks for what the cloud encloses, within a distance that grows until it is found or nothing can be.
-fn enclose(
-    engine: &Engine,
-    image: &Geometry,
-    marks: &ObjectMarks,
-    cloud: &[[f64; 3]],
-    settings: &SegmentSettings,
-) -> Result<Enclosure> {
-    let bounds = voxel_bounds(cloud, image);
-    let extent = (0..3).map(|a| bounds.shape()[a] as f64 * image.spacing[a]).fold(0.0, f64::max);
-    let mean = image.voxel_volume().cbrt();
-    let mut farthest = first_reach(marks, image, settings);
-    loop {
-        let around = Vicinity::new(image, cloud, farthest);
-        let (geometry, window) = (around.geometry.clone(), around.window);
-        let (distance, tagging) = flood_within(engine, marks, cloud, around, settings, farthest)?;
-        let beta = settings.beta.or_else(|| automatic_beta(&tagging.basins, image));
-        let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|b| f64::from(b.saddle) < beta)) else {
-            if farthest > extent || (settings.beta.is_some() && !tagging.basins.is_empty()) {
-                return Err(leak(marks, settings, &tagging.basins, image));
-            }
-            farthest *= 2.0;
-            continue;
-        };
-        let half_width = (2.0 * beta).max(BAND_VOXELS * mean);
-        let outer = (beta + 0.5 * half_width).max(half_width);
-        if half_width.max(outer) + 2.0 * image.max_spacing() > farthest {
-            farthest = half_width.max(outer) + 3.0 * image.max_spacing();
-            continue;
-        }
-        let reaches = Reaches { beta: beta as f32, inner: half_width as f32, outer: outer as f32 };
-        return Ok(Enclosure { geometry, window, distance, tagging, reaches });
-    }
-}
-
-fn flood_within(
-    engine: &Engine,
-    marks: &ObjectMarks,
-    cloud: &[[f64; 3]],
-    around: Vicinity,
-    settings: &SegmentSettings,
-    farthest: f64,
-) -> Result<(BrickArray<f32>, Tagging)> {
-    let set = Arc::new(around.cells);
-    let voxels = (set.len() * set.grid().brick_len()) as u64;
-    let sources = Sources::cloud(&around.geometry, cloud, &around.bins);
-    let stage = engine.stage(&name("distance", marks), 11 * set.len() as u64);
-    stage.voxels(voxels);
-    let distance = cloud_distance(&stage, engine, &sources, &set, settings.method, farthest as f32)?;
-    stage.finish();
-    let stage = engine.stage(&name("tagging", marks), 0);
-    stage.voxels(voxels);
-    let tagging = tag(&stage, engine, &sources, &distance)?;
-    stage.finish();
-    Ok((distance, tagging))
-}
-
-fn automatic_beta(basins: &[Basin], image: &Geometry) -> Option<f64> {
-    let saddle = basins.iter().map(|b| f64::from(b.saddle)).reduce(f64::max)?;
-    Some((ABOVE_SADDLE * saddle).max(SMALLEST_BETA_VOXELS * image.min_spacing()))
-}
-
-fn leak(marks: &ObjectMarks, settings: &SegmentSettings, basins: &[Basin], image: &Geometry) -> Error {
-    let object = marks.object;
+fn leak(marks: &ObjectMarks, settings: &SegmentSettings, saddle: f32, image: &Geometry) -> Error {
+    let (object, beta) = (marks.object, settings.beta.unwrap_or_default());
     let unit = image.unit.as_deref().unwrap_or("(no unit)");
-    match (settings.beta, basins.iter().map(|b| b.saddle).reduce(f32::min)) {
-        (Some(beta), Some(saddle)) => Error::input(format!(
-            "with --beta {beta} the start of object {object} leaks through a hole {:.3} {unit} wide; leave --beta out or \
-             give more than {saddle:.3}",
-            2.0 * saddle
-        )),
-        _ => Error::input(format!(
-            "the marks of object {object} enclose nothing at this spacing; mark its border all around, on every few \
-             slices, in the order of the contour"
-        )),
-    }
+    Error::input(format!(
+        "with --beta {beta} the start of object {object} leaks through a hole {:.3} {unit} wide; leave --beta out or \
+         give more than {saddle:.3}",
+        2.0 * saddle
+    ))
+}
+
+fn encloses_nothing(marks: &ObjectMarks) -> Error {
+    let object = marks.object;
+    Error::input(format!(
+        "the marks of object {object} enclose nothing at this spacing; mark its border all around, on every few slices, \
+         in the order of the contour"
+    ))
 }

@@ -8,16 +8,14 @@ use super::settings::{Guides, SegmentSettings};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, Geometry};
-use crate::io::mesh_ply::PlyWriter;
 use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
 use crate::kernel::image::labels;
 use crate::kernel::image::palette::label_color;
-use crate::kernel::surface::Hausdorff;
 use crate::pipeline::ingest::{Image, Sample, ingest};
 use crate::pipeline::marks::{ObjectMarks, split};
 use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface;
-use crate::store::{BoxSource, Element, ElementType, NoMesh, PlaneSource};
+use crate::store::{BoxSource, Element, ElementType, PlaneSource};
 
 /// What a segmentation found.
 #[derive(Clone, Debug)]
@@ -66,7 +64,7 @@ fn run<T: Sample>(
     let stage = engine.stage("read stack", crop.shape()[2].unsigned_abs());
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();
-    if settings.rho > 0.0 && image.extremes[0] == image.extremes[1] {
+    if settings.motion.rho > 0.0 && image.extremes[0] == image.extremes[1] {
         return Err(Error::input(format!(
             "the image holds only the value {}; check --channel, --time and --crop, or give --rho 0 to use the marks alone",
             image.extremes[0]
@@ -97,19 +95,9 @@ fn draw(
 ) -> Result<ObjectReport> {
     let (u, geometry, label) = (&solution.u, &solution.geometry, marks.object);
     let stage = engine.stage(&format!("surface {label}"), 0);
-    let measures = match store {
-        Some(store) => {
-            let file = if several { format!("meshes/object-{label}.ply") } else { "meshes/surface.ply".into() };
-            let mut mesh = PlyWriter::create(&store.file(&file)?, geometry.unit.as_deref())?;
-            let measures = surface::extract(&stage, u, geometry, &mut mesh)?;
-            mesh.finish()?;
-            measures
-        }
-        None => surface::extract(&stage, u, geometry, &mut NoMesh)?,
-    };
-    let points = marks.contours.concat();
-    let distances = surface::distances_to(&stage, u, geometry, &points)?;
-    let hausdorff = Hausdorff::of(distances.into_iter().flatten());
+    let name = if several { format!("meshes/object-{label}.ply") } else { "meshes/surface.ply".into() };
+    let mesh = store.map(|store| store.file(&name)).transpose()?;
+    let (measures, hausdorff) = surface::draw(&stage, u, geometry, &marks.contours.concat(), mesh.as_deref())?;
     stage.voxels(solution.band_voxels);
     stage.finish();
     if let Some(store) = store {

@@ -1,0 +1,111 @@
+//! `strandline measure`: volume, area, closedness and pieces of a triangle mesh, and how far points lie from it.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::args::MeasureArgs;
+use super::print;
+use super::text::{grouped, number};
+use crate::error::{Error, Result};
+use crate::grid::{BoundaryEdges, TriangleMesh};
+use crate::io::sources::{Source, read_source};
+use crate::kernel::surface::{Hausdorff, Measures, PatchIndex, SurfaceMeasure};
+
+/// Runs the command.
+pub(super) fn run(args: &MeasureArgs) -> Result<()> {
+    let mesh = match read_source(&args.mesh)? {
+        Source::Mesh(mesh) => mesh,
+        Source::Cloud(_) => return Err(Error::input("holds points and no triangle; give a mesh").at(&args.mesh)),
+    };
+    let points = args.points.as_deref().map(read_points).transpose()?;
+    let local = Local::new(&mesh).map_err(|error| error.at(&args.mesh))?;
+    let (measures, edges) = (local.measures(&mesh), mesh.boundary_edges());
+    let hausdorff = points.and_then(|points| local.distances(&mesh, &measures, &points));
+    print(&if args.json { as_json(&measures, edges, hausdorff) } else { as_lines(&measures, edges, hausdorff) });
+    Ok(())
+}
+
+fn read_points(path: &Path) -> Result<Vec<[f64; 3]>> {
+    Ok(match read_source(path)? {
+        Source::Cloud(cloud) => cloud.positions,
+        Source::Mesh(mesh) => mesh.vertices,
+    })
+}
+
+/// The mesh as seen from its middle: there f32 holds positions to a millionth of the mesh, wherever it lies.
+struct Local {
+    middle: [f64; 3],
+    vertices: Vec<[f32; 3]>,
+}
+
+impl Local {
+    fn new(mesh: &TriangleMesh) -> Result<Self> {
+        let (low, high) = mesh.bounds().ok_or_else(|| Error::input("holds no triangle"))?;
+        let middle = std::array::from_fn(|a| f64::midpoint(low[a], high[a]));
+        let vertices: Vec<[f32; 3]> = mesh.vertices.iter().map(|p| seen_from(middle, *p).map(|v| v as f32)).collect();
+        let is_measurable = vertices.iter().flatten().all(|v| v.is_finite());
+        is_measurable
+            .then_some(Self { middle, vertices })
+            .ok_or_else(|| Error::input("reaches farther than single precision does; scale it down"))
+    }
+
+    fn measures(&self, mesh: &TriangleMesh) -> Measures {
+        let names = mesh.welded();
+        let mut measure = SurfaceMeasure::new([0.0; 3]);
+        for triangle in &mesh.triangles {
+            measure.add(triangle.map(|v| names[v as usize]), triangle.map(|v| self.vertices[v as usize]));
+        }
+        measure.measures()
+    }
+
+    /// Distances of points from the surface.
+    fn distances(&self, mesh: &TriangleMesh, measures: &Measures, points: &[[f64; 3]]) -> Option<Hausdorff> {
+        // The side of a mean triangle.
+        let side = (measures.area / measures.triangles as f64).sqrt();
+        let edge = if side > 0.0 { side } else { 1.0 };
+        let index = PatchIndex::new(&self.vertices, &mesh.triangles, edge);
+        index.hausdorff_from(points.iter().map(|&p| seen_from(self.middle, p)))
+    }
+}
+
+fn seen_from(middle: [f64; 3], point: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|a| point[a] - middle[a])
+}
+
+fn as_json(measures: &Measures, edges: BoundaryEdges, hausdorff: Option<Hausdorff>) -> String {
+    let document = json!({
+        "volume": measures.volume,
+        "area": measures.area,
+        "closed": edges.is_closed() && edges.is_oriented(),
+        "boundary_edges": edges.open,
+        "flipped_edges": edges.flipped,
+        "components": measures.components,
+        "triangles": measures.triangles,
+        "vertices": measures.vertices,
+        "hausdorff": hausdorff.map(|h| json!({ "mean": h.mean, "max": h.max })),
+    });
+    format!("{document:#}\n")
+}
+
+fn as_lines(measures: &Measures, edges: BoundaryEdges, hausdorff: Option<Hausdorff>) -> String {
+    let closed = match (edges.is_closed(), edges.is_oriented()) {
+        (true, true) => "closed".into(),
+        (true, false) => {
+            format!("closed, {} edges whose triangles disagree on what is outside", grouped(edges.flipped))
+        }
+        (false, _) => format!("open, {} boundary edges; its volume means nothing", grouped(edges.open)),
+    };
+    let mut lines = vec![
+        format!("surface     {closed}"),
+        format!("pieces      {}", grouped(measures.components)),
+        format!("triangles   {}", grouped(measures.triangles)),
+        format!("vertices    {}", grouped(measures.vertices)),
+        format!("volume      {}", number(measures.volume)),
+        format!("area        {}", number(measures.area)),
+    ];
+    if let Some(Hausdorff { mean, max }) = hausdorff {
+        lines.push(format!("points off  {} in the mean, {} at most", number(mean), number(max)));
+    }
+    lines.join("\n") + "\n"
+}

@@ -1,0 +1,317 @@
+//! `strandline reconstruct`: reads the cloud, lays the grid, says what it will take, runs, writes, tells what was
+//! found.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::config::{self, Resources};
+use super::console::{Console, Voice};
+use super::files::{export_mesh, mesh_format};
+use super::grid::check_counts;
+use super::reconstruct_args::ReconstructArgs;
+use super::report::{Grid, Hausdorff, Hole, Report, stop_rule};
+use super::text::{bytes, duration, grouped, number, triple};
+use super::{print, signals, table};
+use crate::error::{Error, Result};
+use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
+use crate::grid::Geometry;
+use crate::io::ome_zarr::StoreWriter;
+use crate::io::sources::{Source, read_source};
+use crate::pipeline::reconstruct::{
+    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct,
+};
+use crate::store::{Scratch, free_space};
+
+/// A reconstruction that is ready to start: the cloud is read and checked.
+struct Job {
+    args: ReconstructArgs,
+    typed: Vec<String>,
+    settings: ReconstructSettings,
+    resources: Resources,
+    cloud: Vec<[f64; 3]>,
+    grid: Geometry,
+    console: Arc<Console>,
+    cancel: Cancel,
+    started: Instant,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
+    let job = Job::new(args.clone(), typed)?;
+    let threads = job.resources.threads as u64;
+    let estimate = estimate(&job.grid, &job.cloud, &job.settings, threads, job.needs_store());
+    let plan = job.plan(&estimate);
+    if args.output.dry_run {
+        print(&format!("{plan}\n"));
+    }
+    let window = job.fits(&estimate)?;
+    if args.output.dry_run {
+        return Ok(());
+    }
+    job.console.say(&plan);
+    job.run(window, &estimate)
+}
+
+impl Job {
+    fn new(args: ReconstructArgs, typed: &[String]) -> Result<Self> {
+        let started = Instant::now();
+        let cancel = signals::cancel_on_signals()?;
+        let settings = config::reconstruct_settings(&args.motion, args.distance.method)?;
+        let spacing = config::spacing("--spacing", args.grid.spacing)?;
+        config::check_outputs(&args.output.output, &[&args.output.report, &args.mesh], args.output.overwrite)?;
+        args.mesh.as_deref().map(mesh_format).transpose()?;
+        let resources = config::resources(&args.resources, args.output.output.path())?;
+        let voice = match (args.output.quiet, args.output.verbose) {
+            (true, _) => Voice::Quiet,
+            (_, true) => Voice::Verbose,
+            _ => Voice::Normal,
+        };
+        let console = Arc::new(Console::new(voice));
+        let cloud = match read_source(&args.cloud)? {
+            Source::Cloud(cloud) => cloud.positions,
+            Source::Mesh(mesh) => {
+                console.note(&format!("{} is a mesh; its vertices are taken as points", args.cloud.display()));
+                mesh.vertices
+            }
+        };
+        let grid = grid_for(&cloud, spacing).ok_or_else(|| {
+            let what = "all points lie in one place, which tells no spacing and encloses nothing";
+            Error::input(what).at(&args.cloud)
+        })?;
+        check_counts(grid.shape.map(|n| n as f64))?;
+        refuse_too_fine(&grid, resources.memory)?;
+        let typed = typed.to_vec();
+        Ok(Self { args, typed, settings, resources, cloud, grid, console, cancel, started })
+    }
+
+    /// Fields are written out, or needed for the mesh.
+    fn needs_store(&self) -> bool {
+        self.args.output.output.path().is_some() || self.args.mesh.is_some()
+    }
+
+    /// Refuses a run that cannot fit memory or disk.
+    fn fits(&self, estimate: &Estimate) -> Result<u64> {
+        let window = Budget { total: self.resources.memory }.window(estimate.held)?;
+        match free_space(&self.resources.scratch) {
+            Some(free) if free < estimate.least_scratch.saturating_sub(window / 2) => Err(Error::failed(format!(
+                "{} voxels near the points need {} of temporary fields, but {} are free; give a larger --spacing, or \
+                 another folder with --scratch",
+                grouped(estimate.near_voxels),
+                bytes(estimate.least_scratch),
+                bytes(free)
+            ))
+            .at(&self.resources.scratch)),
+            _ => Ok(window),
+        }
+    }
+
+    /// What the run will take, in a few lines.
+    fn plan(&self, estimate: &Estimate) -> String {
+        let [x, y, z] = self.grid.shape;
+        format!(
+            "{}: {} points, spacing {}, {x} x {y} x {z} voxels (x, y, z), {} of them near the points\n\
+             about {}; memory up to {}, of which {} must be held; {} of temporary fields, in memory or in {}",
+            self.args.cloud.display(),
+            grouped(self.cloud.len() as u64),
+            triple(self.grid.spacing),
+            grouped(estimate.near_voxels),
+            duration(estimate.seconds),
+            bytes(self.resources.memory),
+            bytes(estimate.held),
+            bytes(estimate.scratch),
+            self.resources.scratch.display()
+        )
+    }
+
+    fn run(&self, window: u64, estimate: &Estimate) -> Result<()> {
+        let scratch = Scratch::new(&self.resources.scratch, window);
+        let budget = Budget { total: self.resources.memory };
+        let progress: Arc<dyn Progress> = self.console.clone();
+        let engine = Engine::new(self.resources.threads, scratch, budget, self.cancel.clone(), progress)?;
+        engine.reserve(estimate.held)?;
+        let result = self.solve_and_write(&engine);
+        self.console.clear();
+        let found = result?;
+        if !self.args.output.quiet {
+            print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)));
+        }
+        Ok(())
+    }
+
+    fn solve_and_write(&self, engine: &Engine) -> Result<Reconstruction> {
+        let output = &self.args.output;
+        // The mesh comes out of a store, if only for a while.
+        let passing = tempfile::tempdir_in(&self.resources.scratch)
+            .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let target: Option<PathBuf> = match output.output.path() {
+            Some(path) => Some(path.to_path_buf()),
+            None => self.needs_store().then(|| passing.path().join("passing.zarr")),
+        };
+        let store = target.as_deref().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, store.as_ref())
+            .map_err(|error| error.at(&self.args.cloud))?;
+        if let Some(store) = store {
+            self.report(engine, &found).write(&store.file("report.json")?)?;
+            engine.check()?;
+            store.finish()?;
+        }
+        engine.check()?;
+        if let (Some(mesh), Some(folder)) = (&self.args.mesh, &target) {
+            export_mesh(&folder.join("meshes/surface.ply"), mesh)?;
+        }
+        if let Some(path) = &output.report {
+            self.report(engine, &found).write(path)?;
+        }
+        Ok(found)
+    }
+
+    fn report(&self, engine: &Engine, found: &Reconstruction) -> Report<Settings, Found> {
+        Report {
+            version: env!("CARGO_PKG_VERSION"),
+            command: "reconstruct",
+            arguments: self.typed.clone(),
+            settings: Settings::new(self, found),
+            grid: Grid::new(&found.geometry),
+            threads: engine.threads(),
+            ranks: engine.ranks(),
+            memory_budget_bytes: self.resources.memory,
+            peak_rss_bytes: peak_resident(),
+            seconds: self.started.elapsed().as_secs_f64(),
+            notes: self.console.notes(),
+            stages: engine.reports().into_iter().map(Into::into).collect(),
+            result: Found::new(found, self.cloud.len() as u64),
+        }
+    }
+}
+
+/// Refuses a grid whose cells alone would not fit the memory, before any is taken for them.
+fn refuse_too_fine(grid: &Geometry, memory: u64) -> Result<()> {
+    let least = least_memory(grid);
+    if least <= memory {
+        return Ok(());
+    }
+    Err(Error::usage(format!(
+        "a grid of {} voxels needs {} of memory for its cells alone, but {} are allowed; give a larger --spacing",
+        grouped(grid.domain().volume()),
+        bytes(least),
+        bytes(memory)
+    )))
+}
+
+fn describe_found(found: &Reconstruction) -> String {
+    let m = &found.measures;
+    let surface = if m.is_closed() { "closed" } else { "OPEN" };
+    let mut lines = vec![format!(
+        "{surface} surface in {} pieces: volume {}, area {}, {} triangles",
+        m.components,
+        number(m.volume),
+        number(m.area),
+        grouped(m.triangles)
+    )];
+    lines.extend(
+        found
+            .hausdorff
+            .map(|h| format!("points off the surface: {} in the mean, {} at most", number(h.mean), number(h.max))),
+    );
+    lines.extend(
+        found
+            .hole
+            .map(|hole| format!("largest hole of the cloud: {} wide, at {}", number(hole.width), triple(hole.place))),
+    );
+    lines.push(format!(
+        "start at {} from the points; {} steps, ended by {}",
+        number(found.beta),
+        found.evolution.steps,
+        found.evolution.stopped_by
+    ));
+    lines.join("\n") + "\n"
+}
+
+/// Every setting, also those that nobody gave; lengths physical.
+#[derive(Debug, Serialize)]
+struct Settings {
+    cloud: String,
+    output: Option<String>,
+    method: &'static str,
+    theta: f64,
+    delta: f64,
+    /// Null when it was found; it is then in the result.
+    beta: Option<f64>,
+    tau: f64,
+    epsilon: f64,
+    omega: f64,
+    stop: &'static str,
+    tol: f64,
+    max_steps: u32,
+    scratch: String,
+}
+
+impl Settings {
+    fn new(job: &Job, found: &Reconstruction) -> Self {
+        let (settings, geometry) = (&job.settings, &found.geometry);
+        let motion = &settings.motion;
+        let (stop, tol) = stop_rule(motion.stop);
+        Self {
+            cloud: job.args.cloud.display().to_string(),
+            output: job.args.output.output.path().map(|path| path.display().to_string()),
+            method: settings.method.name(),
+            theta: motion.theta,
+            delta: motion.delta_on(geometry),
+            beta: settings.beta,
+            tau: motion.tau_on(geometry),
+            epsilon: motion.epsilon_on(geometry),
+            omega: motion.omega,
+            stop,
+            tol,
+            max_steps: motion.max_steps,
+            scratch: job.resources.scratch.display().to_string(),
+        }
+    }
+}
+
+/// What was found.
+#[derive(Debug, Serialize)]
+struct Found {
+    volume: f64,
+    area: f64,
+    closed: bool,
+    components: u64,
+    triangles: u64,
+    open_edges: u64,
+    hausdorff: Option<Hausdorff>,
+    cloud_points: u64,
+    spaces: usize,
+    beta: f64,
+    hole: Option<Hole>,
+    band_voxels: u64,
+    time_steps: u32,
+    sor_iterations: u64,
+    stopped_by: &'static str,
+    residual: f64,
+}
+
+impl Found {
+    fn new(found: &Reconstruction, cloud_points: u64) -> Self {
+        Self {
+            volume: found.measures.volume,
+            area: found.measures.area,
+            closed: found.measures.is_closed(),
+            components: found.measures.components,
+            triangles: found.measures.triangles,
+            open_edges: found.measures.open_edges,
+            hausdorff: found.hausdorff.map(Into::into),
+            cloud_points,
+            spaces: found.spaces,
+            beta: found.beta,
+            hole: found.hole.map(Into::into),
+            band_voxels: found.band_voxels,
+            time_steps: found.evolution.steps,
+            sor_iterations: found.evolution.sor_iterations,
+            stopped_by: found.evolution.stopped_by,
+            residual: found.evolution.residual,
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! What was typed after `reconstruct`: the cloud, the grid, how the surface moves. What it means together is decided in
+//! `reconstruct`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::args::{DistanceArgs, MotionArgs, ResourceArgs};
+use super::distance_args::FieldOutputArgs;
+use super::values::parse_spacing;
+
+/// Reconstruct a closed surface from a point cloud, without normals.
+#[derive(Clone, Debug, Args)]
+pub(super) struct ReconstructArgs {
+    /// Points (CSV, XYZ, PLY), or a mesh whose vertices are taken
+    pub(super) cloud: PathBuf,
+    #[command(flatten)]
+    pub(super) grid: CloudGridArgs,
+    #[command(flatten)]
+    pub(super) motion: MotionArgs,
+    #[command(flatten)]
+    pub(super) distance: DistanceArgs,
+    #[command(flatten)]
+    pub(super) resources: ResourceArgs,
+    #[command(flatten)]
+    pub(super) output: FieldOutputArgs,
+    /// Write the surface once more, in a file of its own, in the format of its name
+    #[arg(long, value_name = "FILE.ply|obj|stl|vtp", help_heading = "Output")]
+    pub(super) mesh: Option<PathBuf>,
+}
+
+/// How fine the grid is.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Grid")]
+pub(super) struct CloudGridArgs {
+    /// Distance between voxel centres, one for all axes or three [default: half the mean spacing of the points]
+    #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
+    pub(super) spacing: Option<[f64; 3]>,
+}

@@ -1,0 +1,35 @@
+//! VTP, VTK's XML `PolyData` (file format 1.0), its arrays appended raw: points as Float32, connectivity and offsets as
+//! Int64, each preceded by its length in bytes; little-endian.
+
+use std::io::{self, Write};
+
+use super::written::Written;
+
+pub(super) fn write(mesh: &mut Written, out: &mut dyn Write) -> io::Result<()> {
+    let (vertices, triangles) = (mesh.vertices, mesh.triangles);
+    let (points, connectivity, offsets) = (12 * vertices, 24 * triangles, 8 * triangles);
+    let at = [0, 8 + points, 16 + points + connectivity];
+    let array = |what: &str, at: u64| format!("<DataArray {what} format=\"appended\" offset=\"{at}\"/>");
+    let header = [
+        "<?xml version=\"1.0\"?>".into(),
+        "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">".into(),
+        "<PolyData>".into(),
+        format!("<Piece NumberOfPoints=\"{vertices}\" NumberOfPolys=\"{triangles}\">"),
+        format!("<Points>{}</Points>", array("type=\"Float32\" NumberOfComponents=\"3\"", at[0])),
+        format!(
+            "<Polys>{}{}</Polys>",
+            array("type=\"Int64\" Name=\"connectivity\"", at[1]),
+            array("type=\"Int64\" Name=\"offsets\"", at[2])
+        ),
+        "</Piece></PolyData>".into(),
+        "<AppendedData encoding=\"raw\">\n_".into(),
+    ];
+    out.write_all(header.join("\n").as_bytes())?;
+    out.write_all(&points.to_le_bytes())?;
+    mesh.each_vertex(|position| position.iter().try_for_each(|value| out.write_all(&value.to_le_bytes())))?;
+    out.write_all(&connectivity.to_le_bytes())?;
+    mesh.each_triangle(|corners| corners.iter().try_for_each(|&v| out.write_all(&i64::from(v).to_le_bytes())))?;
+    out.write_all(&offsets.to_le_bytes())?;
+    (1..=triangles).try_for_each(|n| out.write_all(&(3 * n).to_le_bytes()))?;
+    out.write_all(b"\n</AppendedData></VTKFile>\n")
+}

@@ -1,0 +1,71 @@
+//! A finished PLY file of ours, read again piece by piece.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+const BUFFER: usize = 1 << 18;
+const VERTEX_BYTES: u64 = 12;
+
+/// Vertices as three f32 each, then triangles as a count byte and three indices; little-endian.
+pub(super) struct Written {
+    file: BufReader<File>,
+    /// Where the vertices begin.
+    start: u64,
+    pub(super) vertices: u64,
+    pub(super) triangles: u64,
+}
+
+impl Written {
+    pub(super) fn open(path: &Path) -> io::Result<Self> {
+        let mut file = BufReader::with_capacity(BUFFER, File::open(path)?);
+        let (mut start, mut counts) = (0, [0; 2]);
+        loop {
+            let mut line = String::new();
+            let read = file.read_line(&mut line)?;
+            if read == 0 {
+                return Err(io::Error::new(io::ErrorKind::InvalidData, "the mesh has no end of its header"));
+            }
+            start += read as u64;
+            for (count, prefix) in counts.iter_mut().zip(["element vertex ", "element face "]) {
+                if let Some(number) = line.strip_prefix(prefix) {
+                    *count = number.trim().parse().map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
+                }
+            }
+            if line == "end_header\n" {
+                let [vertices, triangles] = counts;
+                return Ok(Self { file, start, vertices, triangles });
+            }
+        }
+    }
+
+    pub(super) fn each_vertex(&mut self, mut f: impl FnMut([f32; 3]) -> io::Result<()>) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(self.start))?;
+        for _ in 0..self.vertices {
+            let mut bytes = [0; 12];
+            self.file.read_exact(&mut bytes)?;
+            f(words(&bytes).map(f32::from_le_bytes))?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn each_triangle(&mut self, mut f: impl FnMut([u32; 3]) -> io::Result<()>) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(self.start + VERTEX_BYTES * self.vertices))?;
+        for _ in 0..self.triangles {
+            let mut bytes = [0; 13];
+            self.file.read_exact(&mut bytes)?;
+            f(words(&bytes[1..]).map(u32::from_le_bytes))?;
+        }
+        Ok(())
+    }
+
+    /// The file as it is.
+    pub(super) fn copy(&mut self, out: &mut dyn Write) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(0))?;
+        io::copy(&mut self.file, out).map(|_| ())
+    }
+}
+
+fn words(bytes: &[u8]) -> [[u8; 4]; 3] {
+    std::array::from_fn(|n| std::array::from_fn(|i| bytes[4 * n + i]))
+}

@@ -1,0 +1,170 @@
+//! What a cloud encloses: the distance around it, the flood from outside, and how far the band must reach. The distance
+//! is computed within a reach that grows until something enclosed is found or nothing can be.
+
+use std::sync::Arc;
+
+use super::band::{Band, Reaches, make_band};
+use super::distance::{Method, Sources, cloud_distance};
+use super::tagging::{Basin, Tagging, tag};
+use super::vicinity::{Vicinity, voxel_bounds};
+use crate::error::Result;
+use crate::exec::Engine;
+use crate::grid::{Box3, Geometry};
+use crate::kernel::level_set::persistence::PERSISTENCE;
+use crate::store::BrickArray;
+
+/// The start surface lies a little beyond the largest saddle, and at least so many smallest spacings from the cloud.
+const ABOVE_SADDLE: f64 = 1.05;
+const SMALLEST_BETA_VOXELS: f64 = 0.75;
+/// The band reaches at least so many mean spacings to either side of the cloud.
+const BAND_VOXELS: f64 = 4.0;
+/// The search begins at so many largest spacings from the cloud.
+const FIRST_REACH_VOXELS: f64 = 6.0;
+
+/// A cloud, and how what it encloses is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Search<'a> {
+    /// The grid; what is found lies on a box of it that may reach past it.
+    pub grid: &'a Geometry,
+    /// World positions.
+    pub cloud: &'a [[f64; 3]],
+    /// Distance method.
+    pub method: Method,
+    /// Distance of the start surface from the cloud; automatic when none.
+    pub beta: Option<f64>,
+    /// The distance from the cloud within which the search begins.
+    pub first_reach: f64,
+    /// What is added to the names of stages.
+    pub suffix: &'a str,
+}
+
+/// The hole through which a cloud would leak first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hole {
+    /// Its width: twice the saddle's distance to the cloud.
+    pub width: f64,
+    /// Where it is, world coordinates.
+    pub place: [f64; 3],
+}
+
+/// A cloud that encloses something, on a grid that reaches far enough around it.
+pub struct Enclosure {
+    /// The grid of its box.
+    pub geometry: Geometry,
+    /// The box in voxels of the grid that was given.
+    pub window: Box3,
+    /// Where the start surface lies and how far the band reaches.
+    pub reaches: Reaches,
+    distance: BrickArray<f32>,
+    tagging: Tagging,
+}
+
+/// What a search ends with.
+pub enum Found {
+    /// Something enclosed.
+    Enclosed(Box<Enclosure>),
+    /// Nothing at the beta that was asked for; a larger one than this saddle would do.
+    Leaks(f32),
+    /// Nothing.
+    Nothing,
+}
+
+/// The reach that a search begins with on a grid, for a beta that was asked for.
+#[must_use]
+pub fn first_reach_for(grid: &Geometry, beta: Option<f64>) -> f64 {
+    let wanted = beta.map_or(0.0, |beta| 2.0 * beta);
+    (FIRST_REACH_VOXELS * grid.max_spacing()).max(wanted + 2.0 * grid.max_spacing())
+}
+
+/// Looks for what the cloud encloses.
+///
+/// # Errors
+/// When scratch runs out or the run is interrupted.
+pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
+    let Search { grid, cloud, .. } = *search;
+    let bounds = voxel_bounds(cloud, grid);
+    let extent = (0..3).map(|a| bounds.shape()[a] as f64 * grid.spacing[a]).fold(0.0, f64::max);
+    let mean = grid.voxel_volume().cbrt();
+    let mut farthest = search.first_reach;
+    loop {
+        let around = Vicinity::new(grid, cloud, farthest);
+        let (geometry, window) = (around.geometry.clone(), around.window);
+        let (distance, tagging) = flood_within(engine, search, around, farthest)?;
+        let beta = search.beta.or_else(|| automatic_beta(&tagging.basins, grid));
+        let holds = |beta: f64| tagging.basins.iter().any(|b| f64::from(b.saddle) < beta && f64::from(b.depth) > beta);
+        let Some(beta) = beta.filter(|&beta| holds(beta)) else {
+            // The deepest comes first; noise is as deep as its saddle.
+            let basin = tagging.basins.first().filter(|b| b.depth >= PERSISTENCE * b.saddle);
+            if let (Some(_), Some(basin)) = (search.beta, basin) {
+                return Ok(Found::Leaks(basin.saddle));
+            }
+            if farthest > extent {
+                return Ok(Found::Nothing);
+            }
+            farthest *= 2.0;
+            continue;
+        };
+        let half_width = (2.0 * beta).max(BAND_VOXELS * mean);
+        let outer = (beta + 0.5 * half_width).max(half_width);
+        if half_width.max(outer) + 2.0 * grid.max_spacing() > farthest {
+            farthest = half_width.max(outer) + 3.0 * grid.max_spacing();
+            continue;
+        }
+        let reaches = Reaches { beta: beta as f32, inner: half_width as f32, outer: outer as f32 };
+        return Ok(Found::Enclosed(Box::new(Enclosure { geometry, window, reaches, distance, tagging })));
+    }
+}
+
+fn flood_within(
+    engine: &Engine,
+    search: &Search<'_>,
+    around: Vicinity,
+    farthest: f64,
+) -> Result<(BrickArray<f32>, Tagging)> {
+    let set = Arc::new(around.cells);
+    let voxels = (set.len() * set.grid().brick_len()) as u64;
+    let sources = Sources::cloud(&around.geometry, search.cloud, &around.bins);
+    let stage = engine.stage(&format!("distance{}", search.suffix), 11 * set.len() as u64);
+    stage.voxels(voxels);
+    let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
+    stage.finish();
+    let stage = engine.stage(&format!("tagging{}", search.suffix), 0);
+    stage.voxels(voxels);
+    // Whoever names a beta knows how deep the inside is.
+    let ratio = if search.beta.is_some() { 1.0 } else { PERSISTENCE };
+    let tagging = tag(&stage, engine, &sources, &distance, ratio)?;
+    stage.finish();
+    Ok((distance, tagging))
+}
+
+fn automatic_beta(basins: &[Basin], grid: &Geometry) -> Option<f64> {
+    let saddle = basins.iter().map(|b| f64::from(b.saddle)).reduce(f64::max)?;
+    Some((ABOVE_SADDLE * saddle).max(SMALLEST_BETA_VOXELS * grid.min_spacing()))
+}
+
+impl Enclosure {
+    /// The cloud's largest hole.
+    #[must_use]
+    pub fn hole(&self) -> Option<Hole> {
+        let basins = self.tagging.basins.iter();
+        let basin = basins.max_by(|a, b| a.saddle.total_cmp(&b.saddle))?;
+        Some(Hole { width: 2.0 * f64::from(basin.saddle), place: self.geometry.position(basin.place) })
+    }
+
+    /// Number of enclosed spaces.
+    #[must_use]
+    pub fn spaces(&self) -> usize {
+        self.tagging.basins.len()
+    }
+
+    /// Makes the band; the fields of the search go.
+    ///
+    /// # Errors
+    /// When scratch runs out or the run is interrupted.
+    pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<Band> {
+        let stage = engine.stage(&format!("band{suffix}"), self.tagging.level.set().len() as u64);
+        let band = make_band(&stage, engine, &self.distance, &self.tagging.level, &self.reaches)?;
+        stage.finish();
+        Ok(band)
+    }
+}

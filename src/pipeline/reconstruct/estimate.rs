@@ -1,0 +1,55 @@
+//! What a reconstruction will take, told before it starts: that of its cells as the search begins with them.
+
+use super::settings::ReconstructSettings;
+use crate::grid::{BrickGrid, Geometry};
+use crate::kernel::level_set::{CELL, CELL_LEN};
+use crate::pipeline::cell_needs::{
+    COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, POINT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES,
+    STORED_CELL_BYTES, THREAD_BYTES,
+};
+use crate::pipeline::enclosure::first_reach_for;
+use crate::pipeline::vicinity::Vicinity;
+
+/// What a run is expected to take; of a cloud whose holes are wider than the search's first reach it takes more.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Bytes that must be in memory at one time, beside the window of scratch pages.
+    pub held: u64,
+    /// Bytes of scratch at one time.
+    pub scratch: u64,
+    /// Bytes of scratch without which the run cannot even start to solve.
+    pub least_scratch: u64,
+    /// Voxels near the cloud.
+    pub near_voxels: u64,
+    /// A rough guess of the seconds it takes.
+    pub seconds: f64,
+}
+
+/// Bytes of memory that a grid takes for its cells alone, told without taking any.
+#[must_use]
+pub fn least_memory(grid: &Geometry) -> u64 {
+    BrickGrid::new(grid.shape, CELL as i64).len().saturating_mul(GRID_CELL_BYTES)
+}
+
+/// Estimates a reconstruction on a grid with so many threads; `writes` says whether there is an output.
+#[must_use]
+pub fn estimate(
+    grid: &Geometry,
+    cloud: &[[f64; 3]],
+    settings: &ReconstructSettings,
+    threads: u64,
+    writes: bool,
+) -> Estimate {
+    let cells = Vicinity::new(grid, cloud, first_reach_for(grid, settings.beta)).cells;
+    let (stored, near_voxels) = (cells.len() as u64, (cells.len() * CELL_LEN) as u64);
+    let points = cloud.len() as u64;
+    let solving = points * POINT_BYTES + cells.grid().len() * GRID_CELL_BYTES + stored * STORED_CELL_BYTES;
+    let writing = if writes { threads * COARSE_VOXELS * 4 } else { 0 };
+    Estimate {
+        held: solving + (threads * THREAD_BYTES).max(writing),
+        scratch: SOLVE_BYTES * near_voxels,
+        least_scratch: DISTANCE_BYTES * near_voxels,
+        near_voxels,
+        seconds: near_voxels as f64 * SECONDS_PER_NEAR_VOXEL / threads as f64,
+    }
+}

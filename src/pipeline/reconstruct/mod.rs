@@ -1,0 +1,15 @@
+//! `reconstruct`: a closed surface from a point cloud without normals (Kósa 2015; Kósa & Mikula 2015).
+//!
+//! ```text
+//! cloud -> grid -> distance -> flood -> band -> time loop -> u -> surface -> mesh, measures
+//! ```
+
+mod estimate;
+mod grid;
+mod output;
+mod settings;
+
+pub use estimate::{Estimate, estimate, least_memory};
+pub use grid::{grid_for, mean_spacing};
+pub use output::{Reconstruction, reconstruct};
+pub use settings::ReconstructSettings;

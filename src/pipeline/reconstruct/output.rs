@@ -1,0 +1,109 @@
+//! The whole job: search what the cloud encloses, move the surface, draw, measure and write it.
+
+use super::settings::ReconstructSettings;
+use crate::error::{Error, Result};
+use crate::exec::Engine;
+use crate::grid::Geometry;
+use crate::io::ome_zarr::{ImageSpec, StoreWriter};
+use crate::kernel::surface::{Hausdorff, Measures};
+use crate::pipeline::band::Band;
+use crate::pipeline::enclosure::{Found, Hole, Search, enclose, first_reach_for};
+use crate::pipeline::evolve::{Evolution, evolve};
+use crate::pipeline::pyramid::{Reduce, write_levels};
+use crate::pipeline::surface;
+use crate::store::ElementType;
+
+/// What a reconstruction found.
+#[derive(Clone, Debug)]
+pub struct Reconstruction {
+    /// The grid that u lies on.
+    pub geometry: Geometry,
+    /// Where the start surface lay.
+    pub beta: f64,
+    /// The cloud's largest hole.
+    pub hole: Option<Hole>,
+    /// Number of spaces that the cloud encloses.
+    pub spaces: usize,
+    /// Number of voxels that were solved.
+    pub band_voxels: u64,
+    /// How the time loop ended.
+    pub evolution: Evolution,
+    /// The surface's measures.
+    pub measures: Measures,
+    /// Distances of the points from the surface.
+    pub hausdorff: Option<Hausdorff>,
+}
+
+/// Reconstructs the surface of a cloud on a grid, whose box grows as far around the cloud as is needed; `store` gets
+/// the results, none of them when it is absent.
+///
+/// # Errors
+/// When the cloud encloses nothing, the output cannot be written, scratch runs out, or the run is interrupted.
+pub fn reconstruct(
+    engine: &Engine,
+    grid: &Geometry,
+    cloud: &[[f64; 3]],
+    settings: &ReconstructSettings,
+    store: Option<&StoreWriter>,
+) -> Result<Reconstruction> {
+    let search = Search {
+        grid,
+        cloud,
+        method: settings.method,
+        beta: settings.beta,
+        first_reach: first_reach_for(grid, settings.beta),
+        suffix: "",
+    };
+    let enclosure = match enclose(engine, &search)? {
+        Found::Enclosed(enclosure) => enclosure,
+        Found::Leaks(saddle) => return Err(leaks(settings, saddle)),
+        Found::Nothing => return Err(encloses_nothing(grid)),
+    };
+    let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
+    let beta = f64::from(enclosure.reaches.beta);
+    let mut band = enclosure.into_band(engine, "")?;
+    let stage = engine.stage("level set", 0);
+    stage.voxels(band.voxels);
+    let time_loop = settings.motion.time_loop(&geometry);
+    let evolution = evolve(&stage, engine, &mut band, None, geometry.spacing, &time_loop)?;
+    stage.finish();
+    let stage = engine.stage("surface", 0);
+    stage.voxels(band.voxels);
+    let mesh = store.map(|store| store.file("meshes/surface.ply")).transpose()?;
+    let (measures, hausdorff) = surface::draw(&stage, &band.u[0], &geometry, cloud, mesh.as_deref())?;
+    stage.finish();
+    if let Some(store) = store {
+        write_fields(engine, &geometry, &band, store)?;
+    }
+    Ok(Reconstruction { geometry, beta, hole, spaces, band_voxels: band.voxels, evolution, measures, hausdorff })
+}
+
+fn write_fields(engine: &Engine, geometry: &Geometry, band: &Band, store: &StoreWriter) -> Result<()> {
+    let farthest = f64::from(band.distance.absent(0));
+    for (group, name, field, high) in
+        [("", "levelset", &band.u[0], 1.0), ("distance", "distance", &band.distance, farthest)]
+    {
+        let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
+        let stage = engine.stage(&format!("write {name}"), 0);
+        stage.voxels(geometry.domain().volume());
+        write_levels::<f32>(&stage, engine, store.image(group, &spec)?.levels(), field, Reduce::Mean)?;
+        stage.finish();
+    }
+    Ok(())
+}
+
+fn leaks(settings: &ReconstructSettings, saddle: f32) -> Error {
+    let beta = settings.beta.unwrap_or_default();
+    Error::input(format!(
+        "with --beta {beta} the start leaks through a hole {:.4} wide; leave --beta out or give more than {saddle:.4}",
+        2.0 * saddle
+    ))
+}
+
+fn encloses_nothing(grid: &Geometry) -> Error {
+    Error::input(format!(
+        "the points enclose nothing at the spacing {}: no space inside is twice as deep as its widest opening; give a \
+         finer --spacing if they lie denser than that, or points of all sides of the body",
+        grid.min_spacing()
+    ))
+}

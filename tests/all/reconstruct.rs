@@ -1,0 +1,138 @@
+//! Surfaces from clouds: the papers' Sponge with its measures, spheres with theirs, and clouds that enclose nothing.
+
+use std::collections::HashSet;
+use std::f64::consts::PI;
+
+use strandline::error::Result;
+use strandline::io::ome_zarr::StoreWriter;
+use strandline::pipeline::distance::Method;
+use strandline::pipeline::evolve::Stop;
+use strandline::pipeline::motion::Motion;
+use strandline::pipeline::reconstruct::{ReconstructSettings, Reconstruction, grid_for, reconstruct};
+
+use crate::common::clouds::{grid_around, sphere, sponge};
+use crate::common::lab::Lab;
+
+/// With nothing but the cloud given.
+fn by_defaults(cloud: &[[f64; 3]]) -> Result<Reconstruction> {
+    let grid = grid_for(cloud, None).expect("more than one place");
+    reconstruct(&Lab::new(2).engine, &grid, cloud, &ReconstructSettings::default(), None)
+}
+
+/// The papers' settings for a spacing (algorithms: section 10).
+fn as_printed(h: f64, delta: f64) -> ReconstructSettings {
+    let motion = Motion {
+        delta: Some(delta),
+        tau: Some(h / 4.0),
+        epsilon: Some(0.01),
+        stop: Stop::L2(1e-4),
+        max_steps: 1000,
+        ..ReconstructSettings::default().motion
+    };
+    ReconstructSettings { motion, beta: Some(0.25), ..ReconstructSettings::default() }
+}
+
+/// The places of a cloud, those that differ by rounding alone taken for one.
+fn places(cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut seen = HashSet::new();
+    cloud.iter().copied().filter(|p| seen.insert(p.map(|v| (v * 1e6).round() as i64))).collect()
+}
+
+/// Volume and mean distance of the points at h = 0.05, as the papers' algorithms were run apart from this program: with
+/// FSM, each place of the cloud once. Within 1 % and half of the last digit that is given.
+#[test]
+fn the_sponge_measures_what_the_papers_scheme_gives() {
+    let (cloud, h) = (places(&sponge()), 0.05);
+    assert_eq!(cloud.len(), 182);
+    let grid = grid_around(&cloud, h);
+    for (delta, volume, mean) in [(0.0, 2.195, 0.0076), (0.025, 1.939, 0.0213), (0.05, 1.839, 0.0359)] {
+        let settings = ReconstructSettings { method: Method::FSM, ..as_printed(h, delta) };
+        let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface");
+        let (measures, off) = (found.measures, found.hausdorff.expect("points").mean);
+        println!("delta {delta}: volume {} ({volume}), mean {off} ({mean})", measures.volume);
+        assert!(measures.is_closed() && measures.components == 1);
+        assert!((measures.volume - volume).abs() < 0.01 * volume + 5e-4, "delta {delta}: volume {}", measures.volume);
+        assert!((off - mean).abs() < 0.01 * mean + 5e-5, "delta {delta}: mean distance {off}");
+    }
+}
+
+/// With the papers' rule a strong curvature makes it vanish in the end; the surface's own rest does not.
+#[test]
+fn the_sponge_does_not_vanish() {
+    let (cloud, h) = (sponge(), 0.05);
+    let motion = Motion { delta: Some(0.1), ..ReconstructSettings::default().motion };
+    let settings = ReconstructSettings { motion, ..ReconstructSettings::default() };
+    let found = reconstruct(&Lab::new(2).engine, &grid_around(&cloud, h), &cloud, &settings, None).expect("a surface");
+    println!("{:?}, {:?}", found.measures, found.evolution);
+    assert!(found.measures.is_closed() && found.measures.volume > 1.0, "{:?}", found.measures);
+}
+
+#[test]
+fn spheres_have_their_volume_and_area() {
+    let centre = [3.0, -1.0, 10.0];
+    let cloud = sphere(centre, 2.0, 4000, |_| true);
+    let found = by_defaults(&cloud).expect("a surface");
+    let (volume, area) = (4.0 / 3.0 * PI * 8.0, 4.0 * PI * 4.0);
+    let h = found.geometry.spacing[0];
+    println!("h {h}: {:?}, {:?}", found.measures, found.hausdorff);
+    assert!((found.measures.volume / volume - 1.0).abs() < 0.02, "{}", found.measures.volume);
+    assert!((found.measures.area / area - 1.0).abs() < 0.05, "{}", found.measures.area);
+    assert!(found.measures.is_closed() && found.measures.components == 1);
+    let off = found.hausdorff.expect("points");
+    assert!(off.mean < 0.12 * h && off.max < 1.5 * h, "{off:?} at {h}");
+}
+
+#[test]
+fn bodies_beside_and_inside_each_other_stay_apart() {
+    let big = sphere([0.0; 3], 2.0, 4000, |_| true);
+    let beside = [big.clone(), sphere([5.0, 0.0, 0.0], 1.0, 1000, |_| true)].concat();
+    let found = by_defaults(&beside).expect("surfaces");
+    assert_eq!((found.measures.components, found.spaces), (2, 2));
+    assert!(found.measures.is_closed());
+    // What lies inside another body is inside of it: the outer surface is the one.
+    let inside = [big, sphere([0.0; 3], 1.0, 1000, |_| true)].concat();
+    let found = by_defaults(&inside).expect("surfaces");
+    assert!(found.measures.is_closed() && found.measures.components == 1, "{:?}", found.measures);
+    assert!((found.measures.volume / (4.0 / 3.0 * PI * 8.0) - 1.0).abs() < 0.02, "{:?}", found.measures);
+}
+
+#[test]
+fn what_encloses_nothing_is_refused_with_the_reason() {
+    let plane: Vec<[f64; 3]> = (0..2500).map(|n| [f64::from(n % 50), f64::from(n / 50), 0.0]).collect();
+    let line: Vec<[f64; 3]> = (0..100).map(|n| [f64::from(n), 0.5 * f64::from(n), 0.1]).collect();
+    let half = sphere([0.0; 3], 2.0, 3000, |d| d[2] > 0.0);
+    for (name, cloud) in [("plane", plane), ("line", line), ("half sphere", half)] {
+        let error = by_defaults(&cloud).expect_err(name);
+        assert!(error.exit_code() == 2 && error.to_string().contains("enclose nothing"), "{name}: {error}");
+    }
+    assert!(grid_for(&[[1.0; 3]; 5], None).is_none());
+}
+
+#[test]
+fn a_beta_that_leaks_is_named() {
+    let cloud = sphere([0.0; 3], 2.0, 400, |_| true);
+    let grid = grid_for(&cloud, Some([0.1; 3])).expect("a spacing");
+    let settings = ReconstructSettings { beta: Some(0.05), ..ReconstructSettings::default() };
+    let error = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect_err("leaks");
+    assert!(error.to_string().contains("--beta 0.05 the start leaks"), "{error}");
+}
+
+/// u and the mesh, vertex for vertex, for any number of threads and for a window that drops what it loads.
+#[test]
+fn threads_and_memory_change_no_bit() {
+    let cloud = sponge();
+    let grid = grid_around(&cloud, 0.04);
+    let run = |lab: &Lab| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = StoreWriter::create(&folder.path().join("out.zarr"), false).expect("a store");
+        let settings = ReconstructSettings::default();
+        reconstruct(&lab.engine, &grid, &cloud, &settings, Some(&store)).expect("a surface");
+        store.finish().expect("a store");
+        let read = |name: &str| std::fs::read(folder.path().join("out.zarr").join(name)).expect("written");
+        (read("meshes/surface.ply"), read("0/c/0/0/0"))
+    };
+    let first = run(&Lab::new(1));
+    for lab in [Lab::new(2), Lab::new(4), Lab::with_window(2, 2 << 20)] {
+        assert!(run(&lab) == first);
+    }
+}

@@ -1,0 +1,117 @@
+//! `strandline reconstruct` and `measure` as users run them: what they write, in which formats, and what they refuse.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+
+use crate::common::ball::Bench;
+use crate::common::clouds::sphere;
+use crate::common::meshes::{self, Form};
+
+/// A folder with a sphere of radius 2 as a cloud.
+fn bench() -> Bench {
+    let bench = Bench::bare();
+    bench.write("ball.xyz", &lines(&sphere([1.0, 2.0, 3.0], 2.0, 1500, |_| true)));
+    bench
+}
+
+fn lines(cloud: &[[f64; 3]]) -> String {
+    let lines: Vec<String> = cloud.iter().map(|[x, y, z]| format!("{x} {y} {z}")).collect();
+    lines.join("\n")
+}
+
+#[test]
+fn a_run_is_told_and_reported() {
+    let bench = bench();
+    let printed = bench.succeed("reconstruct ball.xyz -o out/x.zarr --mesh out/m.ply --report out/r.json --threads 2");
+    assert!(printed.starts_with("stage ") && printed.contains("closed surface in 1 pieces"), "{printed}");
+    assert_eq!(bench.entries("out"), ["m.ply", "r.json", "x.zarr"]);
+    assert_eq!(
+        fs::read(bench.path("out/m.ply")).unwrap(),
+        fs::read(bench.path("out/x.zarr/meshes/surface.ply")).unwrap()
+    );
+    let report = bench.json("out/x.zarr/report.json");
+    assert_eq!((&report["command"], &report["result"]["closed"]), (&"reconstruct".into(), &true.into()));
+    for key in ["volume", "area", "components", "time_steps", "sor_iterations", "band_voxels", "beta", "stopped_by"] {
+        assert!(!report["result"][key].is_null(), "{key}: {report}");
+    }
+    assert_eq!(bench.json("out/r.json")["result"], report["result"]);
+    let measured: serde_json::Value =
+        serde_json::from_str(&bench.succeed("measure out/m.ply --points ball.xyz --json")).unwrap();
+    for key in ["volume", "area"] {
+        let [told, found] = [&report["result"][key], &measured[key]].map(|v| v.as_f64().unwrap());
+        assert!((told / found - 1.0).abs() < 1e-5, "{key}: {told}, {found}");
+    }
+    let mean = |v: &serde_json::Value| v["hausdorff"]["mean"].as_f64().unwrap();
+    assert!((mean(&measured) / mean(&report["result"]) - 1.0).abs() < 1e-3, "{measured}");
+}
+
+/// Every format holds the same surface; the readers of other programs' files read ours.
+#[test]
+fn meshes_come_in_the_format_of_their_name() {
+    let bench = bench();
+    let volume = |name: &str| {
+        let found: serde_json::Value = serde_json::from_str(&bench.succeed(&format!("measure {name} --json"))).unwrap();
+        assert_eq!((&found["closed"], &found["components"]), (&true.into(), &1.into()), "{name}: {found}");
+        found["volume"].as_f64().unwrap()
+    };
+    for name in ["m.ply", "m.obj", "m.STL", "m.vtp"] {
+        bench.succeed(&format!("reconstruct ball.xyz -q -o none --mesh out/{name}"));
+    }
+    let expected = volume("out/m.ply");
+    for name in ["out/m.obj", "out/m.STL"] {
+        assert!((volume(name) / expected - 1.0).abs() < 1e-6, "{name}");
+    }
+    let vtp = fs::read(bench.path("out/m.vtp")).unwrap();
+    let ply = fs::read(bench.path("out/m.ply")).unwrap();
+    let after = |bytes: &[u8], mark: &[u8]| bytes.windows(mark.len()).position(|w| w == mark).unwrap() + mark.len();
+    let (at, start) = (after(&vtp, b"raw\">\n_"), after(&ply, b"end_header\n"));
+    let length = u64::from_le_bytes(vtp[at..at + 8].try_into().unwrap()) as usize;
+    assert_eq!(vtp[at + 8..at + 8 + length], ply[start..start + length], "the points");
+    let triangles = (ply.len() - start - length) / 13;
+    let head = String::from_utf8_lossy(&vtp[..at]).into_owned();
+    assert!(head.contains(&format!("NumberOfPoints=\"{}\" NumberOfPolys=\"{triangles}\"", length / 12)), "{head}");
+    let tail = vtp.len() - (at + 8 + length);
+    assert_eq!(tail, 8 + 24 * triangles + 8 + 8 * triangles + "\n</AppendedData></VTKFile>\n".len());
+}
+
+#[test]
+fn meshes_are_measured_as_they_are() {
+    let bench = Bench::bare();
+    fs::write(bench.path("box.stl"), Form::StlBinary.write(&meshes::cuboid([10.0, 0.0, 0.0], [12.0, 1.0, 3.0])))
+        .unwrap();
+    bench.write("points.xyz", "11 0.5 4\n10 0 0\n");
+    let printed = bench.succeed("measure box.stl --points points.xyz");
+    for line in ["closed", "pieces      1", "volume      6", "area        22", "0.5 in the mean, 1 at most"] {
+        assert!(printed.contains(line), "{line}: {printed}");
+    }
+}
+
+#[test]
+fn what_cannot_be_done_is_refused_in_a_sentence() {
+    let bench = bench();
+    bench
+        .write("plane.xyz", &lines(&(0..900).map(|n| [f64::from(n % 30), f64::from(n / 30), 0.0]).collect::<Vec<_>>()));
+    bench.write("one.xyz", "1 2 3\n1 2 3\n");
+    for (arguments, code, words) in [
+        ("reconstruct plane.xyz -o out/x.zarr", 2, ["plane.xyz", "enclose nothing"]),
+        ("reconstruct one.xyz -o out/x.zarr", 2, ["one.xyz", "one place"]),
+        ("reconstruct none.xyz -o out/x.zarr", 2, ["none.xyz", ""]),
+        ("reconstruct ball.xyz -o out/x.zarr --spacing 0", 2, ["--spacing", "more than 0"]),
+        ("reconstruct ball.xyz -o out/x.zarr --spacing 1e-5", 2, ["--spacing", "memory"]),
+        ("reconstruct ball.xyz -o out/x.zarr --spacing 1e-300", 2, ["--spacing", "voxels"]),
+        ("reconstruct ball.xyz -o out/x.zarr --beta 0.01", 2, ["--beta 0.01", "leaks"]),
+        ("reconstruct ball.xyz -o out/x.zarr --beta -1", 2, ["--beta", "more than 0"]),
+        ("reconstruct ball.xyz -o out/x.zarr --mesh out/m.xyz", 2, ["m.xyz", ".vtp"]),
+        ("reconstruct ball.xyz -o out/x.zarr --memory 1MiB", 2, ["memory", ""]),
+        ("measure ball.xyz", 2, ["ball.xyz", "no triangle"]),
+    ] {
+        let output = bench.run(arguments);
+        let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {complaint}");
+        let said = complaint.lines().filter(|line| line.starts_with("strandline: ")).collect::<Vec<_>>();
+        assert_eq!(said.len(), 1, "{arguments}: {complaint}");
+        assert!(words.iter().all(|word| said[0].contains(word)), "{arguments}: {complaint}");
+        assert!(bench.entries("out").is_empty(), "{arguments}: {:?}", bench.entries("out"));
+    }
+}
