@@ -2,6 +2,7 @@
 //! (`kernel::distance::second_look`). Nothing more is stored, and no brick is visited for it: whoever reads a box reads
 //! two voxels more around it.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::{Options, Solved, Sources};
@@ -15,6 +16,9 @@ use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::tracked::TrackedSource;
 use crate::kernel::distance::vector_distance::VectorDistance;
 use crate::store::BoxSource;
+
+/// Edge of the pieces that a box is looked at in: some 6 MB of buffers for each thread.
+const PIECE: i64 = 64;
 
 /// A solved distance, each voxel looked at again as it is read.
 pub(super) fn with_second_look<'a, P: Precision>(
@@ -51,18 +55,41 @@ struct SecondLook<'a, S> {
 }
 
 impl<S: TrackedSource> SecondLook<'_, S> {
-    /// Looks at a box and hands on what was seen.
-    fn see(&self, part: &Box3, then: impl FnOnce(&Seen)) -> Result<()> {
+    /// Looks at a box, a piece at a time so that buffers stay small, and hands on what was seen of each.
+    fn see(&self, part: &Box3, mut then: impl FnMut(&Box3, &Seen)) -> Result<()> {
         let (geometry, farthest) = (self.geometry, self.farthest);
-        let known = part.grow(MARGIN).intersect(&geometry.domain());
         self.buffers.with(|(found, seen)| {
-            found.resize(known.len().max(found.len()), NO_SOURCE);
-            let found = &mut found[..known.len()];
-            self.found.read_box(&known, found)?;
-            seen.look(&self.method, &Look { geometry, part, known: &known, found, farthest });
-            then(seen);
+            for piece in pieces(part) {
+                let known = piece.grow(MARGIN).intersect(&geometry.domain());
+                found.resize(known.len().max(found.len()), NO_SOURCE);
+                let found = &mut found[..known.len()];
+                self.found.read_box(&known, found)?;
+                seen.look(&self.method, &Look { geometry, part: &piece, known: &known, found, farthest });
+                then(&piece, seen);
+            }
             Ok(())
         })
+    }
+}
+
+/// Cubes of at most [`PIECE`] voxels an edge that make up a box.
+fn pieces(part: &Box3) -> impl Iterator<Item = Box3> {
+    let part = *part;
+    let counts = part.shape().map(|n| (n + PIECE - 1) / PIECE);
+    Box3::from_shape(counts).rows().flat_map(move |(y, z)| {
+        (0..counts[0]).map(move |x| {
+            let lo = std::array::from_fn(|a| part.lo[a] + PIECE * [x, y, z][a]);
+            Box3::new(lo, lo.map(|v| v + PIECE)).intersect(&part)
+        })
+    })
+}
+
+/// Calls `copy` with the rows of a piece: where each lies in the box, and in the piece.
+fn each_row(part: &Box3, piece: &Box3, mut copy: impl FnMut(Range<usize>, Range<usize>)) {
+    let width = piece.shape()[0] as usize;
+    for (n, (y, z)) in piece.rows().enumerate() {
+        let at = part.offset_of([piece.lo[0], y, z]);
+        copy(at..at + width, n * width..(n + 1) * width);
     }
 }
 
@@ -72,7 +99,9 @@ impl<S: TrackedSource> BoxSource<u32> for SecondLook<'_, S> {
     }
 
     fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
-        self.see(part, |seen| out.copy_from_slice(&seen.sources))
+        self.see(part, |piece, seen| {
+            each_row(part, piece, |to, from| out[to].copy_from_slice(&seen.sources[from]));
+        })
     }
 }
 
@@ -82,10 +111,11 @@ impl<S: TrackedSource, P: Precision> BoxSource<P> for SecondLook<'_, S> {
     }
 
     fn read_box(&self, part: &Box3, out: &mut [P]) -> Result<()> {
-        self.see(part, |seen| {
-            for (out, squared) in out.iter_mut().zip(&seen.squared) {
-                *out = P::from_f64(squared.sqrt().min(self.farthest));
-            }
+        let distance = |squared: f64| P::from_f64(squared.sqrt().min(self.farthest));
+        self.see(part, |piece, seen| {
+            each_row(part, piece, |to, from| {
+                out[to].iter_mut().zip(&seen.squared[from]).for_each(|(out, &squared)| *out = distance(squared));
+            });
         })
     }
 }
