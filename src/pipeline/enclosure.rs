@@ -38,6 +38,15 @@ pub struct Search<'a> {
     pub suffix: &'a str,
 }
 
+impl Search<'_> {
+    /// Whether a basin is inside of a start surface at beta. One that was asked for is held against the depth too: then
+    /// basins of any persistence come, and noise is as deep as its saddle.
+    fn holds(&self, basin: &Basin, beta: f64) -> bool {
+        let deep = self.beta.is_none() || f64::from(basin.depth) > beta;
+        f64::from(basin.saddle) < beta && deep
+    }
+}
+
 /// The hole through which a cloud would leak first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hole {
@@ -89,10 +98,9 @@ pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     loop {
         let around = Vicinity::new(grid, cloud, farthest);
         let (geometry, window) = (around.geometry.clone(), around.window);
-        let (distance, tagging) = flood_within(engine, search, around, farthest)?;
+        let (distance, mut tagging) = flood_within(engine, search, around, farthest)?;
         let beta = search.beta.or_else(|| automatic_beta(&tagging.basins, grid));
-        let holds = |beta: f64| tagging.basins.iter().any(|b| f64::from(b.saddle) < beta && f64::from(b.depth) > beta);
-        let Some(beta) = beta.filter(|&beta| holds(beta)) else {
+        let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|basin| search.holds(basin, beta))) else {
             // The deepest comes first; noise is as deep as its saddle.
             let basin = tagging.basins.first().filter(|b| b.depth >= PERSISTENCE * b.saddle);
             if let (Some(_), Some(basin)) = (search.beta, basin) {
@@ -110,6 +118,7 @@ pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
             farthest = half_width.max(outer) + 3.0 * grid.max_spacing();
             continue;
         }
+        tagging.basins.retain(|basin| search.holds(basin, beta));
         let reaches = Reaches { beta: beta as f32, inner: half_width as f32, outer: outer as f32 };
         return Ok(Found::Enclosed(Box::new(Enclosure { geometry, window, reaches, distance, tagging })));
     }

@@ -117,6 +117,19 @@ fn a_beta_that_leaks_is_named() {
     assert!(error.to_string().contains("--beta 0.05 the start leaks"), "{error}");
 }
 
+/// A beta that was asked for lets basins of any persistence in; the noise among them is no space and no hole.
+#[test]
+fn a_given_beta_finds_the_same_space_and_hole() {
+    let cloud = sponge();
+    let grid = grid_around(&cloud, 0.05);
+    let found = |beta| {
+        let settings = ReconstructSettings { beta, ..ReconstructSettings::default() };
+        reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface")
+    };
+    let (automatic, given) = (found(None), found(Some(0.25)));
+    assert_eq!((given.spaces, given.hole), (1, automatic.hole));
+}
+
 /// u and the mesh, vertex for vertex, for any number of threads and for a window that drops what it loads.
 #[test]
 fn threads_and_memory_change_no_bit() {
