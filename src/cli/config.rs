@@ -1,18 +1,21 @@
 //! What was typed becomes what is meant: settings checked one by one and together, budgets resolved.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::thread::available_parallelism;
 
 use super::args::{Edge, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, StopArg};
+use super::console::Console;
 use super::text::bytes;
 use super::values::Output;
 use crate::error::{Error, Result};
-use crate::exec::machine_memory;
+use crate::exec::{Budget, Cancel, Engine, Progress, machine_memory};
 use crate::pipeline::distance::Method;
 use crate::pipeline::evolve::Stop;
 use crate::pipeline::motion::Motion;
 use crate::pipeline::reconstruct::ReconstructSettings;
 use crate::pipeline::segment::{Overlap, SegmentSettings};
+use crate::store::Scratch;
 
 /// What a run may use.
 #[derive(Clone, Debug)]
@@ -20,6 +23,15 @@ pub(super) struct Resources {
     pub(super) memory: u64,
     pub(super) threads: usize,
     pub(super) scratch: PathBuf,
+}
+
+impl Resources {
+    /// An engine that keeps to them, with a window of so many bytes of scratch pages.
+    pub(super) fn engine(&self, window: u64, cancel: &Cancel, console: &Arc<Console>) -> Result<Engine> {
+        let scratch = Scratch::new(&self.scratch, window);
+        let progress: Arc<dyn Progress> = console.clone();
+        Engine::new(self.threads, scratch, Budget { total: self.memory }, cancel.clone(), progress)
+    }
 }
 
 const L2_TOLERANCE: f64 = 1e-3;

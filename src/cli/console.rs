@@ -27,6 +27,17 @@ pub(super) enum Voice {
     Verbose,
 }
 
+impl Voice {
+    /// What the two flags ask for.
+    pub(super) fn of(quiet: bool, verbose: bool) -> Self {
+        match (quiet, verbose) {
+            (true, _) => Self::Quiet,
+            (_, true) => Self::Verbose,
+            _ => Self::Normal,
+        }
+    }
+}
+
 /// The user's side of a run.
 pub(super) struct Console {
     voice: Voice,

@@ -11,18 +11,18 @@ use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::distance_args::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
 use super::grid::grid;
-use super::report::{Grid, Report};
+use super::report::{Ran, Report};
 use super::text::{bytes, duration, grouped, number, triple};
 use super::{print, signals, table};
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
+use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::precision::Precision;
 use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, Schedule, Textbook, distance};
-use crate::store::{Scratch, free_space};
+use crate::store::free_space;
 
 /// More ranks than this are no use in one process.
 const MOST_RANKS: usize = 64;
@@ -57,12 +57,7 @@ impl Job {
         let mut settings = settings(&args)?;
         config::check_outputs(&args.output.output, &[&args.output.report], args.output.overwrite)?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
-        let voice = match (args.output.quiet, args.output.verbose) {
-            (true, _) => Voice::Quiet,
-            (_, true) => Voice::Verbose,
-            _ => Voice::Normal,
-        };
-        let console = Arc::new(Console::new(voice));
+        let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
         let sets = read_sets(&args, &console)?;
         let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
         let mut notes = Vec::new();
@@ -89,10 +84,7 @@ impl Job {
             return Ok(());
         }
         self.console.say(&plan);
-        let scratch = Scratch::new(&self.resources.scratch, window);
-        let budget = Budget { total: self.resources.memory };
-        let progress: Arc<dyn Progress> = self.console.clone();
-        let engine = Engine::new(self.resources.threads, scratch, budget, self.cancel.clone(), progress)?;
+        let engine = self.resources.engine(window, &self.cancel, &self.console)?;
         let engine = engine.with_ranks(self.args.ranks);
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
@@ -188,21 +180,16 @@ impl Job {
     }
 
     fn report(&self, engine: &Engine, found: &DistanceFound) -> Report<Settings, Found> {
-        Report {
-            version: env!("CARGO_PKG_VERSION"),
+        let ran = Ran {
             command: "distance",
-            arguments: self.typed.clone(),
-            settings: Settings::new(&self.args, &self.settings, &self.resources),
-            grid: Grid::new(&self.geometry),
-            threads: engine.threads(),
+            typed: &self.typed,
+            resources: &self.resources,
+            console: &self.console,
+            engine,
             ranks: engine.ranks(),
-            memory_budget_bytes: self.resources.memory,
-            peak_rss_bytes: peak_resident(),
-            seconds: self.started.elapsed().as_secs_f64(),
-            notes: self.console.notes(),
-            stages: engine.reports().into_iter().map(Into::into).collect(),
-            result: Found::new(found),
-        }
+            started: self.started,
+        };
+        Report::new(&ran, Settings::new(&self.args, &self.settings, &self.resources), &self.geometry, Found::new(found))
     }
 }
 

@@ -12,18 +12,18 @@ use super::console::{Console, Voice};
 use super::files::{export_mesh, mesh_format};
 use super::grid::check_counts;
 use super::reconstruct_args::ReconstructArgs;
-use super::report::{Grid, Hausdorff, Hole, Report, stop_rule};
+use super::report::{Hausdorff, Hole, Moves, Ran, Report};
 use super::text::{bytes, duration, grouped, number, triple};
 use super::{print, signals, table};
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
+use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct,
 };
-use crate::store::{Scratch, free_space};
+use crate::store::free_space;
 
 /// A reconstruction that is ready to start: the cloud is read and checked.
 struct Job {
@@ -64,12 +64,7 @@ impl Job {
         config::check_outputs(&args.output.output, &[&args.output.report, &args.mesh], args.output.overwrite)?;
         args.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
-        let voice = match (args.output.quiet, args.output.verbose) {
-            (true, _) => Voice::Quiet,
-            (_, true) => Voice::Verbose,
-            _ => Voice::Normal,
-        };
-        let console = Arc::new(Console::new(voice));
+        let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
         let cloud = match read_source(&args.cloud)? {
             Source::Cloud(cloud) => cloud.positions,
             Source::Mesh(mesh) => {
@@ -127,10 +122,7 @@ impl Job {
     }
 
     fn run(&self, window: u64, estimate: &Estimate) -> Result<()> {
-        let scratch = Scratch::new(&self.resources.scratch, window);
-        let budget = Budget { total: self.resources.memory };
-        let progress: Arc<dyn Progress> = self.console.clone();
-        let engine = Engine::new(self.resources.threads, scratch, budget, self.cancel.clone(), progress)?;
+        let engine = self.resources.engine(window, &self.cancel, &self.console)?;
         engine.reserve(estimate.held)?;
         let result = self.solve_and_write(&engine);
         self.console.clear();
@@ -169,21 +161,16 @@ impl Job {
     }
 
     fn report(&self, engine: &Engine, found: &Reconstruction) -> Report<Settings, Found> {
-        Report {
-            version: env!("CARGO_PKG_VERSION"),
+        let ran = Ran {
             command: "reconstruct",
-            arguments: self.typed.clone(),
-            settings: Settings::new(self, found),
-            grid: Grid::new(&found.geometry),
-            threads: engine.threads(),
+            typed: &self.typed,
+            resources: &self.resources,
+            console: &self.console,
+            engine,
             ranks: engine.ranks(),
-            memory_budget_bytes: self.resources.memory,
-            peak_rss_bytes: peak_resident(),
-            seconds: self.started.elapsed().as_secs_f64(),
-            notes: self.console.notes(),
-            stages: engine.reports().into_iter().map(Into::into).collect(),
-            result: Found::new(found, self.cloud.len() as u64),
-        }
+            started: self.started,
+        };
+        Report::new(&ran, Settings::new(self, found), &found.geometry, Found::new(found, self.cloud.len() as u64))
     }
 }
 
@@ -236,37 +223,21 @@ struct Settings {
     cloud: String,
     output: Option<String>,
     method: &'static str,
-    theta: f64,
-    delta: f64,
+    #[serde(flatten)]
+    motion: Moves,
     /// Null when it was found; it is then in the result.
     beta: Option<f64>,
-    tau: f64,
-    epsilon: f64,
-    omega: f64,
-    stop: &'static str,
-    tol: f64,
-    max_steps: u32,
     scratch: String,
 }
 
 impl Settings {
     fn new(job: &Job, found: &Reconstruction) -> Self {
-        let (settings, geometry) = (&job.settings, &found.geometry);
-        let motion = &settings.motion;
-        let (stop, tol) = stop_rule(motion.stop);
         Self {
             cloud: job.args.cloud.display().to_string(),
             output: job.args.output.output.path().map(|path| path.display().to_string()),
-            method: settings.method.name(),
-            theta: motion.theta,
-            delta: motion.delta_on(geometry),
-            beta: settings.beta,
-            tau: motion.tau_on(geometry),
-            epsilon: motion.epsilon_on(geometry),
-            omega: motion.omega,
-            stop,
-            tol,
-            max_steps: motion.max_steps,
+            method: job.settings.method.name(),
+            motion: Moves::new(&job.settings.motion, &found.geometry),
+            beta: job.settings.beta,
             scratch: job.resources.scratch.display().to_string(),
         }
     }

@@ -2,13 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Instant;
 
 use serde::Serialize;
 
+use super::config::Resources;
+use super::console::Console;
 use crate::error::{Error, Result};
-use crate::exec::StageReport;
+use crate::exec::{Engine, StageReport, peak_resident};
 use crate::grid::Geometry;
 use crate::pipeline::evolve::Stop;
+use crate::pipeline::motion::Motion;
 use crate::pipeline::segment::{ObjectReport, Outcome, Overlap, SegmentSettings};
 
 /// The whole report.
@@ -49,19 +53,13 @@ pub(super) struct Settings {
 #[derive(Debug, Serialize)]
 pub(super) struct Solver {
     method: &'static str,
-    theta: f64,
+    #[serde(flatten)]
+    motion: Moves,
     rho: f64,
-    delta: f64,
     k: f64,
     sigma: f64,
     /// Null when it was found for each object; it is then in the results.
     beta: Option<f64>,
-    tau: f64,
-    epsilon: f64,
-    omega: f64,
-    stop: &'static str,
-    tol: f64,
-    max_steps: u32,
     edge: &'static str,
     caps: bool,
     percentiles: [f64; 2],
@@ -146,11 +144,35 @@ impl From<crate::pipeline::enclosure::Hole> for Hole {
     }
 }
 
-/// The rule that ends a time loop, and its limit.
-pub(super) fn stop_rule(stop: Stop) -> (&'static str, f64) {
-    match stop {
-        Stop::Surface(limit) => ("surface", limit),
-        Stop::L2(limit) => ("l2", limit),
+/// How the surface moved.
+#[derive(Debug, Serialize)]
+pub(super) struct Moves {
+    theta: f64,
+    delta: f64,
+    tau: f64,
+    epsilon: f64,
+    omega: f64,
+    stop: &'static str,
+    tol: f64,
+    max_steps: u32,
+}
+
+impl Moves {
+    pub(super) fn new(motion: &Motion, geometry: &Geometry) -> Self {
+        let (stop, tol) = match motion.stop {
+            Stop::Surface(limit) => ("surface", limit),
+            Stop::L2(limit) => ("l2", limit),
+        };
+        Self {
+            theta: motion.theta,
+            delta: motion.delta_on(geometry),
+            tau: motion.tau_on(geometry),
+            epsilon: motion.epsilon_on(geometry),
+            omega: motion.omega,
+            stop,
+            tol,
+            max_steps: motion.max_steps,
+        }
     }
 }
 
@@ -159,7 +181,7 @@ fn zyx<T: Copy>([x, y, z]: [T; 3]) -> [T; 3] {
 }
 
 impl Grid {
-    pub(super) fn new(geometry: &Geometry) -> Self {
+    fn new(geometry: &Geometry) -> Self {
         Self {
             shape_zyx: zyx(geometry.shape),
             spacing_zyx: zyx(geometry.spacing),
@@ -171,21 +193,13 @@ impl Grid {
 
 impl Solver {
     pub(super) fn new(settings: &SegmentSettings, geometry: &Geometry) -> Self {
-        let (stop, tol) = stop_rule(settings.motion.stop);
         Self {
             method: settings.method.name(),
-            theta: settings.motion.theta,
+            motion: Moves::new(&settings.motion, geometry),
             rho: settings.motion.rho,
-            delta: settings.motion.delta_on(geometry),
             k: settings.k,
             sigma: settings.sigma_on(geometry),
             beta: settings.beta,
-            tau: settings.motion.tau_on(geometry),
-            epsilon: settings.motion.epsilon_on(geometry),
-            omega: settings.motion.omega,
-            stop,
-            tol,
-            max_steps: settings.motion.max_steps,
             edge: if settings.motion.normalised { "normalised" } else { "plain" },
             caps: settings.caps,
             percentiles: settings.percentiles,
@@ -255,7 +269,36 @@ pub(super) fn crop_xyz(part: &crate::grid::Box3) -> [[i64; 2]; 3] {
     std::array::from_fn(|a| [part.lo[a], part.hi[a]])
 }
 
+/// What a report tells of a run, whatever it was for.
+pub(super) struct Ran<'a> {
+    pub(super) command: &'static str,
+    pub(super) typed: &'a [String],
+    pub(super) resources: &'a Resources,
+    pub(super) console: &'a Console,
+    pub(super) engine: &'a Engine,
+    pub(super) ranks: usize,
+    pub(super) started: Instant,
+}
+
 impl<S: Serialize, R: Serialize> Report<S, R> {
+    pub(super) fn new(ran: &Ran<'_>, settings: S, geometry: &Geometry, result: R) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            command: ran.command,
+            arguments: ran.typed.to_vec(),
+            settings,
+            grid: Grid::new(geometry),
+            threads: ran.engine.threads(),
+            ranks: ran.ranks,
+            memory_budget_bytes: ran.resources.memory,
+            peak_rss_bytes: peak_resident(),
+            seconds: ran.started.elapsed().as_secs_f64(),
+            notes: ran.console.notes(),
+            stages: ran.engine.reports().into_iter().map(Into::into).collect(),
+            result,
+        }
+    }
+
     /// Writes the report; nothing stands under the name before it is whole.
     pub(super) fn write(&self, path: &Path) -> Result<()> {
         let fault = |error: std::io::Error| Error::from_io("the report cannot be written", &error).at(path);

@@ -9,17 +9,17 @@ use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::files::{export_mesh, mesh_format};
 use super::input::{Marks, crop_box, open_stack, read_marks};
-use super::report::{Found, Grid, Report, Settings, Solver, crop_xyz};
+use super::report::{Found, Ran, Report, Settings, Solver, crop_xyz};
 use super::text::{bytes, duration, grouped, number, triple};
 use super::{picture, print, signals, table};
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Engine, Progress, peak_resident};
+use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stacks::{Select, Stack};
 use crate::pipeline::marks::split;
 use crate::pipeline::segment::{Estimate, Guides, Outcome, SegmentSettings, check_marks, estimate, segment};
-use crate::store::{Scratch, free_space};
+use crate::store::free_space;
 
 /// A segmentation that is ready to start: all inputs are open and checked.
 pub(super) struct Job {
@@ -73,12 +73,7 @@ impl Job {
         )?;
         args.output.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = config::resources(&args.resources, args.output.store())?;
-        let voice = match (args.output.quiet, args.output.verbose) {
-            (true, _) => Voice::Quiet,
-            (_, true) => Voice::Verbose,
-            _ => Voice::Normal,
-        };
-        let console = Arc::new(Console::new(voice));
+        let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
         let select = Select { channel: args.picture.channel, time: args.picture.time };
         let opened = open_stack(&args.image, select, spacing)?;
         opened.notes.iter().for_each(|note| console.note(note));
@@ -165,10 +160,7 @@ impl Job {
         if self.console.is_verbose() {
             self.console.say(&self.describe());
         }
-        let scratch = Scratch::new(&self.resources.scratch, window);
-        let budget = Budget { total: self.resources.memory };
-        let progress: Arc<dyn Progress> = self.console.clone();
-        let engine = Engine::new(self.resources.threads, scratch, budget, self.cancel.clone(), progress)?;
+        let engine = self.resources.engine(window, &self.cancel, &self.console)?;
         engine.reserve(estimate.held)?;
         let result = self.solve_and_write(&engine);
         self.console.clear();
@@ -253,21 +245,16 @@ impl Job {
             solver: Solver::new(&self.settings, &self.geometry),
             scratch: self.resources.scratch.display().to_string(),
         };
-        Report {
-            version: env!("CARGO_PKG_VERSION"),
+        let ran = Ran {
             command: self.command,
-            arguments: self.typed.clone(),
-            settings,
-            grid: Grid::new(&outcome.geometry),
-            threads: engine.threads(),
+            typed: &self.typed,
+            resources: &self.resources,
+            console: &self.console,
+            engine,
             ranks: engine.comm().ranks(),
-            memory_budget_bytes: self.resources.memory,
-            peak_rss_bytes: peak_resident(),
-            seconds: self.started.elapsed().as_secs_f64(),
-            notes: self.console.notes(),
-            stages: engine.reports().into_iter().map(Into::into).collect(),
-            result: Found::new(outcome),
-        }
+            started: self.started,
+        };
+        Report::new(&ran, settings, &outcome.geometry, Found::new(outcome))
     }
 
     /// The image and its settings in a few lines.

@@ -7,8 +7,11 @@
 //! neighbours has more than 2 (d - t)^2 + 2 h^2, no source is nearer than d - t. On the faces of Voronoi cells a pair
 //! along the face has it. The pair may have lost sources itself, at a ridge along the axis; so a second pair must not
 //! fall off either: its sum must be more than 2 (d - k)^2. What is left are the edges and corners where cells meet, few
-//! voxels of all. In: source indices, [`NO_SOURCE`] where none is known, halo 2 on all 26 sides; out: source indices.
-//! Ties keep the source that was there; of equally near others the first in `[z][y][x]` order is taken.
+//! voxels of all.
+//!
+//! In: source indices, [`NO_SOURCE`] where none is known, halo 2 on all 26 sides; out: source indices and squared
+//! distances, f64. Bends are looked for in f32. Ties keep the source that was there; of equally near others the first in
+//! `[z][y][x]` order is taken.
 
 use super::initialise::NO_SOURCE;
 use super::precision::Real;
@@ -49,7 +52,7 @@ pub struct Seen {
     pub squared: Vec<f64>,
     /// Squared distances of the part and of the voxels one step beyond, rounded.
     grown: Vec<f32>,
-    /// Voxels of a row where something may have been lost.
+    /// Voxels of a plane where something may have been lost.
     bent: Vec<u32>,
 }
 
