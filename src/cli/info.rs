@@ -171,7 +171,8 @@ fn groups(store: &Path) -> Vec<String> {
 /// The inputs that a report names: an image, or sources.
 fn made_from(settings: &Value) -> String {
     let sources = settings["sources"].as_array().into_iter().flatten();
-    let names: Vec<&str> = settings["image"].as_str().into_iter().chain(sources.filter_map(Value::as_str)).collect();
+    let single = ["image", "cloud"].iter().filter_map(|key| settings[key].as_str());
+    let names: Vec<&str> = single.chain(sources.filter_map(Value::as_str)).collect();
     names.join(", ")
 }
 

@@ -30,6 +30,8 @@ fn a_run_is_told_and_reported() {
         fs::read(bench.path("out/m.ply")).unwrap(),
         fs::read(bench.path("out/x.zarr/meshes/surface.ply")).unwrap()
     );
+    let told = bench.succeed("info out/x.zarr");
+    assert!(told.lines().any(|line| line.starts_with("from ") && line.ends_with("ball.xyz")), "{told}");
     let report = bench.json("out/x.zarr/report.json");
     assert_eq!((&report["command"], &report["result"]["closed"]), (&"reconstruct".into(), &true.into()));
     for key in ["volume", "area", "components", "time_steps", "sor_iterations", "band_voxels", "beta", "stopped_by"] {
