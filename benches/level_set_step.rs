@@ -124,10 +124,11 @@ fn plain(scene: &Scene, tolerance: f64) -> Cost {
 fn ours(scene: &Scene, threads: usize, tolerance: f64) -> Cost {
     let lab = Lab::new(threads);
     let set = dense(scene.grid.shape, CELL as i64);
-    let (distance, level, g) = (lab.field(&set, &scene.d), lab.field(&set, &scene.level), lab.field(&set, &scene.g));
+    let inside: Vec<u8> = scene.level.iter().map(|level| u8::from(*level < 3.0)).collect();
+    let (distance, inside, g) = (lab.field(&set, &scene.d), lab.field(&set, &inside), lab.field(&set, &scene.g));
     let stage = lab.engine.stage("band", 0);
-    let reaches = Reaches { beta: 3.0, inner: HALF as f32, outer: HALF as f32 };
-    let mut band = make_band(&stage, &lab.engine, &distance, &level, &reaches).expect("room for a band");
+    let reaches = Reaches { inner: HALF as f32, outer: HALF as f32 };
+    let mut band = make_band(&stage, &lab.engine, &distance, &inside, &reaches).expect("room for a band");
     let edges = lab.field(&band.solved.set().clone(), &whole(&g));
     let velocity = Velocity {
         theta: VELOCITY.theta as f32,

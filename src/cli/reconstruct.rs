@@ -198,11 +198,13 @@ fn describe_found(found: &Reconstruction) -> String {
         number(m.area),
         grouped(m.triangles)
     )];
-    lines.extend(
-        found
-            .hausdorff
-            .map(|h| format!("points off the surface: {} in the mean, {} at most", number(h.mean), number(h.max))),
-    );
+    lines.extend(found.hausdorff.map(|h| {
+        let lost = match found.lost_points {
+            0 => String::new(),
+            lost => format!("; {} of them more than a voxel", grouped(lost)),
+        };
+        format!("points off the surface: {} in the mean, {} at most{lost}", number(h.mean), number(h.max))
+    }));
     lines.extend(
         found
             .hole
@@ -254,6 +256,8 @@ struct Found {
     open_edges: u64,
     hausdorff: Option<Hausdorff>,
     cloud_points: u64,
+    /// Points farther from the surface than a voxel.
+    lost_points: u64,
     spaces: usize,
     beta: f64,
     hole: Option<Hole>,
@@ -275,6 +279,7 @@ impl Found {
             open_edges: found.measures.open_edges,
             hausdorff: found.hausdorff.map(Into::into),
             cloud_points,
+            lost_points: found.lost_points,
             spaces: found.spaces,
             beta: found.beta,
             hole: found.hole.map(Into::into),

@@ -36,6 +36,12 @@ impl Triangle {
         Self { a, ab, ac, gram, determinant, is_thin: determinant <= THIN * longest * longest }
     }
 
+    /// Its first corner.
+    #[must_use]
+    pub fn corner(&self) -> [f64; 3] {
+        self.a
+    }
+
     /// The squared distance from `point` to the triangle.
     #[must_use]
     pub fn distance_squared(&self, point: [f64; 3]) -> f64 {

@@ -1,14 +1,15 @@
-//! What a cloud encloses: the distance around it, the flood from outside, and how far the band must reach. The distance
-//! is computed within a reach that grows until something enclosed is found or nothing can be.
+//! What a cloud encloses: the distance around it, which side of it voxels are on, and how far the band must reach. The
+//! distance is computed within a reach that grows until something enclosed is found or nothing can be.
 
 use std::sync::Arc;
 
 use super::band::{Band, Reaches, make_band};
 use super::distance::{Method, Sources, cloud_distance};
-use super::tagging::{Basin, Tagging, tag};
+use super::tagging::{Basin, tag};
 use super::vicinity::{Vicinity, voxel_bounds};
+use super::watershed::{Sides, watershed};
 use crate::error::Result;
-use crate::exec::Engine;
+use crate::exec::{Engine, Stage};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::level_set::persistence::PERSISTENCE;
 use crate::store::BrickArray;
@@ -21,6 +22,19 @@ const BAND_VOXELS: f64 = 4.0;
 /// The search begins at so many largest spacings from the cloud.
 const FIRST_REACH_VOXELS: f64 = 6.0;
 
+/// The search goes on while fewer of the points than this share have both sides beside them: a body may be open wider
+/// than the reach.
+const ENOUGH_BETWEEN: f64 = 0.9;
+
+/// Where the start surface lies when no beta is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Between the points, each hole closed where it is narrowest.
+    Watershed,
+    /// At one distance from all points, a little beyond the largest hole.
+    Tube,
+}
+
 /// A cloud, and how what it encloses is looked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Search<'a> {
@@ -32,6 +46,8 @@ pub struct Search<'a> {
     pub method: Method,
     /// Distance of the start surface from the cloud; automatic when none.
     pub beta: Option<f64>,
+    /// Where it lies otherwise.
+    pub start: Start,
     /// The distance from the cloud within which the search begins.
     pub first_reach: f64,
     /// What is added to the names of stages.
@@ -44,6 +60,12 @@ impl Search<'_> {
     fn holds(&self, basin: &Basin, beta: f64) -> bool {
         let deep = self.beta.is_none() || f64::from(basin.depth) > beta;
         f64::from(basin.saddle) < beta && deep
+    }
+
+    /// The cloud's extents along x, y, z.
+    fn extents(&self) -> [f64; 3] {
+        let bounds = voxel_bounds(self.cloud, self.grid);
+        std::array::from_fn(|a| bounds.shape()[a] as f64 * self.grid.spacing[a])
     }
 }
 
@@ -62,10 +84,13 @@ pub struct Enclosure {
     pub geometry: Geometry,
     /// The box in voxels of the grid that was given.
     pub window: Box3,
-    /// Where the start surface lies and how far the band reaches.
+    /// How far from the cloud the start surface lies; 0 where it runs between the points.
+    pub beta: f64,
+    /// How far the band reaches.
     pub reaches: Reaches,
     distance: BrickArray<f32>,
-    tagging: Tagging,
+    inside: BrickArray<u8>,
+    basins: Vec<Basin>,
 }
 
 /// What a search ends with.
@@ -90,23 +115,57 @@ pub fn first_reach_for(grid: &Geometry, beta: Option<f64>) -> f64 {
 /// # Errors
 /// When scratch runs out or the run is interrupted.
 pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
-    let Search { grid, cloud, .. } = *search;
-    let bounds = voxel_bounds(cloud, grid);
-    let extent = (0..3).map(|a| bounds.shape()[a] as f64 * grid.spacing[a]).fold(0.0, f64::max);
+    match (search.beta, search.start) {
+        (None, Start::Watershed) => enclose_by_sides(engine, search),
+        _ => enclose_by_flood(engine, search),
+    }
+}
+
+/// The watershed of the distance, within a reach that grows until most points have both sides beside them.
+fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
+    let grid = search.grid;
+    let half_width = BAND_VOXELS * grid.voxel_volume().cbrt();
+    let mut farthest = search.first_reach.max(half_width + 3.0 * grid.max_spacing());
+    loop {
+        let around = Around::new(engine, search, farthest)?;
+        let stage = around.tagging(engine, search);
+        let Sides { inside, basins, points_between } =
+            watershed(&stage, engine, &around.sources(search), &around.distance)?;
+        stage.finish();
+        let enough = points_between as f64 >= ENOUGH_BETWEEN * search.cloud.len() as f64;
+        // No ball fits the box around the cloud that is larger.
+        let all = 2.0 * farthest > search.extents().into_iter().fold(f64::INFINITY, f64::min) + grid.max_spacing();
+        if !basins.is_empty() && (enough || all) {
+            let reaches = Reaches { inner: half_width as f32, outer: half_width as f32 };
+            return Ok(around.enclosed(0.0, reaches, inside, basins));
+        }
+        if all {
+            return Ok(Found::Nothing);
+        }
+        farthest *= 2.0;
+    }
+}
+
+/// The flood from outside, to a start surface at one distance from all of the cloud.
+fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
+    let grid = search.grid;
     let mean = grid.voxel_volume().cbrt();
     let mut farthest = search.first_reach;
     loop {
-        let around = Vicinity::new(grid, cloud, farthest);
-        let (geometry, window) = (around.geometry.clone(), around.window);
-        let (distance, mut tagging) = flood_within(engine, search, around, farthest)?;
+        let around = Around::new(engine, search, farthest)?;
+        let stage = around.tagging(engine, search);
+        // Whoever names a beta knows how deep the inside is.
+        let ratio = if search.beta.is_some() { 1.0 } else { PERSISTENCE };
+        let mut tagging = tag(&stage, engine, &around.sources(search), &around.distance, ratio)?;
         let beta = search.beta.or_else(|| automatic_beta(&tagging.basins, grid));
         let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|basin| search.holds(basin, beta))) else {
+            stage.finish();
             // The deepest comes first; noise is as deep as its saddle.
             let basin = tagging.basins.first().filter(|b| b.depth >= PERSISTENCE * b.saddle);
             if let (Some(_), Some(basin)) = (search.beta, basin) {
                 return Ok(Found::Leaks(basin.saddle));
             }
-            if farthest > extent {
+            if farthest > search.extents().into_iter().fold(0.0, f64::max) {
                 return Ok(Found::Nothing);
             }
             farthest *= 2.0;
@@ -115,35 +174,16 @@ pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         let half_width = (2.0 * beta).max(BAND_VOXELS * mean);
         let outer = (beta + 0.5 * half_width).max(half_width);
         if half_width.max(outer) + 2.0 * grid.max_spacing() > farthest {
+            stage.finish();
             farthest = half_width.max(outer) + 3.0 * grid.max_spacing();
             continue;
         }
         tagging.basins.retain(|basin| search.holds(basin, beta));
-        let reaches = Reaches { beta: beta as f32, inner: half_width as f32, outer: outer as f32 };
-        return Ok(Found::Enclosed(Box::new(Enclosure { geometry, window, reaches, distance, tagging })));
+        let inside = tagging.inside(&stage, engine, beta as f32)?;
+        stage.finish();
+        let reaches = Reaches { inner: half_width as f32, outer: outer as f32 };
+        return Ok(around.enclosed(beta, reaches, inside, tagging.basins));
     }
-}
-
-fn flood_within(
-    engine: &Engine,
-    search: &Search<'_>,
-    around: Vicinity,
-    farthest: f64,
-) -> Result<(BrickArray<f32>, Tagging)> {
-    let set = Arc::new(around.cells);
-    let voxels = (set.len() * set.grid().brick_len()) as u64;
-    let sources = Sources::cloud(&around.geometry, search.cloud, &around.bins);
-    let stage = engine.stage(&format!("distance{}", search.suffix), 11 * set.len() as u64);
-    stage.voxels(voxels);
-    let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
-    stage.finish();
-    let stage = engine.stage(&format!("tagging{}", search.suffix), 0);
-    stage.voxels(voxels);
-    // Whoever names a beta knows how deep the inside is.
-    let ratio = if search.beta.is_some() { 1.0 } else { PERSISTENCE };
-    let tagging = tag(&stage, engine, &sources, &distance, ratio)?;
-    stage.finish();
-    Ok((distance, tagging))
 }
 
 fn automatic_beta(basins: &[Basin], grid: &Geometry) -> Option<f64> {
@@ -151,19 +191,61 @@ fn automatic_beta(basins: &[Basin], grid: &Geometry) -> Option<f64> {
     Some((ABOVE_SADDLE * saddle).max(SMALLEST_BETA_VOXELS * grid.min_spacing()))
 }
 
+/// The distance within some reach of the cloud.
+struct Around {
+    vicinity: Vicinity,
+    distance: BrickArray<f32>,
+}
+
+impl Around {
+    fn new(engine: &Engine, search: &Search<'_>, farthest: f64) -> Result<Self> {
+        let vicinity = Vicinity::new(search.grid, search.cloud, farthest);
+        let set = Arc::new(vicinity.cells.clone());
+        let sources = Sources::cloud(&vicinity.geometry, search.cloud, &vicinity.bins);
+        let stage = engine.stage(&format!("distance{}", search.suffix), 11 * set.len() as u64);
+        stage.voxels((set.len() * set.grid().brick_len()) as u64);
+        let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
+        stage.finish();
+        Ok(Self { vicinity, distance })
+    }
+
+    fn sources<'a>(&'a self, search: &Search<'a>) -> Sources<'a> {
+        Sources::cloud(&self.vicinity.geometry, search.cloud, &self.vicinity.bins)
+    }
+
+    fn tagging<'a>(&self, engine: &'a Engine, search: &Search<'_>) -> Stage<'a> {
+        let set = self.distance.set();
+        let stage = engine.stage(&format!("tagging{}", search.suffix), 0);
+        stage.voxels((set.len() * set.grid().brick_len()) as u64);
+        stage
+    }
+
+    fn enclosed(self, beta: f64, reaches: Reaches, inside: BrickArray<u8>, basins: Vec<Basin>) -> Found {
+        let Vicinity { geometry, window, .. } = self.vicinity;
+        Found::Enclosed(Box::new(Enclosure {
+            geometry,
+            window,
+            beta,
+            reaches,
+            distance: self.distance,
+            inside,
+            basins,
+        }))
+    }
+}
+
 impl Enclosure {
     /// The cloud's largest hole.
     #[must_use]
     pub fn hole(&self) -> Option<Hole> {
-        let basins = self.tagging.basins.iter();
-        let basin = basins.max_by(|a, b| a.saddle.total_cmp(&b.saddle))?;
+        let basin = self.basins.iter().max_by(|a, b| a.saddle.total_cmp(&b.saddle))?;
         Some(Hole { width: 2.0 * f64::from(basin.saddle), place: self.geometry.position(basin.place) })
     }
 
     /// Number of enclosed spaces.
     #[must_use]
     pub fn spaces(&self) -> usize {
-        self.tagging.basins.len()
+        self.basins.len()
     }
 
     /// Makes the band; the fields of the search go.
@@ -171,8 +253,8 @@ impl Enclosure {
     /// # Errors
     /// When scratch runs out or the run is interrupted.
     pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<Band> {
-        let stage = engine.stage(&format!("band{suffix}"), self.tagging.level.set().len() as u64);
-        let band = make_band(&stage, engine, &self.distance, &self.tagging.level, &self.reaches)?;
+        let stage = engine.stage(&format!("band{suffix}"), self.inside.set().len() as u64);
+        let band = make_band(&stage, engine, &self.distance, &self.inside, &self.reaches)?;
         stage.finish();
         Ok(band)
     }

@@ -15,6 +15,17 @@ use crate::store::{BoxSource, BrickArray, MeshSink, NoMesh};
 /// Bricks whose patches are made in parallel before they are welded in order.
 const BATCH: usize = 256;
 
+/// A surface that was drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drawn {
+    /// What it measures.
+    pub measures: Measures,
+    /// Distances of the points from it; none without points or surface.
+    pub hausdorff: Option<Hausdorff>,
+    /// Points that are farther from it than the largest spacing.
+    pub lost_points: u64,
+}
+
 /// Draws the closed surface of `u`, as a PLY file where `mesh` names one; measures it, and how far `points` lie from
 /// it.
 ///
@@ -26,7 +37,7 @@ pub fn draw(
     geometry: &Geometry,
     points: &[[f64; 3]],
     mesh: Option<&Path>,
-) -> Result<(Measures, Option<Hausdorff>)> {
+) -> Result<Drawn> {
     let measures = match mesh {
         Some(path) => {
             let mut mesh = PlyWriter::create(path, geometry.unit.as_deref())?;
@@ -37,7 +48,8 @@ pub fn draw(
         None => extract(stage, u, geometry, &mut NoMesh)?,
     };
     let distances = distances_to(stage, u, geometry, points)?;
-    Ok((measures, Hausdorff::of(distances.into_iter().flatten())))
+    let lost_points = distances.iter().flatten().filter(|&&d| d > geometry.max_spacing()).count() as u64;
+    Ok(Drawn { measures, hausdorff: Hausdorff::of(distances.into_iter().flatten()), lost_points })
 }
 
 /// Sends the closed surface of `u` to `sink` and measures it.
@@ -182,10 +194,22 @@ impl Shells {
     ) -> Result<()> {
         patch_of(u, id, &mut self.cubes, &mut self.values, &mut self.patch)?;
         let world = |p: [f64; 3]| std::array::from_fn(|a| geometry.origin[a] + p[a] * geometry.spacing[a]);
+        // A triangle lies inside one cube of voxels: from its first corner none of it is farther than that.
+        let size = geometry.spacing.iter().map(|h| h * h).sum::<f64>().sqrt() * (1.0 + 1e-9);
+        let limit = |squared: f64| (squared.sqrt() + size) * (squared.sqrt() + size);
+        let mut limits: Vec<f64> = squared.iter().map(|&known| limit(known)).collect();
         for corners in &self.patch.triangles {
             let triangle = Triangle::new(corners.map(|v| world(self.patch.positions[v as usize])));
-            for (target, nearest) in targets.iter().zip(squared.iter_mut()) {
-                *nearest = nearest.min(triangle.distance_squared(*target));
+            let corner = triangle.corner();
+            for ((target, nearest), near) in targets.iter().zip(squared.iter_mut()).zip(&mut limits) {
+                let away = (0..3).map(|a| (corner[a] - target[a]) * (corner[a] - target[a])).sum::<f64>();
+                if away > *near {
+                    continue;
+                }
+                let found = triangle.distance_squared(*target);
+                if found < *nearest {
+                    (*nearest, *near) = (found, limit(found));
+                }
             }
         }
         Ok(())

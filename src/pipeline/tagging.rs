@@ -3,12 +3,11 @@
 //! One flood gives the answer for every threshold at once. Bricks far from the cloud are not stored: all their
 //! voxels lie at the same (largest) distance, so a connected region of them has one flood value.
 
-use std::sync::Arc;
-
 use super::distance::Sources;
+use super::far_regions::FarRegions;
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
-use crate::grid::{BrickId, BrickSet, FACES, Face, Slot};
+use crate::grid::{BrickSet, FACES, Face, Slot};
 use crate::kernel::level_set::basins::{self, Piece};
 use crate::kernel::level_set::flood;
 use crate::kernel::level_set::persistence::Joins;
@@ -36,6 +35,30 @@ pub struct Tagging {
     pub basins: Vec<Basin>,
 }
 
+impl Tagging {
+    /// 1 where the flood at a threshold does not reach, 0 elsewhere.
+    ///
+    /// # Errors
+    /// When scratch runs out or the run is interrupted.
+    pub fn inside(&self, stage: &Stage<'_>, engine: &Engine, beta: f32) -> Result<BrickArray<u8>> {
+        let set = self.level.set();
+        let mut inside = BrickArray::with_faces(engine.scratch(), set)?;
+        for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
+            inside.set_absent(id, u8::from(self.level.absent(id) < beta));
+        }
+        stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+            self.level.read(slot, |level| {
+                inside.write(slot, |inside: &mut [u8]| {
+                    inside.iter_mut().zip(level).for_each(|(inside, &level)| *inside = u8::from(level < beta));
+                });
+            });
+            inside.refresh_faces(slot);
+            Ok(())
+        })?;
+        Ok(inside)
+    }
+}
+
 /// Floods the grid from its border and finds the basins that are so many times as deep as their saddle.
 ///
 /// # Errors
@@ -53,58 +76,6 @@ pub fn tag(
     locate_saddles(stage, sources, [distance, &level], &pieces, &mut basins)?;
     basins.sort_by(|a, b| b.depth.total_cmp(&a.depth).then(b.voxels.cmp(&a.voxels)));
     Ok(Tagging { level, basins })
-}
-
-/// Connected regions of bricks that are not stored; each floods as one.
-struct FarRegions {
-    /// The region of each brick; meaningless for stored ones.
-    region: Vec<u32>,
-    level: Vec<f32>,
-    farthest: f32,
-    bricks: Vec<Vec<BrickId>>,
-}
-
-impl FarRegions {
-    fn new(set: &Arc<BrickSet>, farthest: f32) -> Self {
-        let grid = set.grid();
-        let mut regions =
-            Self { region: vec![u32::MAX; grid.len() as usize], level: Vec::new(), farthest, bricks: Vec::new() };
-        for seed in 0..grid.len() {
-            if set.slot(seed).is_some() || regions.region[seed as usize] != u32::MAX {
-                continue;
-            }
-            let name = regions.bricks.len() as u32;
-            let (mut bricks, mut next, mut outside) = (vec![seed], 0, false);
-            regions.region[seed as usize] = name;
-            while let Some(&id) = bricks.get(next) {
-                next += 1;
-                for face in FACES {
-                    match grid.neighbour(id, face.offset()) {
-                        None => outside = true,
-                        Some(n) if set.slot(n).is_none() && regions.region[n as usize] == u32::MAX => {
-                            regions.region[n as usize] = name;
-                            bricks.push(n);
-                        }
-                        Some(_) => {}
-                    }
-                }
-            }
-            regions.bricks.push(bricks);
-            regions.level.push(if outside { farthest } else { 0.0 });
-        }
-        regions
-    }
-
-    /// Raises the level of the region that a brick belongs to. Returns the region's bricks and level if it rose.
-    fn raise(&mut self, id: BrickId, level: f32) -> Option<(&[BrickId], f32)> {
-        let region = self.region[id as usize] as usize;
-        let level = level.min(self.farthest);
-        if level <= self.level[region] {
-            return None;
-        }
-        self.level[region] = level;
-        Some((&self.bricks[region], level))
-    }
 }
 
 /// Relaxes bricks in rounds until nothing rises: even ones, then odd ones, only those beside a change.

@@ -64,8 +64,9 @@ fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
     let distance =
         cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, f32::INFINITY).expect("room in scratch");
     let tagging = tag(&stage, &lab.engine, &sources, &distance, PERSISTENCE).expect("room in scratch");
-    let reaches = Reaches { beta: 0.25, inner: 0.5, outer: 0.5 };
-    let mut band = make_band(&stage, &lab.engine, &distance, &tagging.level, &reaches).expect("room in scratch");
+    let inside = tagging.inside(&stage, &lab.engine, 0.25).expect("room in scratch");
+    let reaches = Reaches { inner: 0.5, outer: 0.5 };
+    let mut band = make_band(&stage, &lab.engine, &distance, &inside, &reaches).expect("room in scratch");
     let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta))
         .expect("room in scratch");
     let (mesh, measures) = surface(&geometry, &whole(&band.u[0]));

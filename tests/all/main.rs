@@ -23,6 +23,7 @@ mod reconstruct;
 mod reconstruct_cli;
 mod surfaces;
 mod triangle_distance;
+mod watershed;
 mod wavefront;
 
 mod cli;

@@ -3,6 +3,7 @@
 //! A *cell* is a box of [`CELL`]^3 voxels of the grid: the unit on which the band is stored, solved and judged, the
 //! same whatever the brick size. Source: Kósa 2015, chapter 3; Kósa PhD, chapter 3 (algorithms: section 5).
 
+pub mod ascent;
 pub mod basins;
 pub mod border;
 pub(crate) mod coefficients;
@@ -13,6 +14,7 @@ pub mod mask;
 pub mod persistence;
 pub mod scheme;
 pub mod sor;
+pub mod spaces;
 pub mod start;
 
 /// Voxels along the edge of a cell.

@@ -1,17 +1,18 @@
 //! The start of the time loop on one brick (algorithms: section 5, "Initial condition", "Narrow band").
 //!
-//! u = 0 where the flood reaches at threshold beta, 1 elsewhere. Solved are the voxels within `inner` of the cloud on
-//! the inside and within `outer` on the outside; all others keep their start value. Comparisons alone, voxel by voxel,
-//! so the result does not depend on how the volume is divided. No halo, no work buffers.
+//! u = 1 inside, 0 outside. Solved are the voxels within `inner` of the cloud on the inside and within `outer` on the
+//! outside, and those near the border between both sides wherever it is, across holes too; all others keep their start
+//! value. Comparisons alone, voxel by voxel, so the result does not depend on how the volume is divided.
 //!
 //! Bricks are dense `[z][y][x]` with row length and plane height `edge`; `valid` voxels along each axis are inside the
-//! domain. `d` is the distance to the cloud, `b` the flood's level; both f32, physical lengths.
+//! domain. `d` is the distance to the cloud, physical lengths; `inside` is 1 or 0; `near` is above 0 near the border.
 
-/// How far the band reaches, and where the start surface lies. Physical lengths.
+use crate::grid::FACES;
+use crate::tile::HaloTile;
+
+/// How far the band reaches on both sides of the cloud. Physical lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reaches {
-    /// The start surface lies at this distance outside of the cloud.
-    pub beta: f32,
     /// The band's reach on the inside.
     pub inner: f32,
     /// The band's reach on the outside.
@@ -19,49 +20,92 @@ pub struct Reaches {
 }
 
 impl Reaches {
-    /// The start value of a voxel.
+    /// True for voxels that are solved wherever the border is.
     #[inline]
     #[must_use]
-    pub fn start(&self, b: f32) -> f32 {
-        if b >= self.beta { 0.0 } else { 1.0 }
-    }
-
-    /// True for voxels that are solved.
-    #[inline]
-    #[must_use]
-    pub fn solves(&self, d: f32, b: f32) -> bool {
-        d <= if b >= self.beta { self.outer } else { self.inner }
+    pub fn solves(&self, d: f32, inside: u8) -> bool {
+        d <= if inside == 0 { self.outer } else { self.inner }
     }
 }
 
-/// The start values of a brick.
-pub fn fill(b: &[f32], reaches: &Reaches, u: &mut [f32]) {
-    u.iter_mut().zip(b).for_each(|(u, &b)| *u = reaches.start(b));
+/// What tells the band of a brick.
+#[derive(Clone, Copy, Debug)]
+pub struct Sides<'a> {
+    /// Distance to the cloud.
+    pub d: &'a [f32],
+    /// 1 inside, 0 outside.
+    pub inside: &'a [u8],
+    /// Above 0 near the border, where that is far from the cloud anywhere.
+    pub near: Option<&'a [u8]>,
+}
+
+impl Sides<'_> {
+    fn solves(&self, place: usize, reaches: &Reaches) -> bool {
+        reaches.solves(self.d[place], self.inside[place]) || self.near.is_some_and(|near| near[place] > 0)
+    }
 }
 
 /// Sets 1 at voxels of the domain that are solved, 0 elsewhere; returns how many there are.
-pub fn mark(d: &[f32], b: &[f32], edge: usize, valid: [usize; 3], reaches: &Reaches, solved: &mut [u8]) -> u64 {
+pub fn mark(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: &Reaches, solved: &mut [u8]) -> u64 {
     solved.fill(0);
     let mut count = 0;
-    for row in rows(edge, valid) {
-        for place in row {
-            solved[place] = u8::from(reaches.solves(d[place], b[place]));
-            count += u64::from(solved[place]);
-        }
+    for place in rows(edge, valid).flatten() {
+        solved[place] = u8::from(sides.solves(place, reaches));
+        count += u64::from(solved[place]);
     }
     count
 }
 
 /// The first and last place along x, y, z of solved voxels, or none when nothing is solved.
 #[must_use]
-pub fn hull(d: &[f32], b: &[f32], edge: usize, valid: [usize; 3], reaches: &Reaches) -> Option<[[usize; 2]; 3]> {
+pub fn hull(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: &Reaches) -> Option<[[usize; 2]; 3]> {
     let mut hull: Option<[[usize; 2]; 3]> = None;
-    for place in rows(edge, valid).flatten().filter(|&place| reaches.solves(d[place], b[place])) {
+    for place in rows(edge, valid).flatten().filter(|&place| sides.solves(place, reaches)) {
         let at = [place % edge, place / edge % edge, place / (edge * edge)];
         let hull = hull.get_or_insert(at.map(|v| [v, v]));
         (0..3).for_each(|a| hull[a] = [hull[a][0].min(at[a]), hull[a][1].max(at[a])]);
     }
     hull
+}
+
+/// Sets 1 at voxels beside the border that no reach solves, 0 elsewhere; returns whether there are any. `inside` has its
+/// ghosts across faces.
+pub fn border(d: &[f32], inside: &HaloTile<u8>, reaches: &Reaches, near: &mut [u8]) -> bool {
+    near.fill(0);
+    let mut found = false;
+    for_each_with_beside(inside, |place, here, beside| {
+        if beside.iter().any(|side| *side != here) && !reaches.solves(d[place], here) {
+            near[place] = 1;
+            found = true;
+        }
+    });
+    found
+}
+
+/// Grows what is near by a voxel: beside those that have at most `step`, those that have none become `step + 1`.
+/// `tile` has its ghosts across faces; `near` is the brick.
+pub fn grow(tile: &HaloTile<u8>, step: u8, near: &mut [u8]) {
+    for_each_with_beside(tile, |place, here, beside| {
+        if here == 0 && beside.iter().any(|near| (1..=step).contains(near)) {
+            near[place] = step + 1;
+        }
+    });
+}
+
+fn for_each_with_beside(tile: &HaloTile<u8>, mut visit: impl FnMut(usize, u8, [u8; 6])) {
+    let (pitch, edge) = (tile.pitch(), tile.edge());
+    let strides = [1, pitch, pitch * pitch];
+    for row in rows(edge, tile.valid()) {
+        let start = tile.at(0, (row.start / edge % edge) as isize, (row.start / (edge * edge)) as isize);
+        for (x, place) in row.enumerate() {
+            let at = start + x;
+            let beside = FACES.map(|face| {
+                let stride = strides[face.axis];
+                tile.data()[if face.upper { at + stride } else { at - stride }]
+            });
+            visit(place, tile.data()[at], beside);
+        }
+    }
 }
 
 /// The places of each row inside the domain.
@@ -75,28 +119,20 @@ mod tests {
     use super::*;
 
     const EDGE: usize = 4;
-    const REACHES: Reaches = Reaches { beta: 1.0, inner: 2.0, outer: 3.0 };
+    const REACHES: Reaches = Reaches { inner: 2.0, outer: 3.0 };
 
-    /// A distance and a level in one brick: inside (b = 0) at first, outside from z = 2 on.
-    fn fields() -> ([f32; 64], [f32; 64]) {
+    /// A distance and the sides in one brick: inside at first, outside from z = 2 on.
+    fn fields() -> ([f32; 64], [u8; 64]) {
         let d = std::array::from_fn(|n| 0.5 * (n % EDGE + n / EDGE % EDGE) as f32 + 0.5);
-        (d, std::array::from_fn(|n| if n < 32 { 0.0 } else { 1.0 }))
-    }
-
-    #[test]
-    fn the_threshold_itself_is_outside() {
-        let (_, b) = fields();
-        let mut u = [9.0; 64];
-        fill(&b, &REACHES, &mut u);
-        assert!(u[..32].iter().all(|&u| u == 1.0) && u[32..].iter().all(|&u| u == 0.0));
+        (d, std::array::from_fn(|n| u8::from(n < 32)))
     }
 
     #[test]
     fn each_side_has_its_reach_and_the_domain_its_end() {
-        let (d, b) = fields();
+        let (d, inside) = fields();
         let mut solved = [7; 64];
         // x + y <= 3 inside, x + y <= 5 outside; of 3 x 4 x 3 voxels.
-        let count = mark(&d, &b, EDGE, [3, 4, 3], &REACHES, &mut solved);
+        let count = mark(Sides { d: &d, inside: &inside, near: None }, EDGE, [3, 4, 3], &REACHES, &mut solved);
         let wanted = |n: usize| {
             let [x, y, z] = [n % EDGE, n / EDGE % EDGE, n / 16];
             x < 3 && z < 3 && x + y <= if z < 2 { 3 } else { 5 }
@@ -107,10 +143,42 @@ mod tests {
 
     #[test]
     fn hulls_hold_what_is_solved_and_no_more() {
-        let (d, b) = fields();
-        assert_eq!(hull(&d, &b, EDGE, [3, 4, 3], &REACHES), Some([[0, 2], [0, 3], [0, 2]]));
-        let near = Reaches { beta: 1.0, inner: 0.0, outer: 0.5 };
-        assert_eq!(hull(&d, &b, EDGE, [4; 3], &near), Some([[0, 0], [0, 0], [2, 3]]));
-        assert_eq!(hull(&d, &b, EDGE, [4, 4, 2], &near), None);
+        let (d, inside) = fields();
+        let sides = Sides { d: &d, inside: &inside, near: None };
+        assert_eq!(hull(sides, EDGE, [3, 4, 3], &REACHES), Some([[0, 2], [0, 3], [0, 2]]));
+        let near = Reaches { inner: 0.0, outer: 0.5 };
+        assert_eq!(hull(sides, EDGE, [4; 3], &near), Some([[0, 0], [0, 0], [2, 3]]));
+        assert_eq!(hull(sides, EDGE, [4, 4, 2], &near), None);
+        let mut flags = [0; 64];
+        flags[63] = 3;
+        let sides = Sides { near: Some(&flags), ..sides };
+        assert_eq!(hull(sides, EDGE, [4; 3], &near), Some([[0, 3], [0, 3], [2, 3]]));
+    }
+
+    #[test]
+    fn the_border_far_from_the_cloud_is_solved_with_what_is_near_it() {
+        let (d, inside) = fields();
+        let mut tile = HaloTile::new(EDGE);
+        for n in 0..64 {
+            let at = tile.at((n % EDGE) as isize, (n / EDGE % EDGE) as isize, (n / 16) as isize);
+            tile.data_mut()[at] = inside[n];
+        }
+        for (axis, upper) in [(0, false), (0, true), (1, false), (1, true), (2, false), (2, true)] {
+            tile.mirror(axis, upper);
+        }
+        let mut near = [9; 64];
+        assert!(border(&d, &tile, &REACHES, &mut near));
+        let wanted = |n: usize| match (n / 16, n % EDGE + n / EDGE % EDGE) {
+            (1, 4..) | (2, 6..) => 1,
+            _ => 0,
+        };
+        assert!((0..64).all(|n| near[n] == wanted(n)), "{near:?}");
+        for n in 0..64 {
+            let at = tile.at((n % EDGE) as isize, (n / EDGE % EDGE) as isize, (n / 16) as isize);
+            tile.data_mut()[at] = near[n];
+        }
+        grow(&tile, 1, &mut near);
+        assert_eq!((near[15], near[63], near[62], near[31]), (2, 2, 0, 1));
+        assert!(!border(&[0.0; 64], &tile, &REACHES, &mut near), "all is solved anyhow");
     }
 }

@@ -7,10 +7,10 @@ use crate::grid::Geometry;
 use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::Band;
-use crate::pipeline::enclosure::{Found, Hole, Search, enclose, first_reach_for};
+use crate::pipeline::enclosure::{Found, Hole, Search, Start, enclose, first_reach_for};
 use crate::pipeline::evolve::{Evolution, evolve};
 use crate::pipeline::pyramid::{Reduce, write_levels};
-use crate::pipeline::surface;
+use crate::pipeline::surface::{self, Drawn};
 use crate::store::ElementType;
 
 /// What a reconstruction found.
@@ -32,6 +32,8 @@ pub struct Reconstruction {
     pub measures: Measures,
     /// Distances of the points from the surface.
     pub hausdorff: Option<Hausdorff>,
+    /// Points farther from the surface than the largest spacing.
+    pub lost_points: u64,
 }
 
 /// Reconstructs the surface of a cloud on a grid, whose box grows as far around the cloud as is needed; `store` gets
@@ -51,6 +53,7 @@ pub fn reconstruct(
         cloud,
         method: settings.method,
         beta: settings.beta,
+        start: Start::Watershed,
         first_reach: first_reach_for(grid, settings.beta),
         suffix: "",
     };
@@ -60,7 +63,7 @@ pub fn reconstruct(
         Found::Nothing => return Err(encloses_nothing(grid)),
     };
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
-    let beta = f64::from(enclosure.reaches.beta);
+    let beta = enclosure.beta;
     let mut band = enclosure.into_band(engine, "")?;
     let stage = engine.stage("level set", 0);
     stage.voxels(band.voxels);
@@ -70,12 +73,14 @@ pub fn reconstruct(
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
     let mesh = store.map(|store| store.file("meshes/surface.ply")).transpose()?;
-    let (measures, hausdorff) = surface::draw(&stage, &band.u[0], &geometry, cloud, mesh.as_deref())?;
+    let Drawn { measures, hausdorff, lost_points } =
+        surface::draw(&stage, &band.u[0], &geometry, cloud, mesh.as_deref())?;
     stage.finish();
     if let Some(store) = store {
         write_fields(engine, &geometry, &band, store)?;
     }
-    Ok(Reconstruction { geometry, beta, hole, spaces, band_voxels: band.voxels, evolution, measures, hausdorff })
+    let band_voxels = band.voxels;
+    Ok(Reconstruction { geometry, beta, hole, spaces, band_voxels, evolution, measures, hausdorff, lost_points })
 }
 
 fn write_fields(engine: &Engine, geometry: &Geometry, band: &Band, store: &StoreWriter) -> Result<()> {

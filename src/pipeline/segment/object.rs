@@ -8,7 +8,7 @@ use crate::grid::{Box3, Geometry};
 use crate::kernel::image::grey_range::GreyRange;
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::Band;
-use crate::pipeline::enclosure::{Found, Hole, Search, enclose};
+use crate::pipeline::enclosure::{Found, Hole, Search, Start, enclose};
 use crate::pipeline::evolve::{Evolution, evolve};
 use crate::pipeline::image_terms::{EdgeSettings, edges, presmooth};
 use crate::pipeline::intensity::Normalised;
@@ -85,6 +85,7 @@ pub(super) fn solve<T: Element>(
         cloud: &cloud,
         method: settings.method,
         beta: settings.beta,
+        start: Start::Tube,
         first_reach: first_reach(marks, picture.geometry, settings),
         suffix: &suffix,
     };
@@ -94,7 +95,7 @@ pub(super) fn solve<T: Element>(
         Found::Nothing => return Err(encloses_nothing(marks)),
     };
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
-    let beta = f64::from(enclosure.reaches.beta);
+    let beta = enclosure.beta;
     let mut band = enclosure.into_band(engine, &suffix)?;
     let edge_field = edge_field(engine, picture, marks, settings, &geometry, window, &band)?;
     let stage = engine.stage(&name("level set", marks), 0);

@@ -14,7 +14,7 @@ use crate::kernel::image::palette::label_color;
 use crate::pipeline::ingest::{Image, Sample, ingest};
 use crate::pipeline::marks::{ObjectMarks, split};
 use crate::pipeline::pyramid::{Reduce, write_levels};
-use crate::pipeline::surface;
+use crate::pipeline::surface::{self, Drawn};
 use crate::store::{BoxSource, Element, ElementType, PlaneSource};
 
 /// What a segmentation found.
@@ -97,7 +97,8 @@ fn draw(
     let stage = engine.stage(&format!("surface {label}"), 0);
     let name = if several { format!("meshes/object-{label}.ply") } else { "meshes/surface.ply".into() };
     let mesh = store.map(|store| store.file(&name)).transpose()?;
-    let (measures, hausdorff) = surface::draw(&stage, u, geometry, &marks.contours.concat(), mesh.as_deref())?;
+    let Drawn { measures, hausdorff, .. } =
+        surface::draw(&stage, u, geometry, &marks.contours.concat(), mesh.as_deref())?;
     stage.voxels(solution.band_voxels);
     stage.finish();
     if let Some(store) = store {

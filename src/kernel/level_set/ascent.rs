@@ -1,0 +1,258 @@
+//! Steepest ascent of the distance inside one brick: which maximum each voxel belongs to (the watershed of -d; after
+//! Meyer, Topographic distance and watershed lines, 1994).
+//!
+//! A voxel points to the face neighbour towards which d rises fastest, and belongs to the region of the maximum that
+//! the pointers lead to. Near a cloud that is the space on the voxel's own side of it. Regions are numbers over the
+//! whole grid, given by the caller; a brick knows its own maxima, and those of others where pointers leave it once its
+//! neighbours know. Only comparisons of d and its differences, so no result depends on bricks.
+
+use crate::grid::FACES;
+use crate::tile::HaloTile;
+
+/// The region of voxels that is not known yet.
+pub const UNKNOWN: u32 = u32::MAX;
+/// The region outside of the domain.
+pub const OUTSIDE: u32 = 0;
+
+/// A maximum: where all pointers nearby lead to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// Its distance to the cloud.
+    pub depth: f32,
+}
+
+/// Where two regions meet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// The smaller of the two numbers first.
+    pub regions: [u32; 2],
+    /// The largest distance to the cloud on the border between them: half as wide as the opening.
+    pub pass: f32,
+    /// The voxel that has it, the first in the brick; as a place of the dense brick.
+    pub place: u32,
+    /// Number of faces between voxels of the one and the other.
+    pub faces: u32,
+}
+
+/// Pointer of a maximum.
+const PEAK: u8 = 6;
+
+/// Work buffers for one brick.
+#[derive(Clone, Debug, Default)]
+pub struct Ascent {
+    /// For each voxel the face across which d rises fastest, or [`PEAK`].
+    pointers: Vec<u8>,
+    stack: Vec<usize>,
+}
+
+impl Ascent {
+    /// Finds the brick's maxima; `d` has its ghosts across faces, infinite beyond the domain. Connected voxels of one
+    /// value are one maximum. `regions`, dense over the brick, gets the maxima's numbers, `first` for the first of them,
+    /// and [`UNKNOWN`] elsewhere.
+    pub fn peaks(&mut self, d: &HaloTile<f32>, spacing: [f64; 3], first: u32, regions: &mut [u32]) -> Vec<Peak> {
+        self.point(d, spacing);
+        regions.fill(UNKNOWN);
+        let (edge, valid) = (d.edge(), d.valid());
+        let mut peaks = Vec::new();
+        for seed in places(edge, valid) {
+            if self.pointers[seed] != PEAK || regions[seed] != UNKNOWN {
+                continue;
+            }
+            let depth = d.data()[place_in(d, seed)];
+            let name = first + peaks.len() as u32;
+            regions[seed] = name;
+            self.stack.push(seed);
+            while let Some(at) = self.stack.pop() {
+                for next in neighbours(at, edge, valid).into_iter().flatten() {
+                    let level = self.pointers[next] == PEAK && d.data()[place_in(d, next)] == depth;
+                    if level && regions[next] == UNKNOWN {
+                        regions[next] = name;
+                        self.stack.push(next);
+                    }
+                }
+            }
+            peaks.push(Peak { depth });
+        }
+        peaks
+    }
+
+    /// Carries regions down to the voxels whose pointers lead to known ones: `regions` has its ghosts across faces.
+    /// Returns whether any voxel became known.
+    pub fn descend(&mut self, d: &HaloTile<f32>, spacing: [f64; 3], regions: &mut HaloTile<u32>) -> bool {
+        self.point(d, spacing);
+        let (edge, pitch) = (d.edge(), d.pitch() as isize);
+        let strides = FACES.map(|face| if face.upper { 1 } else { -1 } * [1, pitch, pitch * pitch][face.axis]);
+        let mut changed = false;
+        for seed in places(edge, d.valid()) {
+            let mut at = place_in(d, seed);
+            let data = regions.data_mut();
+            self.stack.clear();
+            // Ghosts have no pointer of their own: the walk ends there, known or not.
+            while data[at] == UNKNOWN {
+                let Some(inside) = place_of(at, edge, d.valid()).filter(|&p| self.pointers[p] != PEAK) else { break };
+                self.stack.push(at);
+                at = at.wrapping_add_signed(strides[self.pointers[inside] as usize]);
+            }
+            let region = data[at];
+            changed |= region != UNKNOWN && !self.stack.is_empty();
+            self.stack.iter().for_each(|&passed| data[passed] = region);
+        }
+        self.stack.clear();
+        changed
+    }
+
+    fn point(&mut self, d: &HaloTile<f32>, spacing: [f64; 3]) {
+        let edge = d.edge();
+        self.pointers.resize(edge * edge * edge, PEAK);
+        let (pointers, inverse) = (&mut self.pointers[..], spacing.map(|h| (1.0 / h) as f32));
+        vectorised!({ d: &HaloTile<f32>, inverse: [f32; 3], pointers: &mut [u8] } => point_all);
+    }
+}
+
+#[inline(always)]
+fn point_all(d: &HaloTile<f32>, inverse: [f32; 3], pointers: &mut [u8]) {
+    let (edge, pitch, valid) = (d.edge(), d.pitch(), d.valid());
+    let strides = [1, pitch, pitch * pitch];
+    for (y, z) in (0..valid[2]).flat_map(|z| (0..valid[1]).map(move |y| (y, z))) {
+        let start = d.at(0, y as isize, z as isize);
+        let beside = FACES.map(|face| {
+            let stride = strides[face.axis];
+            let first = if face.upper { start + stride } else { start - stride };
+            (&d.data()[first..][..valid[0]], inverse[face.axis])
+        });
+        let here = &d.data()[start..][..valid[0]];
+        let row = &mut pointers[(z * edge + y) * edge..][..valid[0]];
+        for x in 0..here.len() {
+            let (mut steepest, mut towards) = (0.0f32, u32::from(PEAK));
+            for (n, (next, inverse)) in beside.iter().enumerate() {
+                let slope = (next[x] - here[x]) * inverse;
+                towards = if slope > steepest { n as u32 } else { towards };
+                steepest = if slope > steepest { slope } else { steepest };
+            }
+            row[x] = towards as u8;
+        }
+    }
+}
+
+/// Where regions meet in a brick and across its upper faces, and across those lower ones that `lower` names; in no
+/// order. `d` and `regions` have their ghosts across faces.
+pub fn contacts(d: &HaloTile<f32>, regions: &HaloTile<u32>, lower: [bool; 3]) -> Vec<Contact> {
+    let (edge, pitch, valid) = (d.edge(), d.pitch(), d.valid());
+    let strides = [1, pitch, pitch * pitch];
+    let mut found: Vec<Contact> = Vec::new();
+    for (y, z) in (0..valid[2]).flat_map(|z| (0..valid[1]).map(move |y| (y, z))) {
+        let start = d.at(0, y as isize, z as isize);
+        let mut compare = |x: usize, next: usize| {
+            let at = start + x;
+            let (a, b) = (regions.data()[at], regions.data()[next]);
+            if a != b {
+                let (pass, place) = (d.data()[at].min(d.data()[next]), ((z * edge + y) * edge + x) as u32);
+                add(&mut found, Contact { regions: [a.min(b), a.max(b)], pass, place, faces: 1 });
+            }
+        };
+        for x in 0..valid[0] {
+            strides.iter().for_each(|stride| compare(x, start + x + stride));
+        }
+        if lower[0] {
+            compare(0, start - 1);
+        }
+        for (axis, _) in [y, z].into_iter().enumerate().filter(|&(n, at)| at == 0 && lower[n + 1]) {
+            (0..valid[0]).for_each(|x| compare(x, start + x - strides[axis + 1]));
+        }
+    }
+    found
+}
+
+/// Few regions meet in one brick: a list is searched faster than anything else, from its end.
+fn add(found: &mut Vec<Contact>, contact: Contact) {
+    match found.iter_mut().rev().find(|known| known.regions == contact.regions) {
+        Some(known) => {
+            known.faces += 1;
+            if contact.pass > known.pass {
+                (known.pass, known.place) = (contact.pass, contact.place);
+            }
+        }
+        None => found.push(contact),
+    }
+}
+
+fn places(edge: usize, valid: [usize; 3]) -> impl Iterator<Item = usize> {
+    let rows = (0..valid[2]).flat_map(move |z| (0..valid[1]).map(move |y| (z * edge + y) * edge));
+    rows.flat_map(move |row| row..row + valid[0])
+}
+
+fn place_in<T: Copy + Default>(tile: &HaloTile<T>, place: usize) -> usize {
+    let edge = tile.edge();
+    tile.at((place % edge) as isize, (place / edge % edge) as isize, (place / (edge * edge)) as isize)
+}
+
+/// The place in the dense brick of a place in the tile; none for ghosts.
+fn place_of(at: usize, edge: usize, valid: [usize; 3]) -> Option<usize> {
+    let pitch = edge + 2;
+    let grown = [at % pitch, at / pitch % pitch, at / (pitch * pitch)];
+    let inside = (0..3).all(|a| (1..=valid[a]).contains(&grown[a]));
+    inside.then(|| ((grown[2] - 1) * edge + grown[1] - 1) * edge + grown[0] - 1)
+}
+
+fn neighbours(at: usize, edge: usize, valid: [usize; 3]) -> [Option<usize>; 6] {
+    let place = [at % edge, at / edge % edge, at / (edge * edge)];
+    let strides = [1, edge, edge * edge];
+    FACES.map(|face| {
+        let inside = if face.upper { place[face.axis] + 1 < valid[face.axis] } else { place[face.axis] > 0 };
+        let stride = strides[face.axis];
+        inside.then(|| if face.upper { at + stride } else { at - stride })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of four voxels in a brick of edge 4, walls of the domain all around but across x.
+    fn row(d: [f32; 4], beyond: [f32; 2]) -> HaloTile<f32> {
+        let mut tile = HaloTile::new(4);
+        tile.set_valid([4, 1, 1]);
+        tile.data_mut().fill(-1.0);
+        for (x, value) in [beyond[0], d[0], d[1], d[2], d[3], beyond[1]].into_iter().enumerate() {
+            let at = tile.at(x as isize - 1, 0, 0);
+            tile.data_mut()[at] = value;
+        }
+        tile
+    }
+
+    #[test]
+    fn voxels_follow_the_steepest_way_up() {
+        // A maximum of two voxels; the last voxel leads across the brick's end.
+        let d = row([1.0, 3.0, 3.0, 0.5], [0.0, 4.0]);
+        let (mut ascent, mut dense) = (Ascent::default(), [0; 64]);
+        assert_eq!(ascent.peaks(&d, [1.0; 3], 7, &mut dense), [Peak { depth: 3.0 }]);
+        assert_eq!(dense[..4], [UNKNOWN, 7, 7, UNKNOWN]);
+        let mut regions = HaloTile::new(4);
+        regions.set_valid([4, 1, 1]);
+        regions.data_mut().fill(UNKNOWN);
+        let at = |x: isize| regions.at(x, 0, 0);
+        let (x, beyond) = ([at(0), at(1), at(2), at(3)], at(4));
+        (0..4).for_each(|n| regions.data_mut()[x[n]] = dense[n]);
+        assert!(ascent.descend(&d, [1.0; 3], &mut regions), "the first voxel");
+        assert_eq!(x.map(|at| regions.data()[at]), [7, 7, 7, UNKNOWN]);
+        assert!(!ascent.descend(&d, [1.0; 3], &mut regions), "what lies beyond is not known yet");
+        regions.data_mut()[beyond] = 2;
+        assert!(ascent.descend(&d, [1.0; 3], &mut regions));
+        assert_eq!(x.map(|at| regions.data()[at]), [7, 7, 7, 2]);
+        let met = contacts(&d, &regions, [false; 3]);
+        let between = met.iter().find(|contact| contact.regions == [2, 7]).unwrap();
+        assert_eq!(*between, Contact { regions: [2, 7], pass: 0.5, place: 2, faces: 1 });
+    }
+
+    #[test]
+    fn slopes_are_of_physical_lengths() {
+        let mut d = row([1.0, 2.0, 1.5, 0.0], [0.0, 0.0]);
+        let above = d.at(1, 1, 0);
+        d.data_mut()[above] = 3.0;
+        let (mut ascent, mut dense) = (Ascent::default(), [0; 64]);
+        assert_eq!(ascent.peaks(&d, [1.0; 3], 1, &mut dense), [], "up across y");
+        // From the third voxel 0.5 along x in a step of 1 against none along y in a step of 9.
+        d.data_mut()[above] = 2.0;
+        assert_eq!(ascent.peaks(&d, [1.0, 9.0, 9.0], 1, &mut dense), [Peak { depth: 2.0 }]);
+    }
+}

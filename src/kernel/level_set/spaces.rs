@@ -1,0 +1,220 @@
+//! Which regions of steepest ascent are inside of a cloud and which are outside (algorithms: section 5, "Automatic
+//! beta": basins, saddles and persistence, here of all spaces against each other, not of the outside alone).
+//!
+//! Regions merge across their passes, the widest first. Where two spaces meet that are both so much deeper than the
+//! pass between them, a wall of points stands there, and they stay apart. Spaces that are left are told sides so that
+//! points have the inside on one hand and the outside on the other: the outermost is outside, and each that follows is
+//! opposite to what most of its border meets. So bodies may hold hollows, and these bodies again.
+
+use super::ascent::{Contact, OUTSIDE};
+use super::persistence::PERSISTENCE;
+
+/// What a region of steepest ascent is like.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Region {
+    /// Its largest distance to the cloud.
+    pub depth: f32,
+    /// Number of voxels.
+    pub voxels: u64,
+}
+
+/// A space that persists, inside of the cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Space {
+    /// Its largest distance to the cloud.
+    pub depth: f32,
+    /// Number of voxels.
+    pub voxels: u64,
+    /// The contact at its widest pass to the outside: its place in the list that was given.
+    pub hole: usize,
+}
+
+/// Sorts contacts by their regions and makes those between the same two one; of equal passes the first stays.
+#[must_use]
+pub fn joined(mut contacts: Vec<(Contact, u64)>) -> Vec<(Contact, u64)> {
+    contacts.sort_by(|(a, m), (b, n)| a.regions.cmp(&b.regions).then(b.pass.total_cmp(&a.pass)).then(m.cmp(n)));
+    contacts.dedup_by(|(next, _), (kept, _)| {
+        let same = next.regions == kept.regions;
+        if same {
+            kept.faces = kept.faces.saturating_add(next.faces);
+        }
+        same
+    });
+    contacts
+}
+
+/// Tells which regions are inside, and the spaces they form, deepest first. Region [`OUTSIDE`] is outside whatever
+/// happens; no space less deep than `least_depth` stays apart.
+#[must_use]
+pub fn inside(regions: &[Region], contacts: &[(Contact, u64)], least_depth: f32) -> (Vec<bool>, Vec<Space>) {
+    let mut order: Vec<usize> = (0..contacts.len()).collect();
+    order.sort_by(|&a, &b| contacts[b].0.pass.total_cmp(&contacts[a].0.pass).then(a.cmp(&b)));
+    let mut merged = Merged::new(regions);
+    for &n in &order {
+        let Contact { regions: [a, b], pass, .. } = contacts[n].0;
+        merged.meet(a, b, (PERSISTENCE * pass).max(least_depth));
+    }
+    let roots: Vec<u32> = (0..regions.len() as u32).map(|region| merged.root(region)).collect();
+    let sides = sides_of(&roots, contacts);
+    let inside: Vec<bool> = roots.iter().map(|&root| sides[root as usize] == Side::Inside).collect();
+    (inside.clone(), spaces_of(regions, &roots, &inside, contacts))
+}
+
+/// A forest over the regions; the smallest number of a tree is its root.
+struct Merged {
+    parent: Vec<u32>,
+    depth: Vec<f32>,
+}
+
+impl Merged {
+    fn new(regions: &[Region]) -> Self {
+        let mut depth: Vec<f32> = regions.iter().map(|region| region.depth).collect();
+        if let Some(outside) = depth.get_mut(OUTSIDE as usize) {
+            *outside = f32::INFINITY;
+        }
+        Self { parent: (0..regions.len() as u32).collect(), depth }
+    }
+
+    fn root(&mut self, mut n: u32) -> u32 {
+        while self.parent[n as usize] != n {
+            let above = self.parent[self.parent[n as usize] as usize];
+            self.parent[n as usize] = above;
+            n = above;
+        }
+        n
+    }
+
+    /// Makes two spaces one, unless both are at least so deep.
+    fn meet(&mut self, a: u32, b: u32, deep: f32) {
+        let (a, b) = (self.root(a), self.root(b));
+        let (kept, gone) = (a.min(b), a.max(b));
+        let depths = [self.depth[a as usize], self.depth[b as usize]];
+        if a == b || depths[0].min(depths[1]) >= deep {
+            return;
+        }
+        self.depth[kept as usize] = depths[0].max(depths[1]);
+        self.parent[gone as usize] = kept;
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Side {
+    Unknown,
+    Inside,
+    Outside,
+}
+
+/// The side of each space, by its root: one after the other, the one whose border says most clearly.
+fn sides_of(roots: &[u32], contacts: &[(Contact, u64)]) -> Vec<Side> {
+    let mut beside: Vec<Vec<(u32, i64)>> = vec![Vec::new(); roots.len()];
+    for Contact { regions, faces, .. } in contacts.iter().map(|(contact, _)| contact) {
+        let [a, b] = regions.map(|region| roots[region as usize]);
+        if a != b {
+            beside[a as usize].push((b, i64::from(*faces)));
+            beside[b as usize].push((a, i64::from(*faces)));
+        }
+    }
+    let mut sides = vec![Side::Unknown; roots.len()];
+    // Faces beside the outside less those beside the inside, of the spaces that are next.
+    let mut votes: std::collections::BTreeMap<u32, i64> = std::collections::BTreeMap::new();
+    let mut next = Some((OUTSIDE, Side::Outside));
+    while let Some((space, side)) = next {
+        sides[space as usize] = side;
+        votes.remove(&space);
+        let sign = if side == Side::Outside { 1 } else { -1 };
+        for &(other, faces) in
+            beside[space as usize].iter().filter(|(other, _)| sides[*other as usize] == Side::Unknown)
+        {
+            *votes.entry(other).or_default() += sign * faces;
+        }
+        let clearest = votes.iter().max_by_key(|(name, vote)| (vote.abs(), std::cmp::Reverse(**name)));
+        next = clearest.map(|(&name, &vote)| (name, if vote > 0 { Side::Inside } else { Side::Outside }));
+    }
+    sides
+}
+
+fn spaces_of(regions: &[Region], roots: &[u32], inside: &[bool], contacts: &[(Contact, u64)]) -> Vec<Space> {
+    let mut spaces: std::collections::BTreeMap<u32, (Region, Option<usize>)> = std::collections::BTreeMap::new();
+    for (n, region) in regions.iter().enumerate().filter(|(n, _)| inside[*n]) {
+        let (whole, _) = spaces.entry(roots[n]).or_default();
+        whole.voxels += region.voxels;
+        whole.depth = whole.depth.max(region.depth);
+    }
+    for (n, (contact, _)) in contacts.iter().enumerate() {
+        let [a, b] = contact.regions.map(|region| region as usize);
+        if inside[a] != inside[b] {
+            let root = roots[if inside[a] { a } else { b }];
+            let (_, hole) = spaces.entry(root).or_default();
+            if hole.is_none_or(|known| contact.pass > contacts[known].0.pass) {
+                *hole = Some(n);
+            }
+        }
+    }
+    let space = |(whole, hole): &(Region, Option<usize>)| {
+        Some(Space { depth: whole.depth, voxels: whole.voxels, hole: (*hole)? })
+    };
+    let mut spaces: Vec<Space> = spaces.values().filter_map(space).collect();
+    spaces.sort_by(|a, b| b.depth.total_cmp(&a.depth).then(b.voxels.cmp(&a.voxels)).then(a.hole.cmp(&b.hole)));
+    spaces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn region(depth: f32) -> Region {
+        Region { depth, voxels: 10 }
+    }
+
+    fn contact(regions: [u32; 2], pass: f32, faces: u32) -> (Contact, u64) {
+        (Contact { regions, pass, place: 0, faces }, 0)
+    }
+
+    #[test]
+    fn a_body_of_two_lobes_and_the_noise_around_it() {
+        // The outside; two lobes with a neck of 4; a dent of the outside; a lobe behind a narrow neck, with walls.
+        let regions = [region(9.0), region(8.0), region(6.0), region(1.2), region(5.0)];
+        let contacts = [
+            contact([0, 1], 0.7, 100),
+            contact([0, 2], 0.8, 60),
+            contact([0, 3], 1.1, 20),
+            contact([0, 4], 0.6, 40),
+            contact([1, 2], 4.0, 30),
+            contact([1, 3], 0.5, 15),
+            contact([1, 4], 2.0, 8),
+        ];
+        let (sides, spaces) = inside(&regions, &contacts, 1.0);
+        assert_eq!(sides, [false, true, true, false, true]);
+        assert_eq!(spaces, [Space { depth: 8.0, voxels: 20, hole: 1 }, Space { depth: 5.0, voxels: 10, hole: 3 }]);
+    }
+
+    #[test]
+    fn a_hollow_is_outside_and_a_body_within_it_inside_again() {
+        let regions = [region(9.0), region(3.0), region(4.0), region(2.0)];
+        let contacts = [contact([0, 1], 0.7, 300), contact([1, 2], 0.8, 200), contact([2, 3], 0.6, 50)];
+        let (sides, spaces) = inside(&regions, &contacts, 1.0);
+        assert_eq!(sides, [false, true, false, true]);
+        assert_eq!(spaces.iter().map(|s| (s.depth, s.hole)).collect::<Vec<_>>(), [(3.0, 1), (2.0, 2)]);
+    }
+
+    #[test]
+    fn what_is_open_or_shallow_is_outside() {
+        let regions = [region(9.0), region(5.0), region(0.9)];
+        let contacts = [contact([0, 1], 2.6, 300), contact([0, 2], 0.1, 20)];
+        assert_eq!(inside(&regions, &contacts, 1.0), (vec![false; 3], Vec::new()));
+    }
+
+    #[test]
+    fn contacts_of_two_bricks_are_one() {
+        let (a, b) = (contact([1, 2], 0.5, 3), contact([1, 2], 0.75, 4));
+        let joined = joined(vec![(a.0, 9), (contact([0, 9], 0.1, 1).0, 5), (b.0, 4)]);
+        assert_eq!(
+            joined,
+            [contact([0, 9], 0.1, 1), contact([1, 2], 0.75, 7)]
+                .map(|(c, _)| c)
+                .into_iter()
+                .zip([5, 4])
+                .collect::<Vec<_>>()
+        );
+    }
+}

@@ -1,0 +1,232 @@
+//! Which side of the cloud each voxel is on: the watershed of the distance, its regions joined to spaces and these told
+//! inside or outside (`kernel/level_set/ascent.rs`, `kernel/level_set/spaces.rs`; algorithms: section 5, "Automatic
+//! beta").
+//!
+//! A hole is closed at its own saddle, however wide others are, and between its points the cloud is closed by the ridge
+//! between both sides.
+
+use std::sync::Arc;
+
+use super::distance::Sources;
+use super::far_regions::FarRegions;
+use super::tagging::Basin;
+use crate::error::Result;
+use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
+use crate::grid::{Box3, BrickId, BrickSet, FACES, Face, Slot};
+use crate::kernel::level_set::ascent::{Ascent, Contact, OUTSIDE, UNKNOWN, contacts};
+use crate::kernel::level_set::spaces::{self, Region, Space};
+use crate::store::{BoxSource, BrickArray};
+use crate::tile::HaloTile;
+
+/// A space less deep than so many smallest spacings is a gap between points.
+const LEAST_DEPTH_VOXELS: f64 = 1.0;
+
+/// The sides of a cloud.
+pub struct Sides {
+    /// 1 inside, 0 outside.
+    pub inside: BrickArray<u8>,
+    /// The spaces inside, deepest first.
+    pub basins: Vec<Basin>,
+    /// Points that have both sides beside them.
+    pub points_between: u64,
+}
+
+struct Worker {
+    ascent: Ascent,
+    d: HaloTile<f32>,
+    regions: HaloTile<u32>,
+}
+
+/// Tells the sides of the cloud that `distance` is measured from.
+///
+/// # Errors
+/// When scratch runs out or the run is interrupted.
+pub fn watershed(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'_>,
+    distance: &BrickArray<f32>,
+) -> Result<Sides> {
+    let set = distance.set();
+    let edge = set.grid().edge() as usize;
+    let make = move || Worker { ascent: Ascent::default(), d: HaloTile::new(edge), regions: HaloTile::new(edge) };
+    let far = FarRegions::new(set, distance.absent(0));
+    let flood = Watershed {
+        stage,
+        distance,
+        spacing: sources.geometry.spacing,
+        plan: HaloPlan::new(*set.grid(), Reach::Faces),
+        workers: Workers::new(make),
+    };
+    let (of_voxel, mut regions) = flood.peaks(engine, &far)?;
+    flood.descend(&of_voxel)?;
+    let contacts = flood.contacts(&of_voxel, &mut regions)?;
+    let least = (LEAST_DEPTH_VOXELS * sources.geometry.min_spacing()) as f32;
+    let (is_inside, found) = spaces::inside(&regions, &contacts, least);
+    let inside = flood.sides(engine, &of_voxel, &is_inside)?;
+    let basins = found.iter().map(|space| basin(space, &contacts, set)).collect();
+    let points_between = points_between(stage, sources, &inside)?;
+    Ok(Sides { inside, basins, points_between })
+}
+
+struct Watershed<'a> {
+    stage: &'a Stage<'a>,
+    distance: &'a BrickArray<f32>,
+    spacing: [f64; 3],
+    plan: HaloPlan,
+    workers: Workers<Worker>,
+}
+
+impl Watershed<'_> {
+    fn set(&self) -> &Arc<BrickSet> {
+        self.distance.set()
+    }
+
+    fn gather_distance(&self, slot: Slot, tile: &mut HaloTile<f32>) {
+        self.plan.gather(self.distance, slot, Boundary::Constant(f32::INFINITY), tile);
+    }
+
+    /// Numbers the maxima of all bricks, in grid order after the far regions; the others' voxels are unknown yet.
+    fn peaks(&self, engine: &Engine, far: &FarRegions) -> Result<(BrickArray<u32>, Vec<Region>)> {
+        let set = self.set();
+        let mut of_voxel = BrickArray::with_faces(engine.scratch(), set)?;
+        let peaks = self.stage.run(&one_wave(set), &self.workers, |w, &slot| {
+            self.gather_distance(slot, &mut w.d);
+            Ok(of_voxel.write(slot, |dense| w.ascent.peaks(&w.d, self.spacing, 0, dense)))
+        })?;
+        let mut regions = vec![Region::default()];
+        let mut of_far = Vec::with_capacity(far.bricks.len());
+        for (bricks, level) in far.bricks.iter().zip(&far.level) {
+            if *level == far.farthest {
+                of_far.push(OUTSIDE);
+            } else {
+                of_far.push(regions.len() as u32);
+                let voxels = (bricks.len() * set.grid().brick_len()) as u64;
+                regions.push(Region { depth: far.farthest, voxels });
+            }
+        }
+        for (&name, bricks) in of_far.iter().zip(&far.bricks) {
+            bricks.iter().for_each(|&id| of_voxel.set_absent(id, name));
+        }
+        let mut first = Vec::with_capacity(set.len());
+        for peaks in &peaks {
+            first.push(regions.len() as u32);
+            regions.extend(peaks.iter().map(|peak| Region { depth: peak.depth, voxels: 0 }));
+        }
+        self.stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+            of_voxel.write(slot, |dense| {
+                dense.iter_mut().filter(|r| **r != UNKNOWN).for_each(|r| *r += first[slot as usize]);
+            });
+            of_voxel.refresh_faces(slot);
+            Ok(())
+        })?;
+        Ok((of_voxel, regions))
+    }
+
+    /// Carries regions down until every voxel has one: even bricks, then odd ones, only those beside a change.
+    fn descend(&self, of_voxel: &BrickArray<u32>) -> Result<()> {
+        let set = self.set();
+        let mut due = vec![true; set.len()];
+        let mut rounds = 0;
+        while due.iter().any(|&due| due) {
+            for wave in checkerboard(set, |slot| due[slot as usize]) {
+                wave.iter().for_each(|&slot| due[slot as usize] = false);
+                let changed = self.stage.run(&wave, &self.workers, |w, &slot| {
+                    self.gather_distance(slot, &mut w.d);
+                    self.plan.gather(of_voxel, slot, Boundary::Constant(OUTSIDE), &mut w.regions);
+                    let changed = w.ascent.descend(&w.d, self.spacing, &mut w.regions);
+                    if changed {
+                        self.plan.scatter(&w.regions, of_voxel, slot);
+                    }
+                    Ok(changed)
+                })?;
+                for (&slot, _) in wave.iter().zip(changed).filter(|(_, changed)| *changed) {
+                    let beside = FACES.into_iter().filter_map(|face| set.neighbour(slot, face.offset()));
+                    beside.for_each(|slot| due[slot as usize] = true);
+                }
+            }
+            rounds += 1;
+        }
+        self.stage.iterated(rounds, 0.0);
+        Ok(())
+    }
+
+    /// Where regions meet, with the brick each place is in; counts the voxels of all regions.
+    fn contacts(&self, of_voxel: &BrickArray<u32>, regions: &mut [Region]) -> Result<Vec<(Contact, BrickId)>> {
+        let set = self.set();
+        let found = self.stage.run(&one_wave(set), &self.workers, |w, &slot| {
+            self.gather_distance(slot, &mut w.d);
+            self.plan.gather(of_voxel, slot, Boundary::Constant(OUTSIDE), &mut w.regions);
+            let stored = |face: Face| set.neighbour(slot, face.offset()).is_some();
+            let lower = [0, 1, 2].map(|axis| !stored(Face { axis, upper: false }));
+            Ok((contacts(&w.d, &w.regions, lower), count(&w.regions)))
+        })?;
+        let mut all = Vec::new();
+        for (slot, (contacts, counts)) in found.into_iter().enumerate() {
+            all.extend(contacts.into_iter().map(|contact| (contact, set.id(slot as Slot))));
+            counts.into_iter().for_each(|(region, voxels)| regions[region as usize].voxels += voxels);
+        }
+        Ok(spaces::joined(all))
+    }
+
+    fn sides(&self, engine: &Engine, of_voxel: &BrickArray<u32>, is_inside: &[bool]) -> Result<BrickArray<u8>> {
+        let set = self.set();
+        let mut inside = BrickArray::with_faces(engine.scratch(), set)?;
+        let side = |region: u32| u8::from(is_inside.get(region as usize).copied().unwrap_or(false));
+        for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
+            inside.set_absent(id, side(of_voxel.absent(id)));
+        }
+        self.stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+            of_voxel.read(slot, |regions| {
+                inside.write(slot, |inside: &mut [u8]| {
+                    inside.iter_mut().zip(regions).for_each(|(inside, &region)| *inside = side(region));
+                });
+            });
+            inside.refresh_faces(slot);
+            Ok(())
+        })?;
+        Ok(inside)
+    }
+}
+
+/// Voxels of each region in a brick.
+fn count(regions: &HaloTile<u32>) -> Vec<(u32, u64)> {
+    let valid = regions.valid();
+    let mut counts: Vec<(u32, u64)> = Vec::new();
+    for (z, y) in (0..valid[2]).flat_map(|z| (0..valid[1]).map(move |y| (z, y))) {
+        for &region in &regions.data()[regions.at(0, y as isize, z as isize)..][..valid[0]] {
+            match counts.iter_mut().rev().find(|(known, _)| *known == region) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((region, 1)),
+            }
+        }
+    }
+    counts
+}
+
+fn basin(space: &Space, contacts: &[(Contact, BrickId)], set: &BrickSet) -> Basin {
+    let (hole, brick) = &contacts[space.hole];
+    let edge = set.grid().edge();
+    let local = [hole.place as i64 % edge, hole.place as i64 / edge % edge, hole.place as i64 / (edge * edge)];
+    let lo = set.grid().brick_box(*brick).lo;
+    let place = std::array::from_fn(|a| lo[a] + local[a]);
+    Basin { voxels: space.voxels, depth: space.depth, saddle: hole.pass, place }
+}
+
+/// Counts the points that have voxels of both sides within two voxels.
+fn points_between(stage: &Stage<'_>, sources: &Sources<'_>, inside: &BrickArray<u8>) -> Result<u64> {
+    let set = inside.set();
+    let domain = Box3::from_shape(set.grid().shape());
+    let counts = stage.run(&one_wave(set), &Workers::new(Vec::new), |voxels, &slot| {
+        let mut count = 0;
+        for &point in sources.bins.of(set.id(slot)) {
+            let base = sources.geometry.to_voxels(sources.positions[point as usize]).map(|v| v.floor() as i64);
+            let around = Box3::new(base.map(|v| v - 1), base.map(|v| v + 3)).intersect(&domain);
+            voxels.resize(around.len(), 0u8);
+            inside.read_box(&around, voxels)?;
+            count += u64::from(voxels.contains(&0) && voxels.contains(&1));
+        }
+        Ok(count)
+    })?;
+    Ok(counts.iter().sum())
+}
