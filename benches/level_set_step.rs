@@ -128,7 +128,7 @@ fn ours(scene: &Scene, threads: usize, tolerance: f64) -> Cost {
     let (distance, inside, g) = (lab.field(&set, &scene.d), lab.field(&set, &inside), lab.field(&set, &scene.g));
     let stage = lab.engine.stage("band", 0);
     let reaches = Reaches { inner: HALF as f32, outer: HALF as f32 };
-    let mut band = make_band(&stage, &lab.engine, &distance, &inside, &reaches).expect("room for a band");
+    let mut band = make_band(&stage, &lab.engine, &distance, &inside, reaches).expect("room for a band");
     let edges = lab.field(&band.solved.set().clone(), &whole(&g));
     let velocity = Velocity {
         theta: VELOCITY.theta as f32,

@@ -36,7 +36,7 @@ pub fn make_band(
     engine: &Engine,
     distance: &BrickArray<f32>,
     inside: &BrickArray<u8>,
-    reaches: &Reaches,
+    reaches: Reaches,
 ) -> Result<Band> {
     let near = near_border(stage, engine, distance, inside, reaches)?;
     let known = Known { distance, inside, near: near.as_ref(), reaches };
@@ -65,7 +65,7 @@ fn near_border(
     engine: &Engine,
     distance: &BrickArray<f32>,
     inside: &BrickArray<u8>,
-    reaches: &Reaches,
+    reaches: Reaches,
 ) -> Result<Option<BrickArray<u8>>> {
     let set = distance.set();
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
@@ -115,7 +115,7 @@ struct Known<'a> {
     distance: &'a BrickArray<f32>,
     inside: &'a BrickArray<u8>,
     near: Option<&'a BrickArray<u8>>,
-    reaches: &'a Reaches,
+    reaches: Reaches,
 }
 
 impl Known<'_> {

@@ -254,7 +254,7 @@ impl Enclosure {
     /// When scratch runs out or the run is interrupted.
     pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<Band> {
         let stage = engine.stage(&format!("band{suffix}"), self.inside.set().len() as u64);
-        let band = make_band(&stage, engine, &self.distance, &self.inside, &self.reaches)?;
+        let band = make_band(&stage, engine, &self.distance, &self.inside, self.reaches)?;
         stage.finish();
         Ok(band)
     }

@@ -106,7 +106,9 @@ impl Watershed<'_> {
             }
         }
         for (&name, bricks) in of_far.iter().zip(&far.bricks) {
-            bricks.iter().for_each(|&id| of_voxel.set_absent(id, name));
+            for &id in bricks {
+                of_voxel.set_absent(id, name);
+            }
         }
         let mut first = Vec::with_capacity(set.len());
         for peaks in &peaks {
@@ -130,7 +132,9 @@ impl Watershed<'_> {
         let mut rounds = 0;
         while due.iter().any(|&due| due) {
             for wave in checkerboard(set, |slot| due[slot as usize]) {
-                wave.iter().for_each(|&slot| due[slot as usize] = false);
+                for &slot in &wave {
+                    due[slot as usize] = false;
+                }
                 let changed = self.stage.run(&wave, &self.workers, |w, &slot| {
                     self.gather_distance(slot, &mut w.d);
                     self.plan.gather(of_voxel, slot, Boundary::Constant(OUTSIDE), &mut w.regions);
@@ -164,7 +168,9 @@ impl Watershed<'_> {
         let mut all = Vec::new();
         for (slot, (contacts, counts)) in found.into_iter().enumerate() {
             all.extend(contacts.into_iter().map(|contact| (contact, set.id(slot as Slot))));
-            counts.into_iter().for_each(|(region, voxels)| regions[region as usize].voxels += voxels);
+            for (region, voxels) in counts {
+                regions[region as usize].voxels += voxels;
+            }
         }
         Ok(spaces::joined(all))
     }

@@ -66,7 +66,7 @@ fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
     let tagging = tag(&stage, &lab.engine, &sources, &distance, PERSISTENCE).expect("room in scratch");
     let inside = tagging.inside(&stage, &lab.engine, 0.25).expect("room in scratch");
     let reaches = Reaches { inner: 0.5, outer: 0.5 };
-    let mut band = make_band(&stage, &lab.engine, &distance, &inside, &reaches).expect("room in scratch");
+    let mut band = make_band(&stage, &lab.engine, &distance, &inside, reaches).expect("room in scratch");
     let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta))
         .expect("room in scratch");
     let (mesh, measures) = surface(&geometry, &whole(&band.u[0]));

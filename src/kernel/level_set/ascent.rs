@@ -136,6 +136,7 @@ fn point_all(d: &HaloTile<f32>, inverse: [f32; 3], pointers: &mut [u8]) {
 
 /// Where regions meet in a brick and across its upper faces, and across those lower ones that `lower` names; in no
 /// order. `d` and `regions` have their ghosts across faces.
+#[must_use]
 pub fn contacts(d: &HaloTile<f32>, regions: &HaloTile<u32>, lower: [bool; 3]) -> Vec<Contact> {
     let (edge, pitch, valid) = (d.edge(), d.pitch(), d.valid());
     let strides = [1, pitch, pitch * pitch];
@@ -151,7 +152,9 @@ pub fn contacts(d: &HaloTile<f32>, regions: &HaloTile<u32>, lower: [bool; 3]) ->
             }
         };
         for x in 0..valid[0] {
-            strides.iter().for_each(|stride| compare(x, start + x + stride));
+            for stride in strides {
+                compare(x, start + x + stride);
+            }
         }
         if lower[0] {
             compare(0, start - 1);

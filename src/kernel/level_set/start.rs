@@ -23,7 +23,7 @@ impl Reaches {
     /// True for voxels that are solved wherever the border is.
     #[inline]
     #[must_use]
-    pub fn solves(&self, d: f32, inside: u8) -> bool {
+    pub fn solves(self, d: f32, inside: u8) -> bool {
         d <= if inside == 0 { self.outer } else { self.inner }
     }
 }
@@ -40,13 +40,13 @@ pub struct Sides<'a> {
 }
 
 impl Sides<'_> {
-    fn solves(&self, place: usize, reaches: &Reaches) -> bool {
+    fn solves(&self, place: usize, reaches: Reaches) -> bool {
         reaches.solves(self.d[place], self.inside[place]) || self.near.is_some_and(|near| near[place] > 0)
     }
 }
 
 /// Sets 1 at voxels of the domain that are solved, 0 elsewhere; returns how many there are.
-pub fn mark(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: &Reaches, solved: &mut [u8]) -> u64 {
+pub fn mark(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches, solved: &mut [u8]) -> u64 {
     solved.fill(0);
     let mut count = 0;
     for place in rows(edge, valid).flatten() {
@@ -58,7 +58,7 @@ pub fn mark(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: &Reaches,
 
 /// The first and last place along x, y, z of solved voxels, or none when nothing is solved.
 #[must_use]
-pub fn hull(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: &Reaches) -> Option<[[usize; 2]; 3]> {
+pub fn hull(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches) -> Option<[[usize; 2]; 3]> {
     let mut hull: Option<[[usize; 2]; 3]> = None;
     for place in rows(edge, valid).flatten().filter(|&place| sides.solves(place, reaches)) {
         let at = [place % edge, place / edge % edge, place / (edge * edge)];
@@ -70,7 +70,7 @@ pub fn hull(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: &Reaches)
 
 /// Sets 1 at voxels beside the border that no reach solves, 0 elsewhere; returns whether there are any. `inside` has its
 /// ghosts across faces.
-pub fn border(d: &[f32], inside: &HaloTile<u8>, reaches: &Reaches, near: &mut [u8]) -> bool {
+pub fn border(d: &[f32], inside: &HaloTile<u8>, reaches: Reaches, near: &mut [u8]) -> bool {
     near.fill(0);
     let mut found = false;
     for_each_with_beside(inside, |place, here, beside| {
@@ -132,7 +132,7 @@ mod tests {
         let (d, inside) = fields();
         let mut solved = [7; 64];
         // x + y <= 3 inside, x + y <= 5 outside; of 3 x 4 x 3 voxels.
-        let count = mark(Sides { d: &d, inside: &inside, near: None }, EDGE, [3, 4, 3], &REACHES, &mut solved);
+        let count = mark(Sides { d: &d, inside: &inside, near: None }, EDGE, [3, 4, 3], REACHES, &mut solved);
         let wanted = |n: usize| {
             let [x, y, z] = [n % EDGE, n / EDGE % EDGE, n / 16];
             x < 3 && z < 3 && x + y <= if z < 2 { 3 } else { 5 }
@@ -145,14 +145,14 @@ mod tests {
     fn hulls_hold_what_is_solved_and_no_more() {
         let (d, inside) = fields();
         let sides = Sides { d: &d, inside: &inside, near: None };
-        assert_eq!(hull(sides, EDGE, [3, 4, 3], &REACHES), Some([[0, 2], [0, 3], [0, 2]]));
+        assert_eq!(hull(sides, EDGE, [3, 4, 3], REACHES), Some([[0, 2], [0, 3], [0, 2]]));
         let near = Reaches { inner: 0.0, outer: 0.5 };
-        assert_eq!(hull(sides, EDGE, [4; 3], &near), Some([[0, 0], [0, 0], [2, 3]]));
-        assert_eq!(hull(sides, EDGE, [4, 4, 2], &near), None);
+        assert_eq!(hull(sides, EDGE, [4; 3], near), Some([[0, 0], [0, 0], [2, 3]]));
+        assert_eq!(hull(sides, EDGE, [4, 4, 2], near), None);
         let mut flags = [0; 64];
         flags[63] = 3;
         let sides = Sides { near: Some(&flags), ..sides };
-        assert_eq!(hull(sides, EDGE, [4; 3], &near), Some([[0, 3], [0, 3], [2, 3]]));
+        assert_eq!(hull(sides, EDGE, [4; 3], near), Some([[0, 3], [0, 3], [2, 3]]));
     }
 
     #[test]
@@ -167,7 +167,7 @@ mod tests {
             tile.mirror(axis, upper);
         }
         let mut near = [9; 64];
-        assert!(border(&d, &tile, &REACHES, &mut near));
+        assert!(border(&d, &tile, REACHES, &mut near));
         let wanted = |n: usize| match (n / 16, n % EDGE + n / EDGE % EDGE) {
             (1, 4..) | (2, 6..) => 1,
             _ => 0,
@@ -179,6 +179,6 @@ mod tests {
         }
         grow(&tile, 1, &mut near);
         assert_eq!((near[15], near[63], near[62], near[31]), (2, 2, 0, 1));
-        assert!(!border(&[0.0; 64], &tile, &REACHES, &mut near), "all is solved anyhow");
+        assert!(!border(&[0.0; 64], &tile, REACHES, &mut near), "all is solved anyhow");
     }
 }
