@@ -167,13 +167,21 @@ impl Shells {
     ) -> Result<Vec<Option<f64>>> {
         let grid = *u.set().grid();
         let centre = grid.coords(brick);
-        let mut squared = vec![f64::INFINITY; targets.len()];
+        let (mut squared, mut due) = (vec![f64::INFINITY; targets.len()], Vec::new());
         for radius in 0..=grid.counts().into_iter().max().unwrap_or(1) {
             let around = Box3::new(centre, centre.map(|c| c + 1)).grow(radius);
             let shell = around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
             let on_shell = shell.filter(|at| (0..3).any(|a| (at[a] - centre[a]).abs() == radius));
             for id in on_shell.filter_map(|at| grid.id_at(at)).filter(|&id| holds_surface(u, id)) {
-                self.measure(u, geometry, id, targets, &mut squared)?;
+                let (lo, hi) = extent_of(u, geometry, id);
+                let away = |target: &[f64; 3]| {
+                    (0..3).map(|a| (lo[a] - target[a]).max(target[a] - hi[a]).max(0.0).powi(2)).sum::<f64>()
+                };
+                due.clear();
+                due.extend((0..targets.len()).filter(|&n| away(&targets[n]) < squared[n]));
+                if !due.is_empty() {
+                    self.measure(u, geometry, id, targets, &due, &mut squared)?;
+                }
             }
             // A triangle of a farther shell is at least this far from any point of the brick in the middle.
             let certain = radius as f64 * grid.edge() as f64 * geometry.min_spacing() - 2.0 * geometry.max_spacing();
@@ -190,6 +198,7 @@ impl Shells {
         geometry: &Geometry,
         id: BrickId,
         targets: &[[f64; 3]],
+        due: &[usize],
         squared: &mut [f64],
     ) -> Result<()> {
         patch_of(u, id, &mut self.cubes, &mut self.values, &mut self.patch)?;
@@ -197,11 +206,12 @@ impl Shells {
         // A triangle lies inside one cube of voxels: from its first corner none of it is farther than that.
         let size = geometry.spacing.iter().map(|h| h * h).sum::<f64>().sqrt() * (1.0 + 1e-9);
         let limit = |squared: f64| (squared.sqrt() + size) * (squared.sqrt() + size);
-        let mut limits: Vec<f64> = squared.iter().map(|&known| limit(known)).collect();
+        let mut limits: Vec<f64> = due.iter().map(|&n| limit(squared[n])).collect();
         for corners in &self.patch.triangles {
             let triangle = Triangle::new(corners.map(|v| world(self.patch.positions[v as usize])));
             let corner = triangle.corner();
-            for ((target, nearest), near) in targets.iter().zip(squared.iter_mut()).zip(&mut limits) {
+            for (&n, near) in due.iter().zip(&mut limits) {
+                let (target, nearest) = (&targets[n], &mut squared[n]);
                 let away = (0..3).map(|a| (corner[a] - target[a]) * (corner[a] - target[a])).sum::<f64>();
                 if away > *near {
                     continue;
@@ -214,6 +224,14 @@ impl Shells {
         }
         Ok(())
     }
+}
+
+/// The box that the surface in a brick's cells lies in, world coordinates; a little larger, for positions are f32.
+fn extent_of(u: &BrickArray<f32>, geometry: &Geometry, id: BrickId) -> ([f64; 3], [f64; 3]) {
+    let grid = u.set().grid();
+    let cells = cells_of_brick(&grid.brick_box(id), grid.shape(), true);
+    let slack = 1e-3 * geometry.max_spacing();
+    (geometry.position(cells.lo).map(|v| v - slack), geometry.position(cells.hi).map(|v| v + slack))
 }
 
 /// The surface in the cells of one brick.

@@ -7,6 +7,7 @@ pub(crate) mod held;
 pub(crate) mod lab;
 pub(crate) mod meshes;
 pub(crate) mod npy;
+pub(crate) mod plain_reconstruction;
 pub(crate) mod plain_scheme;
 pub(crate) mod random;
 pub(crate) mod solve;

@@ -34,14 +34,12 @@ pub struct Contact {
     pub faces: u32,
 }
 
-/// Pointer of a maximum.
-const PEAK: u8 = 6;
-
 /// Work buffers for one brick.
 #[derive(Clone, Debug, Default)]
 pub struct Ascent {
-    /// For each voxel the face across which d rises fastest, or [`PEAK`].
-    pointers: Vec<u8>,
+    /// For each voxel of the grown brick the way in the tile to the neighbour towards which d rises fastest; 0 where it
+    /// rises to none, and in ghosts.
+    ways: Vec<i32>,
     stack: Vec<usize>,
 }
 
@@ -54,24 +52,27 @@ impl Ascent {
         regions.fill(UNKNOWN);
         let (edge, valid) = (d.edge(), d.valid());
         let mut peaks = Vec::new();
-        for seed in places(edge, valid) {
-            if self.pointers[seed] != PEAK || regions[seed] != UNKNOWN {
-                continue;
-            }
-            let depth = d.data()[place_in(d, seed)];
-            let name = first + peaks.len() as u32;
-            regions[seed] = name;
-            self.stack.push(seed);
-            while let Some(at) = self.stack.pop() {
-                for next in neighbours(at, edge, valid).into_iter().flatten() {
-                    let level = self.pointers[next] == PEAK && d.data()[place_in(d, next)] == depth;
-                    if level && regions[next] == UNKNOWN {
-                        regions[next] = name;
-                        self.stack.push(next);
+        for (row, start) in rows(d) {
+            for x in 0..valid[0] {
+                if self.ways[start + x] != 0 || regions[row + x] != UNKNOWN {
+                    continue;
+                }
+                let depth = d.data()[start + x];
+                let name = first + peaks.len() as u32;
+                regions[row + x] = name;
+                self.stack.push(row + x);
+                while let Some(at) = self.stack.pop() {
+                    for next in neighbours(at, edge, valid).into_iter().flatten() {
+                        let there = place_in(d, next);
+                        let level = self.ways[there] == 0 && d.data()[there] == depth;
+                        if level && regions[next] == UNKNOWN {
+                            regions[next] = name;
+                            self.stack.push(next);
+                        }
                     }
                 }
+                peaks.push(Peak { depth });
             }
-            peaks.push(Peak { depth });
         }
         peaks
     }
@@ -80,58 +81,70 @@ impl Ascent {
     /// Returns whether any voxel became known.
     pub fn descend(&mut self, d: &HaloTile<f32>, spacing: [f64; 3], regions: &mut HaloTile<u32>) -> bool {
         self.point(d, spacing);
-        let (edge, pitch) = (d.edge(), d.pitch() as isize);
-        let strides = FACES.map(|face| if face.upper { 1 } else { -1 } * [1, pitch, pitch * pitch][face.axis]);
+        let data = regions.data_mut();
         let mut changed = false;
-        for seed in places(edge, d.valid()) {
-            let mut at = place_in(d, seed);
-            let data = regions.data_mut();
-            self.stack.clear();
-            // Ghosts have no pointer of their own: the walk ends there, known or not.
-            while data[at] == UNKNOWN {
-                let Some(inside) = place_of(at, edge, d.valid()).filter(|&p| self.pointers[p] != PEAK) else { break };
-                self.stack.push(at);
-                at = at.wrapping_add_signed(strides[self.pointers[inside] as usize]);
+        for (_, start) in rows(d) {
+            for seed in start..start + d.valid()[0] {
+                if data[seed] != UNKNOWN {
+                    continue;
+                }
+                self.stack.clear();
+                let mut at = seed;
+                // Ghosts lead nowhere: the walk ends there, known or not.
+                while data[at] == UNKNOWN && self.ways[at] != 0 {
+                    self.stack.push(at);
+                    at = at.wrapping_add_signed(self.ways[at] as isize);
+                }
+                let region = data[at];
+                changed |= region != UNKNOWN;
+                for &passed in &self.stack {
+                    data[passed] = region;
+                }
             }
-            let region = data[at];
-            changed |= region != UNKNOWN && !self.stack.is_empty();
-            self.stack.iter().for_each(|&passed| data[passed] = region);
         }
         self.stack.clear();
         changed
     }
 
     fn point(&mut self, d: &HaloTile<f32>, spacing: [f64; 3]) {
-        let edge = d.edge();
-        self.pointers.resize(edge * edge * edge, PEAK);
-        let (pointers, inverse) = (&mut self.pointers[..], spacing.map(|h| (1.0 / h) as f32));
-        vectorised!({ d: &HaloTile<f32>, inverse: [f32; 3], pointers: &mut [u8] } => point_all);
+        self.ways.clear();
+        self.ways.resize(d.data().len(), 0);
+        let (ways, inverse) = (&mut self.ways[..], spacing.map(|h| (1.0 / h) as f32));
+        vectorised!({ d: &HaloTile<f32>, inverse: [f32; 3], ways: &mut [i32] } => point_all);
     }
 }
 
 #[inline(always)]
-fn point_all(d: &HaloTile<f32>, inverse: [f32; 3], pointers: &mut [u8]) {
-    let (edge, pitch, valid) = (d.edge(), d.pitch(), d.valid());
+fn point_all(d: &HaloTile<f32>, inverse: [f32; 3], ways: &mut [i32]) {
+    let pitch = d.pitch();
     let strides = [1, pitch, pitch * pitch];
-    for (y, z) in (0..valid[2]).flat_map(|z| (0..valid[1]).map(move |y| (y, z))) {
-        let start = d.at(0, y as isize, z as isize);
+    for (_, start) in rows(d) {
+        let len = d.valid()[0];
         let beside = FACES.map(|face| {
             let stride = strides[face.axis];
-            let first = if face.upper { start + stride } else { start - stride };
-            (&d.data()[first..][..valid[0]], inverse[face.axis])
+            let (first, way) =
+                if face.upper { (start + stride, stride as i32) } else { (start - stride, -(stride as i32)) };
+            (&d.data()[first..][..len], inverse[face.axis], way)
         });
-        let here = &d.data()[start..][..valid[0]];
-        let row = &mut pointers[(z * edge + y) * edge..][..valid[0]];
-        for x in 0..here.len() {
-            let (mut steepest, mut towards) = (0.0f32, u32::from(PEAK));
-            for (n, (next, inverse)) in beside.iter().enumerate() {
+        let (here, ways) = (&d.data()[start..][..len], &mut ways[start..][..len]);
+        for x in 0..len {
+            let (mut steepest, mut towards) = (0.0f32, 0);
+            for (next, inverse, way) in beside {
                 let slope = (next[x] - here[x]) * inverse;
-                towards = if slope > steepest { n as u32 } else { towards };
+                towards = if slope > steepest { way } else { towards };
                 steepest = if slope > steepest { slope } else { steepest };
             }
-            row[x] = towards as u8;
+            ways[x] = towards;
         }
     }
+}
+
+/// Starts of the rows inside the domain: in the dense brick and in the tile.
+#[inline(always)]
+fn rows(d: &HaloTile<f32>) -> impl Iterator<Item = (usize, usize)> {
+    let (edge, pitch, valid) = (d.edge(), d.pitch(), d.valid());
+    let row = move |y: usize, z: usize| ((z * edge + y) * edge, ((z + 1) * pitch + y + 1) * pitch + 1);
+    (0..valid[2]).flat_map(move |z| (0..valid[1]).map(move |y| row(y, z)))
 }
 
 /// Where regions meet in a brick and across its upper faces, and across those lower ones that `lower` names; in no
@@ -141,26 +154,25 @@ pub fn contacts(d: &HaloTile<f32>, regions: &HaloTile<u32>, lower: [bool; 3]) ->
     let (edge, pitch, valid) = (d.edge(), d.pitch(), d.valid());
     let strides = [1, pitch, pitch * pitch];
     let mut found: Vec<Contact> = Vec::new();
-    for (y, z) in (0..valid[2]).flat_map(|z| (0..valid[1]).map(move |y| (y, z))) {
-        let start = d.at(0, y as isize, z as isize);
+    for (row, start) in rows(d) {
         let mut compare = |x: usize, next: usize| {
             let at = start + x;
             let (a, b) = (regions.data()[at], regions.data()[next]);
             if a != b {
-                let (pass, place) = (d.data()[at].min(d.data()[next]), ((z * edge + y) * edge + x) as u32);
+                let (pass, place) = (d.data()[at].min(d.data()[next]), (row + x) as u32);
                 add(&mut found, Contact { regions: [a.min(b), a.max(b)], pass, place, faces: 1 });
             }
         };
-        for x in 0..valid[0] {
-            for stride in strides {
-                compare(x, start + x + stride);
-            }
+        for stride in strides {
+            (0..valid[0]).for_each(|x| compare(x, start + x + stride));
         }
         if lower[0] {
             compare(0, start - 1);
         }
-        for (axis, _) in [y, z].into_iter().enumerate().filter(|&(n, at)| at == 0 && lower[n + 1]) {
-            (0..valid[0]).for_each(|x| compare(x, start + x - strides[axis + 1]));
+        for (axis, at) in [(1, row / edge % edge), (2, row / (edge * edge))] {
+            if at == 0 && lower[axis] {
+                (0..valid[0]).for_each(|x| compare(x, start + x - strides[axis]));
+            }
         }
     }
     found
@@ -179,22 +191,9 @@ fn add(found: &mut Vec<Contact>, contact: Contact) {
     }
 }
 
-fn places(edge: usize, valid: [usize; 3]) -> impl Iterator<Item = usize> {
-    let rows = (0..valid[2]).flat_map(move |z| (0..valid[1]).map(move |y| (z * edge + y) * edge));
-    rows.flat_map(move |row| row..row + valid[0])
-}
-
 fn place_in<T: Copy + Default>(tile: &HaloTile<T>, place: usize) -> usize {
     let edge = tile.edge();
     tile.at((place % edge) as isize, (place / edge % edge) as isize, (place / (edge * edge)) as isize)
-}
-
-/// The place in the dense brick of a place in the tile; none for ghosts.
-fn place_of(at: usize, edge: usize, valid: [usize; 3]) -> Option<usize> {
-    let pitch = edge + 2;
-    let grown = [at % pitch, at / pitch % pitch, at / (pitch * pitch)];
-    let inside = (0..3).all(|a| (1..=valid[a]).contains(&grown[a]));
-    inside.then(|| ((grown[2] - 1) * edge + grown[1] - 1) * edge + grown[0] - 1)
 }
 
 fn neighbours(at: usize, edge: usize, valid: [usize; 3]) -> [Option<usize>; 6] {

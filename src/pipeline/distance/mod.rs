@@ -67,8 +67,8 @@ impl Options {
     }
 }
 
-/// Distance to the nearest point in f32, physical units, on the bricks of `set`, no value above `farthest`; by one
-/// iteration of ordered sweeps, so that no bit depends on bricks or threads.
+/// Distance to the nearest point in f32, physical units, on the bricks of `set`, no value above `farthest`; on all ranks
+/// of the stage's engine. No bit depends on threads or ranks.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
@@ -80,8 +80,8 @@ pub fn cloud_distance(
     method: Method,
     farthest: f32,
 ) -> Result<BrickArray<f32>> {
-    let (schedule, options) = (Schedule::Sweep { iterations: 1 }, Options::up_to(f64::from(farthest)));
-    let solved = (method.solver::<f32>().solve)(stage, engine, sources, set, schedule, options)?;
+    let options = Options::up_to(f64::from(farthest));
+    let solved = ranks::solve_once::<f32>(stage, sources, set, method, Schedule::Front, options)?;
     let mut distance = BrickArray::with_faces(engine.scratch(), set)?;
     let (edge, len) = (set.grid().edge(), set.grid().brick_len());
     let workers = Workers::new(move || vec![0.0; len]);

@@ -25,6 +25,21 @@ pub fn solve<'a, P: Precision>(
     schedule: Schedule,
     options: Options,
 ) -> Result<Solved<'a, P>> {
+    let solved = solve_once(stage, sources, set, method, schedule, options)?;
+    let looks_again = schedule == Schedule::Front && method.solver::<P>().tracks_sources();
+    Ok(if looks_again { with_second_look(solved, sources, options) } else { solved })
+}
+
+/// The same without a second look at voxels whose nearest source the front may have lost: they are few, away from the
+/// sources, and off by less than a spacing.
+pub(super) fn solve_once<'a, P: Precision>(
+    stage: &Stage<'_>,
+    sources: &Sources<'a>,
+    set: &BrickSet,
+    method: Method,
+    schedule: Schedule,
+    options: Options,
+) -> Result<Solved<'a, P>> {
     let solver = method.solver::<P>();
     let one_heap = schedule != Schedule::Front && solver.textbook != Textbook::Sweeps;
     let ownership =
@@ -37,15 +52,13 @@ pub fn solve<'a, P: Precision>(
     })?;
     let joined = Cut { grid: *set.grid(), ownership };
     let sum = |of: fn(&Solved<'a, P>) -> u64| parts.iter().map(of).sum();
-    let solved = Solved {
+    Ok(Solved {
         values: joined.join(parts.iter().map(|part| part.values.clone()).collect()),
         sources: joined.join(parts.iter().map(|part| part.sources.clone()).collect()),
         fixed: joined.join(parts.iter().map(|part| part.fixed.clone()).collect()),
         fixed_voxels: sum(|part| part.fixed_voxels),
         triangle_distances: sum(|part| part.triangle_distances),
-    };
-    let looks_again = schedule == Schedule::Front && solver.tracks_sources();
-    Ok(if looks_again { with_second_look(solved, sources, options) } else { solved })
+    })
 }
 
 /// How a field is cut.
