@@ -145,7 +145,7 @@ fn ours(scene: &Scene, threads: usize, tolerance: f64) -> Cost {
     let started = Instant::now();
     let done = evolve(&stage, &lab.engine, &mut band, Some(&edges), [1.0; 3], &settings).expect("steps are taken");
     let seconds = started.elapsed().as_secs_f64();
-    let u = whole(&band.u[0]).into_iter().map(f64::from).collect();
+    let u = whole(&band.u).into_iter().map(f64::from).collect();
     Cost { seconds, assembly: 0.0, iterations: done.sor_iterations, fill, u }
 }
 

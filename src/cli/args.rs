@@ -124,7 +124,7 @@ pub(super) struct MotionArgs {
     /// What counts as rest: the surface's mean speed, or the L2 norm of a step's change
     #[arg(long, value_enum, default_value_t = StopArg::Surface)]
     pub(super) stop: StopArg,
-    /// Limit under which the surface rests [default: 0.02 for surface, 0.001 for l2]
+    /// Limit under which the surface rests [default: 0.02 for surface, 0.005 in `reconstruct`, 0.001 for l2]
     #[arg(long, value_name = "X", allow_hyphen_values = true)]
     pub(super) tol: Option<f64>,
     /// Time steps at most [default: 60]

@@ -1,7 +1,8 @@
 //! The narrow band and its start (algorithms: section 5, "Initial condition", "Narrow band").
 //!
-//! What a voxel is at the start is told by `kernel/level_set/start.rs`. Only cells that hold a solved voxel, or touch
-//! one, are stored; the others are constant.
+//! What a voxel is at the start is told by `kernel/level_set/start.rs`. Only cells that hold a solved voxel are stored;
+//! the others are constant, for the border between the sides is solved wherever it runs. Beyond the band the distance
+//! counts as the farthest: it acts on voxels of the band's rim alone, which are as constant as what is beyond.
 
 use std::sync::Arc;
 
@@ -17,8 +18,8 @@ pub use crate::kernel::level_set::start::Reaches;
 
 /// The fields of the band before the first time step; all over the same set of cells.
 pub struct Band {
-    /// Segmentation function, two time levels; the first holds the start.
-    pub u: [BrickArray<f32>; 2],
+    /// Segmentation function, at the start.
+    pub u: BrickArray<f32>,
     /// Distance to the cloud.
     pub distance: BrickArray<f32>,
     /// 1 where a voxel is solved.
@@ -42,12 +43,12 @@ pub fn make_band(
     let known = Known { distance, inside, near: near.as_ref(), reaches };
     let set = Arc::new(known.band_cells(stage)?);
     let new = || BrickArray::<f32>::with_faces(engine.scratch(), &set);
-    let mut band =
-        Band { u: [new()?, new()?], distance: new()?, solved: BrickArray::new(engine.scratch(), &set)?, voxels: 0 };
+    let mut band = Band { u: new()?, distance: new()?, solved: BrickArray::new(engine.scratch(), &set)?, voxels: 0 };
     for id in 0..set.grid().len() {
         let start = known.start_of_cell(id);
-        band.u.iter_mut().for_each(|u| u.set_absent(id, start));
-        band.distance.set_absent(id, distance.absent(id));
+        band.u.set_absent(id, start);
+        let farthest = Some(distance.absent(id)).filter(|d| d.is_finite());
+        band.distance.set_absent(id, farthest.unwrap_or(reaches.inner.max(reaches.outer)));
     }
     let counts = stage.run(&one_wave(&set), &Workers::none(), |(), &slot| Ok(known.fill_cell(&band, slot)))?;
     band.voxels = counts.iter().sum();
@@ -133,56 +134,37 @@ impl Known<'_> {
     /// The start value of a cell that is constant, told from its first voxel.
     fn start_of_cell(&self, id: BrickId) -> f32 {
         let slot = self.inside.set().slot(id);
-        f32::from(slot.map_or_else(|| self.inside.absent(id), |slot| self.inside.read(slot, |inside| inside[0])))
+        let side = slot.map_or_else(|| self.inside.absent(id), |slot| self.inside.read(slot, |inside| inside[0]));
+        f32::from(u8::from(side > 0))
     }
 
     fn fill_cell(&self, band: &Band, slot: Slot) -> u64 {
         let set = band.solved.set();
         let (id, edge) = (set.id(slot), set.grid().edge() as usize);
         let valid = set.grid().brick_box(id).shape().map(|n| n as usize);
-        // A cell of the band's rim may lie where the distance is not stored: it is constant there.
         let fill = |sides: Sides<'_>| {
             band.distance.write(slot, |out| out.copy_from_slice(sides.d));
-            band.u[0].write(slot, |u| u.iter_mut().zip(sides.inside).for_each(|(u, &side)| *u = f32::from(side)));
+            band.u.write(slot, |u| {
+                u.iter_mut().zip(sides.inside).for_each(|(u, &side)| *u = f32::from(u8::from(side > 0)));
+            });
             band.solved.write(slot, |solved| start::mark(sides, edge, valid, self.reaches, solved))
         };
-        let count = if let Some(from) = self.distance.set().slot(id) {
-            self.read(from, fill)
-        } else {
-            let len = set.grid().brick_len();
-            let (d, inside) = (vec![self.distance.absent(id); len], vec![self.inside.absent(id); len]);
-            fill(Sides { d: &d, inside: &inside, near: None })
-        };
+        let count = self.distance.set().slot(id).map_or(0, |from| self.read(from, fill));
         band.distance.refresh_faces(slot);
-        band.u[0].refresh_faces(slot);
+        band.u.refresh_faces(slot);
         count
     }
 
-    /// The cells that hold a solved voxel or have one right beside them.
+    /// The cells that hold a solved voxel: all others are constant.
     fn band_cells(&self, stage: &Stage<'_>) -> Result<BrickSet> {
         let set = self.distance.set();
         let grid = *set.grid();
         let edge = grid.edge() as usize;
-        let hulls = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+        let holds = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
             let valid = grid.brick_box(set.id(slot)).shape().map(|n| n as usize);
-            Ok(self.read(slot, |sides| start::hull(sides, edge, valid, self.reaches)))
+            Ok(self.read(slot, |sides| start::holds(sides, edge, valid, self.reaches)))
         })?;
-        let mut keep = vec![false; grid.len() as usize];
-        for (slot, hull) in hulls.iter().enumerate().filter_map(|(s, h)| Some((s as Slot, h.as_ref()?))) {
-            let id = set.id(slot);
-            keep[id as usize] = true;
-            for offset in NEIGHBOURS_26 {
-                let touches = (0..3).all(|a| match offset[a] {
-                    -1 => hull[a][0] == 0,
-                    1 => hull[a][1] == edge - 1,
-                    _ => true,
-                });
-                if let Some(neighbour) = grid.neighbour(id, offset).filter(|_| touches) {
-                    keep[neighbour as usize] = true;
-                }
-            }
-        }
-        Ok(BrickSet::from_fn(grid, |id| keep[id as usize]))
+        Ok(BrickSet::from_fn(grid, |id| set.slot(id).is_some_and(|slot| holds[slot as usize])))
     }
 }
 

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use super::band::{Band, Reaches, make_band};
 use super::distance::{Method, Sources, cloud_distance};
+use super::pockets::pockets;
+use super::sheets::hold_sheets;
 use super::tagging::{Basin, tag};
 use super::vicinity::{Vicinity, voxel_bounds};
 use super::watershed::{Sides, watershed};
@@ -22,9 +24,12 @@ const BAND_VOXELS: f64 = 4.0;
 /// The search begins at so many largest spacings from the cloud.
 const FIRST_REACH_VOXELS: f64 = 6.0;
 
-/// The search goes on while fewer of the points than this share have both sides beside them: a body may be open wider
+/// The search goes on while more of the points than this share have one side all around them: a body may be open wider
 /// than the reach.
-const ENOUGH_BETWEEN: f64 = 0.9;
+const MOST_LOST: f64 = 0.1;
+
+/// An open body is closed by balls of these parts of the reach.
+const POCKET_RADII: [f64; 2] = [0.25, 0.5];
 
 /// Where the start surface lies when no beta is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,21 +131,27 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     let grid = search.grid;
     let half_width = BAND_VOXELS * grid.voxel_volume().cbrt();
     let mut farthest = search.first_reach.max(half_width + 3.0 * grid.max_spacing());
+    let enough = |sides: &Sides| sides.lost.len() as f64 <= MOST_LOST * search.cloud.len() as f64;
     loop {
         let around = Around::new(engine, search, farthest)?;
-        let stage = around.tagging(engine, search);
-        let Sides { inside, basins, points_between } =
-            watershed(&stage, engine, &around.sources(search), &around.distance)?;
-        stage.finish();
-        let enough = points_between as f64 >= ENOUGH_BETWEEN * search.cloud.len() as f64;
+        let mut sides = around.sides(engine, search, None)?;
         // No ball fits the box around the cloud that is larger.
         let all = 2.0 * farthest > search.extents().into_iter().fold(f64::INFINITY, f64::min) + grid.max_spacing();
-        if !basins.is_empty() && (enough || all) {
-            let reaches = Reaches { inner: half_width as f32, outer: half_width as f32 };
-            return Ok(around.enclosed(0.0, reaches, inside, basins));
-        }
-        if all {
+        if sides.basins.is_empty() && all {
             return Ok(Found::Nothing);
+        }
+        if !sides.basins.is_empty() && all && !enough(&sides) {
+            for part in POCKET_RADII {
+                let closed = around.sides(engine, search, Some(part * farthest))?;
+                if closed.lost.len() < sides.lost.len() {
+                    sides = closed;
+                }
+            }
+        }
+        if !sides.basins.is_empty() && (all || enough(&sides)) {
+            let reaches = Reaches { inner: half_width as f32, outer: half_width as f32 };
+            hold_sheets(&around.vicinity.geometry, search.cloud, &sides.lost, &sides.inside);
+            return Ok(around.enclosed(0.0, reaches, sides.inside, sides.basins));
         }
         farthest *= 2.0;
     }
@@ -211,6 +222,17 @@ impl Around {
 
     fn sources<'a>(&'a self, search: &Search<'a>) -> Sources<'a> {
         Sources::cloud(&self.vicinity.geometry, search.cloud, &self.vicinity.bins)
+    }
+
+    /// The sides of the cloud; with a radius, bodies that are open are closed by a ball of it.
+    fn sides(&self, engine: &Engine, search: &Search<'_>, radius: Option<f64>) -> Result<Sides> {
+        let stage = self.tagging(engine, search);
+        let pockets = radius
+            .map(|radius| pockets(&stage, engine, &self.vicinity.geometry, &self.distance, radius))
+            .transpose()?;
+        let sides = watershed(&stage, engine, &self.sources(search), &self.distance, pockets.as_ref())?;
+        stage.finish();
+        Ok(sides)
     }
 
     fn tagging<'a>(&self, engine: &'a Engine, search: &Search<'_>) -> Stage<'a> {

@@ -133,6 +133,8 @@ struct Solver<'a> {
     engine: &'a Engine,
     stage: &'a Stage<'a>,
     band: &'a Band,
+    /// Where the next time level goes.
+    next: &'a BrickArray<f32>,
     edges: Option<&'a BrickArray<f32>>,
     settings: &'a TimeLoop,
     spacing: [f64; 3],
@@ -147,7 +149,7 @@ struct Solver<'a> {
     exchange: &'a Exchange<'a>,
 }
 
-/// Moves the surface until it rests. The result is in `band.u[0]`.
+/// Moves the surface until it rests. The result is in `band.u`.
 ///
 /// # Errors
 /// When the run is interrupted.
@@ -167,14 +169,27 @@ pub fn evolve(
     let cells = &Cells::new(band.solved.set());
     let exchange = &Exchange::new(engine.comm(), band.solved.set(), all)?;
     let mut cell_iterations = 0;
-    // Cells without a solved voxel never change: both time levels hold their start.
-    copy_start(stage, band)?;
+    let mut next = second_level(stage, engine, &band.u)?;
     while done.steps < settings.max_steps {
         let (kept, first) = (kept.as_ref(), done.steps == 0);
-        let solver =
-            Solver { engine, stage, band, edges, settings, spacing, all, faces, kept, first, workers, cells, exchange };
+        let solver = Solver {
+            engine,
+            stage,
+            band,
+            next: &next,
+            edges,
+            settings,
+            spacing,
+            all,
+            faces,
+            kept,
+            first,
+            workers,
+            cells,
+            exchange,
+        };
         let (step, visits) = solver.step()?;
-        band.u.swap(0, 1);
+        std::mem::swap(&mut band.u, &mut next);
         done.steps += 1;
         cell_iterations += visits * LOCAL_ITERATIONS as u64;
         let (residual, limit, name) = match settings.stop {
@@ -211,14 +226,19 @@ fn room_to_keep(engine: &Engine, band: &Band) -> Result<Option<BrickArray<f32>>>
     BrickArray::with_layers(engine.scratch(), set, KEPT_LAYERS).map(Some)
 }
 
-fn copy_start(stage: &Stage<'_>, band: &Band) -> Result<()> {
-    let set = band.solved.set();
+/// A second time level, equal to the start: cells without a solved voxel never change.
+fn second_level(stage: &Stage<'_>, engine: &Engine, u: &BrickArray<f32>) -> Result<BrickArray<f32>> {
+    let set = u.set();
+    let mut next = BrickArray::with_faces(engine.scratch(), set)?;
+    for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
+        next.set_absent(id, u.absent(id));
+    }
     stage.run(&crate::exec::one_wave(set), &Workers::none(), |(), &slot| {
-        band.u[0].read(slot, |from| band.u[1].write(slot, |to| to.copy_from_slice(from)));
-        band.u[1].refresh_faces(slot);
+        u.read(slot, |from| next.write(slot, |to| to.copy_from_slice(from)));
+        next.refresh_faces(slot);
         Ok(())
     })?;
-    Ok(())
+    Ok(next)
 }
 
 /// What a time step did to the surface.
@@ -231,7 +251,7 @@ struct Step {
 }
 
 impl Solver<'_> {
-    /// One time step from `band.u[0]` to `band.u[1]`; returns its motion and the number of visits.
+    /// One time step from `band.u` to `next`; returns its motion and the number of visits.
     ///
     /// All cells are taken up once; then again those that were left unsolved or whose neighbours were stirred since.
     fn step(&self) -> Result<(Step, u64)> {
@@ -246,7 +266,7 @@ impl Solver<'_> {
                 let wave: Vec<Slot> = cells.iter().copied().filter(due).collect();
                 let results =
                     self.stage.run(&wave, self.workers, |worker, &slot| Ok(self.visit(worker, slot, round, colour)))?;
-                self.exchange.faces(&self.band.u[1], &wave)?;
+                self.exchange.faces(self.next, &wave)?;
                 for (&slot, visit) in wave.iter().zip(results) {
                     visits[slot as usize] = visit;
                     unknown[slot as usize] = 0.0;
@@ -284,7 +304,7 @@ impl Solver<'_> {
 
     /// Takes up a cell: makes its scheme, relaxes it, writes it back.
     fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) -> Visit {
-        let [old, new] = &self.band.u;
+        let (old, new) = (&self.band.u, self.next);
         read_mask(&self.band.solved, slot, &mut w.mask);
         if w.mask.count == 0 {
             return Visit::default();
@@ -318,7 +338,7 @@ impl Solver<'_> {
     /// last corrections.
     fn solve(&self, w: &mut Worker, turn: Turn, fixed: &[f32]) -> (f64, f64) {
         let Turn { slot, round, colour } = turn;
-        let [old, new] = &self.band.u;
+        let (old, new) = (&self.band.u, self.next);
         let (d, g) = fixed[..FIXED_LEN].split_at(GROWN_LEN);
         self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
         let fields = Fields { u: w.u.data(), d, g };

@@ -78,6 +78,14 @@ pub fn tag(
     Ok(Tagging { level, basins })
 }
 
+/// For each voxel the largest threshold at which the flood reaches it.
+///
+/// # Errors
+/// When scratch runs out or the run is interrupted.
+pub fn level_of(stage: &Stage<'_>, engine: &Engine, distance: &BrickArray<f32>) -> Result<BrickArray<f32>> {
+    flood_all(stage, engine, distance, &mut FarRegions::new(distance.set(), distance.absent(0)))
+}
+
 /// Relaxes bricks in rounds until nothing rises: even ones, then odd ones, only those beside a change.
 fn flood_all(
     stage: &Stage<'_>,

@@ -20,15 +20,17 @@ use crate::tile::HaloTile;
 
 /// A space less deep than so many smallest spacings is a gap between points.
 const LEAST_DEPTH_VOXELS: f64 = 1.0;
+/// A pocket less deep than so many is a ball's curvature against the grid's steps.
+const LEAST_POCKET_VOXELS: f64 = 2.0;
 
 /// The sides of a cloud.
 pub struct Sides {
-    /// 1 inside, 0 outside.
+    /// 1 inside, 0 outside; [`HELD`](crate::kernel::level_set::start::HELD) once [`hold_sheets`] held it.
     pub inside: BrickArray<u8>,
     /// The spaces inside, deepest first.
     pub basins: Vec<Basin>,
-    /// Points that have both sides beside them.
-    pub points_between: u64,
+    /// The points that have one side all around them: of sheets without an inside, or far from any body.
+    pub lost: Vec<u32>,
 }
 
 struct Worker {
@@ -37,7 +39,7 @@ struct Worker {
     regions: HaloTile<u32>,
 }
 
-/// Tells the sides of the cloud that `distance` is measured from.
+/// Tells the sides of the cloud that `distance` is measured from; `pockets` says how deep voxels lie in one, 0 for not.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
@@ -46,6 +48,7 @@ pub fn watershed(
     engine: &Engine,
     sources: &Sources<'_>,
     distance: &BrickArray<f32>,
+    pockets: Option<&BrickArray<f32>>,
 ) -> Result<Sides> {
     let set = distance.set();
     let edge = set.grid().edge() as usize;
@@ -54,6 +57,7 @@ pub fn watershed(
     let flood = Watershed {
         stage,
         distance,
+        pockets,
         spacing: sources.geometry.spacing,
         plan: HaloPlan::new(*set.grid(), Reach::Faces),
         workers: Workers::new(make),
@@ -61,17 +65,18 @@ pub fn watershed(
     let (of_voxel, mut regions) = flood.peaks(engine, &far)?;
     flood.descend(&of_voxel)?;
     let contacts = flood.contacts(&of_voxel, &mut regions)?;
-    let least = (LEAST_DEPTH_VOXELS * sources.geometry.min_spacing()) as f32;
-    let (is_inside, found) = spaces::inside(&regions, &contacts, least);
+    let least = |voxels: f64| (voxels * sources.geometry.min_spacing()) as f32;
+    let (is_inside, found) = spaces::inside(&regions, &contacts, least(LEAST_DEPTH_VOXELS), least(LEAST_POCKET_VOXELS));
     let inside = flood.sides(engine, &of_voxel, &is_inside)?;
     let basins = found.iter().map(|space| basin(space, &contacts, set)).collect();
-    let points_between = points_between(stage, sources, &inside)?;
-    Ok(Sides { inside, basins, points_between })
+    let lost = lost_points(stage, sources, &inside)?;
+    Ok(Sides { inside, basins, lost })
 }
 
 struct Watershed<'a> {
     stage: &'a Stage<'a>,
     distance: &'a BrickArray<f32>,
+    pockets: Option<&'a BrickArray<f32>>,
     spacing: [f64; 3],
     plan: HaloPlan,
     workers: Workers<Worker>,
@@ -92,7 +97,13 @@ impl Watershed<'_> {
         let mut of_voxel = BrickArray::with_faces(engine.scratch(), set)?;
         let peaks = self.stage.run(&one_wave(set), &self.workers, |w, &slot| {
             self.gather_distance(slot, &mut w.d);
-            Ok(of_voxel.write(slot, |dense| w.ascent.peaks(&w.d, self.spacing, 0, dense)))
+            let mut peaks = |pockets: Option<&[f32]>| {
+                of_voxel.write(slot, |dense| w.ascent.peaks(&w.d, self.spacing, 0, pockets, dense))
+            };
+            Ok(match self.pockets {
+                Some(pockets) => pockets.read(slot, |pockets| peaks(Some(pockets))),
+                None => peaks(None),
+            })
         })?;
         let mut regions = vec![Region::default()];
         let mut of_far = Vec::with_capacity(far.bricks.len());
@@ -102,7 +113,7 @@ impl Watershed<'_> {
             } else {
                 of_far.push(regions.len() as u32);
                 let voxels = (bricks.len() * set.grid().brick_len()) as u64;
-                regions.push(Region { depth: far.farthest, voxels });
+                regions.push(Region { depth: far.farthest, voxels, pocket: 0.0 });
             }
         }
         for (&name, bricks) in of_far.iter().zip(&far.bricks) {
@@ -113,7 +124,7 @@ impl Watershed<'_> {
         let mut first = Vec::with_capacity(set.len());
         for peaks in &peaks {
             first.push(regions.len() as u32);
-            regions.extend(peaks.iter().map(|peak| Region { depth: peak.depth, voxels: 0 }));
+            regions.extend(peaks.iter().map(|peak| Region { depth: peak.depth, voxels: 0, pocket: peak.pocket }));
         }
         self.stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
             of_voxel.write(slot, |dense| {
@@ -219,20 +230,24 @@ fn basin(space: &Space, contacts: &[(Contact, BrickId)], set: &BrickSet) -> Basi
     Basin { voxels: space.voxels, depth: space.depth, saddle: hole.pass, place }
 }
 
-/// Counts the points that have voxels of both sides within two voxels.
-fn points_between(stage: &Stage<'_>, sources: &Sources<'_>, inside: &BrickArray<u8>) -> Result<u64> {
+/// The points that have not voxels of both sides within two voxels.
+fn lost_points(stage: &Stage<'_>, sources: &Sources<'_>, inside: &BrickArray<u8>) -> Result<Vec<u32>> {
     let set = inside.set();
     let domain = Box3::from_shape(set.grid().shape());
-    let counts = stage.run(&one_wave(set), &Workers::new(Vec::new), |voxels, &slot| {
-        let mut count = 0;
+    let found = stage.run(&one_wave(set), &Workers::new(Vec::new), |voxels, &slot| {
+        let mut lost = Vec::new();
         for &point in sources.bins.of(set.id(slot)) {
             let base = sources.geometry.to_voxels(sources.positions[point as usize]).map(|v| v.floor() as i64);
             let around = Box3::new(base.map(|v| v - 1), base.map(|v| v + 3)).intersect(&domain);
             voxels.resize(around.len(), 0u8);
             inside.read_box(&around, voxels)?;
-            count += u64::from(voxels.contains(&0) && voxels.contains(&1));
+            if !(voxels.contains(&0) && voxels.contains(&1)) {
+                lost.push(point);
+            }
         }
-        Ok(count)
+        Ok(lost)
     })?;
-    Ok(counts.iter().sum())
+    let mut lost = found.concat();
+    lost.sort_unstable();
+    Ok(lost)
 }

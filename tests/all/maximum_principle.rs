@@ -62,7 +62,7 @@ impl Problem {
         let stage = lab.engine.stage("step", 0);
         let edges = (self.velocity.rho > 0.0).then_some(&edges);
         let done = evolve(&stage, &lab.engine, &mut band, edges, self.spacing, &settings).expect("room in scratch");
-        (whole(&band.u[0]), done)
+        (whole(&band.u), done)
     }
 
     /// How far the printed scheme, divided by its diagonal, is from holding: root mean square over the solved voxels.

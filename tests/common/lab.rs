@@ -42,7 +42,7 @@ impl Lab {
     pub(crate) fn band(&self, shape: [i64; 3], u: &[f32], d: &[f32], solved: &[u8]) -> Band {
         let set = dense(shape, CELL as i64);
         Band {
-            u: [self.field(&set, u), self.field(&set, u)],
+            u: self.field(&set, u),
             distance: self.field(&set, d),
             solved: self.field(&set, solved),
             voxels: solved.iter().map(|s| u64::from(*s)).sum(),

@@ -14,11 +14,13 @@ pub const UNKNOWN: u32 = u32::MAX;
 /// The region outside of the domain.
 pub const OUTSIDE: u32 = 0;
 
-/// A maximum: where all pointers nearby lead to.
+/// A maximum, where all pointers nearby lead to; or a pocket, where they end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Peak {
-    /// Its distance to the cloud.
+    /// Its distance to the cloud, of a pocket the largest.
     pub depth: f32,
+    /// How deep a pocket is, the most; 0 for a maximum.
+    pub pocket: f32,
 }
 
 /// Where two regions meet.
@@ -45,33 +47,46 @@ pub struct Ascent {
 
 impl Ascent {
     /// Finds the brick's maxima; `d` has its ghosts across faces, infinite beyond the domain. Connected voxels of one
-    /// value are one maximum. `regions`, dense over the brick, gets the maxima's numbers, `first` for the first of them,
-    /// and [`UNKNOWN`] elsewhere.
-    pub fn peaks(&mut self, d: &HaloTile<f32>, spacing: [f64; 3], first: u32, regions: &mut [u32]) -> Vec<Peak> {
+    /// value are one maximum. Connected voxels where `pockets`, dense over the brick, is above 0 are regions of their
+    /// own, and pointers end there. `regions`, dense too, gets the numbers, `first` for the first of them, and
+    /// [`UNKNOWN`] elsewhere.
+    pub fn peaks(
+        &mut self,
+        d: &HaloTile<f32>,
+        spacing: [f64; 3],
+        first: u32,
+        pockets: Option<&[f32]>,
+        regions: &mut [u32],
+    ) -> Vec<Peak> {
         self.point(d, spacing);
         regions.fill(UNKNOWN);
-        let (edge, valid) = (d.edge(), d.valid());
+        let depth = |place: usize| d.data()[place_in(d, place)];
+        let pocket = |place: usize| pockets.map_or(0.0, |pockets| pockets[place]);
         let mut peaks = Vec::new();
-        for (row, start) in rows(d) {
-            for x in 0..valid[0] {
-                if self.ways[start + x] != 0 || regions[row + x] != UNKNOWN {
+        for row in rows(d).map(|(row, _)| row) {
+            for seed in row..row + d.valid()[0] {
+                if regions[seed] != UNKNOWN {
                     continue;
                 }
-                let depth = d.data()[start + x];
                 let name = first + peaks.len() as u32;
-                regions[row + x] = name;
-                self.stack.push(row + x);
-                while let Some(at) = self.stack.pop() {
-                    for next in neighbours(at, edge, valid).into_iter().flatten() {
-                        let there = place_in(d, next);
-                        let level = self.ways[there] == 0 && d.data()[there] == depth;
-                        if level && regions[next] == UNKNOWN {
-                            regions[next] = name;
-                            self.stack.push(next);
+                if pocket(seed) > 0.0 {
+                    let mut peak = Peak { depth: 0.0, pocket: 0.0 };
+                    fill(d, seed, name, regions, &mut self.stack, |at| {
+                        let joins = pocket(at) > 0.0;
+                        if joins {
+                            peak = Peak { depth: peak.depth.max(depth(at)), pocket: peak.pocket.max(pocket(at)) };
                         }
-                    }
+                        joins
+                    });
+                    peaks.push(peak);
+                } else if self.ways[place_in(d, seed)] == 0 {
+                    let height = depth(seed);
+                    let ways = &self.ways;
+                    fill(d, seed, name, regions, &mut self.stack, |at| {
+                        ways[place_in(d, at)] == 0 && depth(at) == height && pocket(at) == 0.0
+                    });
+                    peaks.push(Peak { depth: height, pocket: 0.0 });
                 }
-                peaks.push(Peak { depth });
             }
         }
         peaks
@@ -111,6 +126,29 @@ impl Ascent {
         self.ways.resize(d.data().len(), 0);
         let (ways, inverse) = (&mut self.ways[..], spacing.map(|h| (1.0 / h) as f32));
         vectorised!({ d: &HaloTile<f32>, inverse: [f32; 3], ways: &mut [i32] } => point_all);
+    }
+}
+
+/// Names the voxels that are connected to `seed` by such as `joins` says yes to.
+fn fill(
+    d: &HaloTile<f32>,
+    seed: usize,
+    name: u32,
+    regions: &mut [u32],
+    stack: &mut Vec<usize>,
+    mut joins: impl FnMut(usize) -> bool,
+) {
+    if joins(seed) {
+        regions[seed] = name;
+        stack.push(seed);
+    }
+    while let Some(at) = stack.pop() {
+        for next in neighbours(at, d.edge(), d.valid()).into_iter().flatten() {
+            if regions[next] == UNKNOWN && joins(next) {
+                regions[next] = name;
+                stack.push(next);
+            }
+        }
     }
 }
 
@@ -227,7 +265,7 @@ mod tests {
         // A maximum of two voxels; the last voxel leads across the brick's end.
         let d = row([1.0, 3.0, 3.0, 0.5], [0.0, 4.0]);
         let (mut ascent, mut dense) = (Ascent::default(), [0; 64]);
-        assert_eq!(ascent.peaks(&d, [1.0; 3], 7, &mut dense), [Peak { depth: 3.0 }]);
+        assert_eq!(ascent.peaks(&d, [1.0; 3], 7, None, &mut dense), [Peak { depth: 3.0, pocket: 0.0 }]);
         assert_eq!(dense[..4], [UNKNOWN, 7, 7, UNKNOWN]);
         let mut regions = HaloTile::new(4);
         regions.set_valid([4, 1, 1]);
@@ -247,14 +285,23 @@ mod tests {
     }
 
     #[test]
+    fn pointers_end_in_pockets() {
+        let d = row([1.0, 2.0, 3.0, 4.0], [0.0, 5.0]);
+        let (mut ascent, mut dense, mut pockets) = (Ascent::default(), [0; 64], [0.0; 64]);
+        (pockets[1], pockets[2]) = (0.5, 0.25);
+        let found = ascent.peaks(&d, [1.0; 3], 3, Some(&pockets), &mut dense);
+        assert_eq!((found, &dense[..4]), (vec![Peak { depth: 3.0, pocket: 0.5 }], &[UNKNOWN, 3, 3, UNKNOWN][..]));
+    }
+
+    #[test]
     fn slopes_are_of_physical_lengths() {
         let mut d = row([1.0, 2.0, 1.5, 0.0], [0.0, 0.0]);
         let above = d.at(1, 1, 0);
         d.data_mut()[above] = 3.0;
         let (mut ascent, mut dense) = (Ascent::default(), [0; 64]);
-        assert_eq!(ascent.peaks(&d, [1.0; 3], 1, &mut dense), [], "up across y");
+        assert_eq!(ascent.peaks(&d, [1.0; 3], 1, None, &mut dense), [], "up across y");
         // From the third voxel 0.5 along x in a step of 1 against none along y in a step of 9.
         d.data_mut()[above] = 2.0;
-        assert_eq!(ascent.peaks(&d, [1.0, 9.0, 9.0], 1, &mut dense), [Peak { depth: 2.0 }]);
+        assert_eq!(ascent.peaks(&d, [1.0, 9.0, 9.0], 1, None, &mut dense), [Peak { depth: 2.0, pocket: 0.0 }]);
     }
 }

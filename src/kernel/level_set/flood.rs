@@ -26,6 +26,24 @@ pub fn highest(layer: &[f32]) -> f32 {
     layer.iter().copied().fold(0.0, f32::max)
 }
 
+/// The voxels that a flood at a threshold reaches and beside which it does not reach one; x fastest.
+#[must_use]
+pub fn shore(b: &HaloTile<f32>, threshold: f32) -> Vec<[usize; 3]> {
+    let (pitch, valid) = (b.pitch(), b.valid());
+    let mut found = Vec::new();
+    for (z, y) in (0..valid[2]).flat_map(|z| (0..valid[1]).map(move |y| (z, y))) {
+        let start = b.at(0, y as isize, z as isize);
+        for x in 0..valid[0] {
+            let at = start + x;
+            let beside = [at - 1, at + 1, at - pitch, at + pitch, at - pitch * pitch, at + pitch * pitch];
+            if b.data()[at] >= threshold && beside.iter().any(|&next| b.data()[next] < threshold) {
+                found.push([x, y, z]);
+            }
+        }
+    }
+    found
+}
+
 fn pass(b: &mut HaloTile<f32>, d: &[f32], upward: bool) -> bool {
     let (edge, pitch, valid) = (b.edge(), b.pitch(), b.valid());
     let mut rose = false;

@@ -5,6 +5,9 @@
 //! pass between them, a wall of points stands there, and they stay apart. Spaces that are left are told sides so that
 //! points have the inside on one hand and the outside on the other: the outermost is outside, and each that follows is
 //! opposite to what most of its border meets. So bodies may hold hollows, and these bodies again.
+//!
+//! *Pockets* are what a large ball cannot reach from outside. They stay apart from what is not a pocket, and their
+//! borders tell their side too: a dent meets the inside with most of its border, the bell of an open body the outside.
 
 use super::ascent::{Contact, OUTSIDE};
 use super::persistence::PERSISTENCE;
@@ -16,6 +19,8 @@ pub struct Region {
     pub depth: f32,
     /// Number of voxels.
     pub voxels: u64,
+    /// How deep a pocket it is; 0 for none.
+    pub pocket: f32,
 }
 
 /// A space that persists, inside of the cloud.
@@ -44,26 +49,49 @@ pub fn joined(mut contacts: Vec<(Contact, u64)>) -> Vec<(Contact, u64)> {
 }
 
 /// Tells which regions are inside, and the spaces they form, deepest first. Region [`OUTSIDE`] is outside whatever
-/// happens; no space less deep than `least_depth` stays apart.
+/// happens; no space less deep than `least_depth` stays apart, and no pocket less deep than `least_pocket`.
 #[must_use]
-pub fn inside(regions: &[Region], contacts: &[(Contact, u64)], least_depth: f32) -> (Vec<bool>, Vec<Space>) {
+pub fn inside(
+    regions: &[Region],
+    contacts: &[(Contact, u64)],
+    least_depth: f32,
+    least_pocket: f32,
+) -> (Vec<bool>, Vec<Space>) {
     let mut order: Vec<usize> = (0..contacts.len()).collect();
     order.sort_by(|&a, &b| contacts[b].0.pass.total_cmp(&contacts[a].0.pass).then(a.cmp(&b)));
     let mut merged = Merged::new(regions);
-    for &n in &order {
-        let Contact { regions: [a, b], pass, .. } = contacts[n].0;
-        merged.meet(a, b, (PERSISTENCE * pass).max(least_depth));
+    let deep = |pass: f32| (PERSISTENCE * pass).max(least_depth);
+    // Pockets first, for how deep they are is that of all of them.
+    for Contact { regions: [a, b], pass, .. } in order.iter().map(|&n| contacts[n].0) {
+        if [a, b].iter().all(|&region| regions[region as usize].pocket > 0.0) {
+            merged.meet(a, b, deep(pass));
+        }
+    }
+    merged.fill_shallow_pockets(least_pocket);
+    for Contact { regions: [a, b], pass, .. } in order.iter().map(|&n| contacts[n].0) {
+        if merged.is_pocket(a) == merged.is_pocket(b) {
+            merged.meet(a, b, deep(pass));
+        }
     }
     let roots: Vec<u32> = (0..regions.len() as u32).map(|region| merged.root(region)).collect();
     let sides = sides_of(&roots, contacts);
     let inside: Vec<bool> = roots.iter().map(|&root| sides[root as usize] == Side::Inside).collect();
-    (inside.clone(), spaces_of(regions, &roots, &inside, contacts))
+    // A pocket inside is part of the body that it opens into.
+    for [a, b] in contacts.iter().map(|(contact, _)| contact.regions) {
+        if inside[a as usize] && inside[b as usize] && merged.is_pocket(a) != merged.is_pocket(b) {
+            merged.meet(a, b, f32::INFINITY);
+        }
+    }
+    let roots: Vec<u32> = (0..regions.len() as u32).map(|region| merged.root(region)).collect();
+    let spaces = spaces_of(regions, &roots, &inside, contacts);
+    (inside, spaces)
 }
 
 /// A forest over the regions; the smallest number of a tree is its root.
 struct Merged {
     parent: Vec<u32>,
     depth: Vec<f32>,
+    pocket: Vec<f32>,
 }
 
 impl Merged {
@@ -72,7 +100,18 @@ impl Merged {
         if let Some(outside) = depth.get_mut(OUTSIDE as usize) {
             *outside = f32::INFINITY;
         }
-        Self { parent: (0..regions.len() as u32).collect(), depth }
+        let pocket = regions.iter().map(|region| region.pocket).collect();
+        Self { parent: (0..regions.len() as u32).collect(), depth, pocket }
+    }
+
+    fn is_pocket(&mut self, region: u32) -> bool {
+        let root = self.root(region);
+        self.pocket[root as usize] > 0.0
+    }
+
+    /// Makes pockets less deep than that nothing special.
+    fn fill_shallow_pockets(&mut self, least: f32) {
+        self.pocket.iter_mut().filter(|pocket| **pocket < least).for_each(|pocket| *pocket = 0.0);
     }
 
     fn root(&mut self, mut n: u32) -> u32 {
@@ -93,6 +132,7 @@ impl Merged {
             return;
         }
         self.depth[kept as usize] = depths[0].max(depths[1]);
+        self.pocket[kept as usize] = self.pocket[a as usize].max(self.pocket[b as usize]);
         self.parent[gone as usize] = kept;
     }
 }
@@ -163,7 +203,7 @@ mod tests {
     use super::*;
 
     fn region(depth: f32) -> Region {
-        Region { depth, voxels: 10 }
+        Region { depth, voxels: 10, pocket: 0.0 }
     }
 
     fn contact(regions: [u32; 2], pass: f32, faces: u32) -> (Contact, u64) {
@@ -183,7 +223,7 @@ mod tests {
             contact([1, 3], 0.5, 15),
             contact([1, 4], 2.0, 8),
         ];
-        let (sides, spaces) = inside(&regions, &contacts, 1.0);
+        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0);
         assert_eq!(sides, [false, true, true, false, true]);
         assert_eq!(spaces, [Space { depth: 8.0, voxels: 20, hole: 1 }, Space { depth: 5.0, voxels: 10, hole: 3 }]);
     }
@@ -192,7 +232,7 @@ mod tests {
     fn a_hollow_is_outside_and_a_body_within_it_inside_again() {
         let regions = [region(9.0), region(3.0), region(4.0), region(2.0)];
         let contacts = [contact([0, 1], 0.7, 300), contact([1, 2], 0.8, 200), contact([2, 3], 0.6, 50)];
-        let (sides, spaces) = inside(&regions, &contacts, 1.0);
+        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0);
         assert_eq!(sides, [false, true, false, true]);
         assert_eq!(spaces.iter().map(|s| (s.depth, s.hole)).collect::<Vec<_>>(), [(3.0, 1), (2.0, 2)]);
     }
@@ -201,7 +241,28 @@ mod tests {
     fn what_is_open_or_shallow_is_outside() {
         let regions = [region(9.0), region(5.0), region(0.9)];
         let contacts = [contact([0, 1], 2.6, 300), contact([0, 2], 0.1, 20)];
-        assert_eq!(inside(&regions, &contacts, 1.0), (vec![false; 3], Vec::new()));
+        assert_eq!(inside(&regions, &contacts, 1.0, 1.0), (vec![false; 3], Vec::new()));
+    }
+
+    /// An open body: its depth, its bell in two parts of one pocket, and a dent of its side.
+    #[test]
+    fn a_bell_is_inside_and_a_dent_is_not() {
+        let pocket = |pocket: f32| Region { pocket, ..region(6.0) };
+        let regions = [region(20.0), region(9.0), pocket(4.0), pocket(0.5), pocket(3.0), pocket(0.9)];
+        let contacts = [
+            contact([0, 1], 0.7, 500),
+            contact([0, 2], 6.0, 300),
+            contact([0, 3], 5.0, 90),
+            contact([0, 4], 4.0, 40),
+            contact([0, 5], 4.0, 40),
+            contact([1, 2], 4.2, 30),
+            contact([1, 4], 0.8, 70),
+            contact([1, 5], 0.7, 20),
+            contact([2, 3], 5.5, 80),
+        ];
+        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0);
+        assert_eq!(sides, [false, true, true, true, false, false]);
+        assert_eq!(spaces, [Space { depth: 9.0, voxels: 30, hole: 1 }]);
     }
 
     #[test]

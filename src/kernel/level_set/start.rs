@@ -5,10 +5,13 @@
 //! value. Comparisons alone, voxel by voxel, so the result does not depend on how the volume is divided.
 //!
 //! Bricks are dense `[z][y][x]` with row length and plane height `edge`; `valid` voxels along each axis are inside the
-//! domain. `d` is the distance to the cloud, physical lengths; `inside` is 1 or 0; `near` is above 0 near the border.
+//! domain. `d` is the distance to the cloud, physical lengths; `inside` is 1, 0 or [`HELD`]; `near` is above 0 near the border.
 
 use crate::grid::FACES;
 use crate::tile::HaloTile;
+
+/// The side of voxels that are inside and stay so.
+pub const HELD: u8 = 2;
 
 /// How far the band reaches on both sides of the cloud. Physical lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +36,7 @@ impl Reaches {
 pub struct Sides<'a> {
     /// Distance to the cloud.
     pub d: &'a [f32],
-    /// 1 inside, 0 outside.
+    /// 1 inside, 0 outside, [`HELD`].
     pub inside: &'a [u8],
     /// Above 0 near the border, where that is far from the cloud anywhere.
     pub near: Option<&'a [u8]>,
@@ -41,7 +44,8 @@ pub struct Sides<'a> {
 
 impl Sides<'_> {
     fn solves(&self, place: usize, reaches: Reaches) -> bool {
-        reaches.solves(self.d[place], self.inside[place]) || self.near.is_some_and(|near| near[place] > 0)
+        let (d, inside) = (self.d[place], self.inside[place]);
+        inside != HELD && (reaches.solves(d, inside) || self.near.is_some_and(|near| near[place] > 0))
     }
 }
 
@@ -56,16 +60,10 @@ pub fn mark(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches, 
     count
 }
 
-/// The first and last place along x, y, z of solved voxels, or none when nothing is solved.
+/// True when any voxel of the domain is solved.
 #[must_use]
-pub fn hull(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches) -> Option<[[usize; 2]; 3]> {
-    let mut hull: Option<[[usize; 2]; 3]> = None;
-    for place in rows(edge, valid).flatten().filter(|&place| sides.solves(place, reaches)) {
-        let at = [place % edge, place / edge % edge, place / (edge * edge)];
-        let hull = hull.get_or_insert(at.map(|v| [v, v]));
-        (0..3).for_each(|a| hull[a] = [hull[a][0].min(at[a]), hull[a][1].max(at[a])]);
-    }
-    hull
+pub fn holds(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches) -> bool {
+    rows(edge, valid).flatten().any(|place| sides.solves(place, reaches))
 }
 
 /// Sets 1 at voxels beside the border that no reach solves, 0 elsewhere; returns whether there are any. `inside` has its
@@ -74,7 +72,7 @@ pub fn border(d: &[f32], inside: &HaloTile<u8>, reaches: Reaches, near: &mut [u8
     near.fill(0);
     let mut found = false;
     for_each_with_beside(inside, |place, here, beside| {
-        if beside.iter().any(|side| *side != here) && !reaches.solves(d[place], here) {
+        if beside.iter().any(|side| (*side > 0) != (here > 0)) && !reaches.solves(d[place], here) {
             near[place] = 1;
             found = true;
         }
@@ -142,17 +140,17 @@ mod tests {
     }
 
     #[test]
-    fn hulls_hold_what_is_solved_and_no_more() {
-        let (d, inside) = fields();
+    fn what_is_held_is_not_solved_and_what_is_near_the_border_is() {
+        let (d, mut inside) = fields();
+        let nothing = Reaches { inner: 0.0, outer: 0.0 };
         let sides = Sides { d: &d, inside: &inside, near: None };
-        assert_eq!(hull(sides, EDGE, [3, 4, 3], REACHES), Some([[0, 2], [0, 3], [0, 2]]));
-        let near = Reaches { inner: 0.0, outer: 0.5 };
-        assert_eq!(hull(sides, EDGE, [4; 3], near), Some([[0, 0], [0, 0], [2, 3]]));
-        assert_eq!(hull(sides, EDGE, [4, 4, 2], near), None);
-        let mut flags = [0; 64];
-        flags[63] = 3;
-        let sides = Sides { near: Some(&flags), ..sides };
-        assert_eq!(hull(sides, EDGE, [4; 3], near), Some([[0, 3], [0, 3], [2, 3]]));
+        assert!(holds(sides, EDGE, [4; 3], REACHES) && !holds(sides, EDGE, [4; 3], nothing));
+        let mut near = [0; 64];
+        near[63] = 3;
+        let sides = Sides { near: Some(&near), ..sides };
+        assert!(holds(sides, EDGE, [4; 3], nothing) && !holds(sides, EDGE, [4, 4, 3], nothing));
+        inside.fill(HELD);
+        assert!(!holds(Sides { d: &d, inside: &inside, near: Some(&near) }, EDGE, [4; 3], REACHES));
     }
 
     #[test]

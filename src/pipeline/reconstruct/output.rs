@@ -73,8 +73,7 @@ pub fn reconstruct(
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
     let mesh = store.map(|store| store.file("meshes/surface.ply")).transpose()?;
-    let Drawn { measures, hausdorff, lost_points } =
-        surface::draw(&stage, &band.u[0], &geometry, cloud, mesh.as_deref())?;
+    let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh.as_deref())?;
     stage.finish();
     if let Some(store) = store {
         write_fields(engine, &geometry, &band, store)?;
@@ -86,7 +85,7 @@ pub fn reconstruct(
 fn write_fields(engine: &Engine, geometry: &Geometry, band: &Band, store: &StoreWriter) -> Result<()> {
     let farthest = f64::from(band.distance.absent(0));
     for (group, name, field, high) in
-        [("", "levelset", &band.u[0], 1.0), ("distance", "distance", &band.distance, farthest)]
+        [("", "levelset", &band.u, 1.0), ("distance", "distance", &band.distance, farthest)]
     {
         let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
         let stage = engine.stage(&format!("write {name}"), 0);

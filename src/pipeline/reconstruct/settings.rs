@@ -1,6 +1,7 @@
 //! Settings of `reconstruct`, and what they are when the user gives none. Lengths are physical.
 
 use crate::pipeline::distance::Method;
+use crate::pipeline::evolve::Stop;
 use crate::pipeline::motion::Motion;
 
 /// What the user may set.
@@ -14,8 +15,11 @@ pub struct ReconstructSettings {
     pub beta: Option<f64>,
 }
 
+/// The start is near the surface: it is worth the few steps more to let it come to rest.
+const REST: Stop = Stop::Surface(0.005);
+
 impl Default for ReconstructSettings {
     fn default() -> Self {
-        Self { method: Method::VDT, motion: Motion { rho: 0.0, ..Motion::default() }, beta: None }
+        Self { method: Method::VDT, motion: Motion { rho: 0.0, stop: REST, ..Motion::default() }, beta: None }
     }
 }

@@ -103,7 +103,7 @@ pub(super) fn solve<T: Element>(
     let time_loop = settings.motion.time_loop(&geometry);
     let evolution = evolve(&stage, engine, &mut band, edge_field.as_ref(), geometry.spacing, &time_loop)?;
     stage.finish();
-    let Band { u: [u, _], distance, voxels: band_voxels, .. } = band;
+    let Band { u, distance, voxels: band_voxels, .. } = band;
     Ok(Solution { geometry, window, u, distance, cloud_points: cloud.len() as u64, beta, hole, band_voxels, evolution })
 }
 
