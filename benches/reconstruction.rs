@@ -17,10 +17,9 @@ use common::random::Random;
 use strandline::grid::{Geometry, TriangleMesh};
 use strandline::io::ome_zarr::StoreWriter;
 use strandline::io::sources::{Source, read_source};
-use strandline::kernel::surface::{MarchingCubes, Patch, PatchIndex, Welder, cells_of_brick};
+use strandline::kernel::surface::PatchIndex;
 use strandline::pipeline::motion::Motion;
 use strandline::pipeline::reconstruct::{ReconstructSettings, reconstruct};
-use strandline::store::MeshBuffer;
 
 const REPEATS: usize = 3;
 /// In the unit of the cloud, whose body is about two across, like the papers'.
@@ -44,16 +43,6 @@ fn scan(shape: [i64; 3], points: usize, h: f64) -> Vec<[f64; 3]> {
         }
     }
     cloud
-}
-
-fn mesh_of(geometry: &Geometry, u: &[f64]) -> MeshBuffer {
-    let u: Vec<f32> = u.iter().map(|u| *u as f32).collect();
-    let part = geometry.domain();
-    let (mut patch, mut welder, mut mesh) = (Patch::default(), Welder::new(geometry), MeshBuffer::default());
-    let cells = cells_of_brick(&part, geometry.shape, false);
-    MarchingCubes::new(geometry.shape, 0.5).extract(&u, &part, &cells, &mut patch);
-    welder.add(&patch, &mut mesh).expect("memory takes any mesh");
-    mesh
 }
 
 /// Our surface, of a run that is not timed.
@@ -99,8 +88,15 @@ fn main() {
         }
     }
     // A little beyond the widest gap between points.
-    let plain =
-        PlainSettings { beta: 4.5 * h, delta: 0.1 * h, epsilon: 0.01, tau: 0.25 * h, stop: 1e-4, tolerance: 1e-3 };
+    let plain = PlainSettings {
+        beta: 4.5 * h,
+        gamma: 9.0 * h,
+        delta: 0.1 * h,
+        epsilon: 0.01,
+        tau: 0.25 * h,
+        stop: 1e-4,
+        tolerance: 1e-3,
+    };
     let found = reconstruct_plainly(&grid, &cloud, plain);
     let [distance, start, level_set] = found.seconds;
     println!(
@@ -112,7 +108,7 @@ fn main() {
         level_set * 1e9 / (found.band as f64 * f64::from(found.steps)),
     );
     let ours = our_mesh(&grid, &cloud, &settings);
-    let theirs = mesh_of(&grid, &found.u);
+    let theirs = found.mesh(&grid);
     let vertices: Vec<[f32; 3]> = ours.vertices.iter().map(|v| v.map(|x| x as f32)).collect();
     let index = PatchIndex::new(&vertices, &ours.triangles, h);
     let off = index.hausdorff_from(theirs.vertices.iter().map(|v| v.map(f64::from))).expect("surfaces");

@@ -29,7 +29,7 @@ const FIRST_REACH_VOXELS: f64 = 6.0;
 const MOST_LOST: f64 = 0.1;
 
 /// An open body is closed by balls of these parts of the reach.
-const POCKET_RADII: [f64; 2] = [0.25, 0.5];
+const POCKET_RADII: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Where the start surface lies when no beta is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,7 +142,7 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         }
         if !sides.basins.is_empty() && all && !enough(&sides) {
             for part in POCKET_RADII {
-                let closed = around.sides(engine, search, Some(part * farthest))?;
+                let closed = around.sides(engine, search, Some((part * farthest, &sides.inside)))?;
                 if closed.lost.len() < sides.lost.len() {
                     sides = closed;
                 }
@@ -224,11 +224,11 @@ impl Around {
         Sources::cloud(&self.vicinity.geometry, search.cloud, &self.vicinity.bins)
     }
 
-    /// The sides of the cloud; with a radius, bodies that are open are closed by a ball of it.
-    fn sides(&self, engine: &Engine, search: &Search<'_>, radius: Option<f64>) -> Result<Sides> {
+    /// The sides of the cloud; with a radius, what is open is closed by a ball of it, what is inside stays so.
+    fn sides(&self, engine: &Engine, search: &Search<'_>, ball: Option<(f64, &BrickArray<u8>)>) -> Result<Sides> {
         let stage = self.tagging(engine, search);
-        let pockets = radius
-            .map(|radius| pockets(&stage, engine, &self.vicinity.geometry, &self.distance, radius))
+        let pockets = ball
+            .map(|(radius, inside)| pockets(&stage, engine, &self.vicinity.geometry, &self.distance, inside, radius))
             .transpose()?;
         let sides = watershed(&stage, engine, &self.sources(search), &self.distance, pockets.as_ref())?;
         stage.finish();

@@ -6,6 +6,7 @@
 
 use super::distance::{Method, Sources, cloud_distance};
 use super::tagging::level_of;
+use super::watershed::WALL_VOXELS;
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
 use crate::grid::{Geometry, PointBins};
@@ -17,7 +18,7 @@ use crate::tile::HaloTile;
 const SLACK_VOXELS: f64 = 1.0;
 
 /// How deep each voxel lies in a pocket of a ball of that radius, 0 for those in none; physical lengths, over the cells
-/// of `distance`, none of which is farther from the cloud than the radius where it is stored.
+/// of `distance`, which reaches farther than the radius. What is `inside` anyhow is no pocket, nor are walls of points.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
@@ -26,6 +27,7 @@ pub(super) fn pockets(
     engine: &Engine,
     geometry: &Geometry,
     distance: &BrickArray<f32>,
+    inside: &BrickArray<u8>,
     radius: f64,
 ) -> Result<BrickArray<f32>> {
     let set = distance.set();
@@ -35,14 +37,17 @@ pub(super) fn pockets(
     let sources = Sources::cloud(geometry, &centres, &bins);
     let away = cloud_distance(stage, engine, &sources, set, Method::VDT, f32::INFINITY)?;
     let from = (radius + SLACK_VOXELS * geometry.max_spacing()) as f32;
+    let wall = (WALL_VOXELS * geometry.min_spacing()) as f32;
     stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
-        level.read(slot, |level| {
+        let known = |d: &[f32], level: &[f32], inside: &[u8]| {
             away.write(slot, |away| {
-                for (away, &level) in away.iter_mut().zip(level) {
-                    *away = if level < radius as f32 { (*away - from).max(0.0) } else { 0.0 };
+                for (n, away) in away.iter_mut().enumerate() {
+                    let open = level[n] < radius as f32 && d[n] >= wall && inside[n] == 0;
+                    *away = if open { (*away - from).max(0.0) } else { 0.0 };
                 }
             });
-        });
+        };
+        distance.read(slot, |d| level.read(slot, |level| inside.read(slot, |inside| known(d, level, inside))));
         Ok(())
     })?;
     Ok(away)

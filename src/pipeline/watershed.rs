@@ -23,6 +23,9 @@ const LEAST_DEPTH_VOXELS: f64 = 1.0;
 /// A pocket less deep than so many is a ball's curvature against the grid's steps.
 const LEAST_POCKET_VOXELS: f64 = 2.0;
 
+/// So far from the cloud, in spacings, there is no wall: a wall's points are not twice as far apart.
+pub(super) const WALL_VOXELS: f64 = 4.0;
+
 /// The sides of a cloud.
 pub struct Sides {
     /// 1 inside, 0 outside; [`HELD`](crate::kernel::level_set::start::HELD) once [`hold_sheets`] held it.
@@ -66,7 +69,8 @@ pub fn watershed(
     flood.descend(&of_voxel)?;
     let contacts = flood.contacts(&of_voxel, &mut regions)?;
     let least = |voxels: f64| (voxels * sources.geometry.min_spacing()) as f32;
-    let (is_inside, found) = spaces::inside(&regions, &contacts, least(LEAST_DEPTH_VOXELS), least(LEAST_POCKET_VOXELS));
+    let (is_inside, found) =
+        spaces::inside(&regions, &contacts, least(LEAST_DEPTH_VOXELS), least(LEAST_POCKET_VOXELS), least(WALL_VOXELS));
     let inside = flood.sides(engine, &of_voxel, &is_inside)?;
     let basins = found.iter().map(|space| basin(space, &contacts, set)).collect();
     let lost = lost_points(stage, sources, &inside)?;

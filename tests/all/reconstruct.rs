@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 use strandline::error::Result;
 use strandline::io::ome_zarr::StoreWriter;
+use strandline::kernel::surface::PatchIndex;
 use strandline::pipeline::distance::Method;
 use strandline::pipeline::evolve::Stop;
 use strandline::pipeline::motion::Motion;
@@ -12,6 +13,8 @@ use strandline::pipeline::reconstruct::{ReconstructSettings, Reconstruction, gri
 
 use crate::common::clouds::{grid_around, sphere, sponge};
 use crate::common::lab::Lab;
+use crate::common::plain_reconstruction::{PlainSettings, reconstruct_plainly};
+use crate::common::random::Random;
 
 /// With nothing but the cloud given.
 fn by_defaults(cloud: &[[f64; 3]]) -> Result<Reconstruction> {
@@ -56,6 +59,38 @@ fn the_sponge_measures_what_the_papers_scheme_gives() {
     }
 }
 
+/// In the band by bricks in f32, and everywhere by the plain program in f64 (Kósa & Mikula 2015, Tables 1 and 2 compare
+/// the two): the mean distance of the points is the same to 1e-5.
+#[test]
+fn the_band_gives_what_the_full_domain_gives() {
+    let (cloud, h, delta) = (places(&sponge()), 0.05, 0.025);
+    let grid = grid_around(&cloud, h);
+    let settings = ReconstructSettings { method: Method::FSM, ..as_printed(h, delta) };
+    let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface");
+    let everywhere = PlainSettings {
+        beta: 0.25,
+        gamma: f64::INFINITY,
+        delta,
+        epsilon: 0.01,
+        tau: h / 4.0,
+        stop: 1e-4,
+        tolerance: 1e-6,
+    };
+    let plain = reconstruct_plainly(&grid, &cloud, everywhere);
+    let banded = reconstruct_plainly(&grid, &cloud, PlainSettings { gamma: 0.5, ..everywhere });
+    let off = [&plain, &banded].map(|found| {
+        let mesh = found.mesh(&grid);
+        PatchIndex::new(&mesh.vertices, &mesh.triangles, h).hausdorff_from(cloud.iter().copied()).expect("points").mean
+    });
+    let ours = found.hausdorff.expect("points").mean;
+    let voxels = [plain.band as u64, banded.band as u64, found.band_voxels];
+    println!(
+        "full, band, ours: {voxels:?} voxels, {off:?} and {ours}; {} and {} steps",
+        plain.steps, found.evolution.steps
+    );
+    assert!((off[1] - off[0]).abs() < 1e-5 && (ours - off[0]).abs() < 1e-5, "{off:?}, {ours}");
+}
+
 /// With the papers' rule a strong curvature makes it vanish in the end; the surface's own rest does not.
 #[test]
 fn the_sponge_does_not_vanish() {
@@ -94,6 +129,76 @@ fn bodies_beside_and_inside_each_other_stay_apart() {
     let found = by_defaults(&inside).expect("surfaces");
     assert!(found.measures.is_closed() && found.measures.components == 2, "{:?}", found.measures);
     assert!((found.measures.volume / (4.0 / 3.0 * PI * 7.0) - 1.0).abs() < 0.02, "{:?}", found.measures);
+}
+
+/// Points of a surface of revolution about z, about `step` apart, from the profile's radii at heights.
+fn turned(profile: impl Fn(f64) -> f64, heights: [f64; 2], step: f64) -> Vec<[f64; 3]> {
+    let mut cloud = Vec::new();
+    let mut z = heights[0];
+    while z <= heights[1] {
+        let r = profile(z);
+        let count = (2.0 * PI * r / step).ceil().max(1.0) as u32;
+        for n in 0..count {
+            let turn = 2.0 * PI * (f64::from(n) + 0.5 * ((z / step).round() % 2.0)) / f64::from(count);
+            cloud.push([r * turn.cos(), r * turn.sin(), z]);
+        }
+        let slope = (profile(z + 1e-4) - r) / 1e-4;
+        z += step / slope.hypot(1.0).max(1.0);
+    }
+    cloud
+}
+
+/// A ball on a foot that widens towards its open end, as scans of busts have it: narrowest is the neck, and still most of
+/// the foot is inside; a ball closes it that touches the rim.
+#[test]
+fn an_open_foot_is_closed_near_its_rim() {
+    let foot = |z: f64| 0.35 + 0.45 * (z / 1.4).powi(2);
+    let neck = -(1.0_f64 - 0.35 * 0.35).sqrt();
+    let ball = sphere([0.0, 0.0, neck], 1.0, 5000, |d| d[2] < 0.93);
+    let cloud = [ball, turned(foot, [0.0, 1.4], 0.05)].concat();
+    let found = by_defaults(&cloud).expect("a surface");
+    let h = found.geometry.spacing[0];
+    let foot_volume: f64 = (0..1400).map(|n| PI * foot(f64::from(n) * 1e-3).powi(2) * 1e-3).sum();
+    let part = (found.measures.volume - 4.0 / 3.0 * PI) / foot_volume;
+    println!("h {h}: {part} of the foot, {:?}, {:?}, {} lost", found.measures, found.hausdorff, found.lost_points);
+    assert!(part > 0.4 && part < 1.0, "{part} of the foot");
+    assert!(found.lost_points < 5 * cloud.len() as u64 / 100);
+}
+
+/// A fin without thickness on a ball: its points stay on the surface, in one piece with the ball.
+#[test]
+fn a_sheet_stays_as_a_shell() {
+    let ball = sphere([0.0; 3], 1.0, 6000, |_| true);
+    let fin = (0..1600).map(|n| [0.96 + 0.045 * f64::from(n % 40), 0.045 * (f64::from(n / 40) - 20.0), 0.01]);
+    let cloud: Vec<[f64; 3]> = ball.into_iter().chain(fin.filter(|p| p[0].hypot(p[1]) > 1.02)).collect();
+    let found = by_defaults(&cloud).expect("a surface");
+    println!("{:?}, {:?}, {} lost", found.measures, found.hausdorff, found.lost_points);
+    assert!(found.measures.is_closed());
+    assert!(found.lost_points < cloud.len() as u64 / 100, "{} of {} points", found.lost_points, cloud.len());
+}
+
+/// Of 100 points moved anywhere in the box none has an effect, and a tenth of the points can be missing: the surface
+/// moves by less than half a spacing wherever there are points (Kósa & Mikula 2015, Fig. 13-14).
+#[test]
+fn missing_and_moved_points_do_not_move_the_surface() {
+    let mut random = Random(11);
+    let cloud = sphere([0.0; 3], 2.0, 12_000, |_| true);
+    let grid = grid_for(&cloud, None).expect("a spacing");
+    let mut fewer: Vec<[f64; 3]> = cloud.iter().copied().filter(|_| random.below(10) > 0).collect();
+    let by = |cloud: &[[f64; 3]]| {
+        reconstruct(&Lab::new(2).engine, &grid, cloud, &ReconstructSettings::default(), None).expect("a surface")
+    };
+    let without = by(&fewer);
+    for point in fewer.iter_mut().step_by(97).take(100) {
+        *point = std::array::from_fn(|_| 4.4 * random.unit() - 2.2);
+    }
+    let noisy = by(&fewer);
+    for found in [&without, &noisy] {
+        let off = found.measures.volume / (4.0 / 3.0 * PI * 8.0) - 1.0;
+        println!("{:?}: volume off by {off}, {:?}", found.measures, found.hausdorff);
+        // Half a spacing all over would be 3 h / 4 of the radius.
+        assert!(off.abs() < 0.75 * grid.spacing[0] && found.measures.components == 1, "{:?}", found.measures);
+    }
 }
 
 #[test]

@@ -5,11 +5,15 @@
 use super::lab::PlainGrid;
 use super::plain_scheme::{PlainVelocity, coefficients, gradient_norms};
 use strandline::grid::Geometry;
+use strandline::kernel::surface::{MarchingCubes, Patch, Welder, cells_of_brick};
+use strandline::store::MeshBuffer;
 
 /// How the plain program is run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlainSettings {
     pub(crate) beta: f64,
+    /// What is solved: all within this distance of the cloud, but for the outermost voxels.
+    pub(crate) gamma: f64,
     pub(crate) delta: f64,
     pub(crate) epsilon: f64,
     pub(crate) tau: f64,
@@ -28,6 +32,19 @@ pub(crate) struct PlainSurface {
     pub(crate) seconds: [f64; 3],
 }
 
+impl PlainSurface {
+    /// The surface u = 1/2.
+    pub(crate) fn mesh(&self, geometry: &Geometry) -> MeshBuffer {
+        let u: Vec<f32> = self.u.iter().map(|u| *u as f32).collect();
+        let part = geometry.domain();
+        let (mut patch, mut welder, mut mesh) = (Patch::default(), Welder::new(geometry), MeshBuffer::default());
+        let cells = cells_of_brick(&part, geometry.shape, false);
+        MarchingCubes::new(geometry.shape, 0.5).extract(&u, &part, &cells, &mut patch);
+        welder.add(&patch, &mut mesh).expect("memory takes any mesh");
+        mesh
+    }
+}
+
 /// Runs it on a grid whose border is outside and farther than the band from the cloud.
 pub(crate) fn reconstruct_plainly(geometry: &Geometry, cloud: &[[f64; 3]], settings: PlainSettings) -> PlainSurface {
     let started = std::time::Instant::now();
@@ -41,8 +58,9 @@ pub(crate) fn reconstruct_plainly(geometry: &Geometry, cloud: &[[f64; 3]], setti
     let d = fast_sweeping(grid, geometry, cloud);
     let distance = seconds();
     let inside = flood(grid, &d, settings.beta);
-    // The rim is as wide as what lies within.
-    let band: Vec<usize> = (0..grid.len()).filter(|&at| d[at] <= 2.0 * settings.beta).collect();
+    let within = |v: &[i64; 3]| (0..3).all(|a| v[a] > 0 && v[a] < grid.shape[a] - 1);
+    let near = |v: &[i64; 3]| d[grid.at(*v)] <= settings.gamma;
+    let band: Vec<usize> = grid.voxels().filter(within).filter(near).map(|v| grid.at(v)).collect();
     let mut found = PlainSurface {
         u: inside.iter().map(|&inside| f64::from(u8::from(inside))).collect(),
         band: band.len(),

@@ -49,13 +49,15 @@ pub fn joined(mut contacts: Vec<(Contact, u64)>) -> Vec<(Contact, u64)> {
 }
 
 /// Tells which regions are inside, and the spaces they form, deepest first. Region [`OUTSIDE`] is outside whatever
-/// happens; no space less deep than `least_depth` stays apart, and no pocket less deep than `least_pocket`.
+/// happens; no space less deep than `least_depth` stays apart, and no pocket less deep than `least_pocket`. Pockets meet
+/// where no wall of points is between them: where the distance to the cloud is at least `wall`.
 #[must_use]
 pub fn inside(
     regions: &[Region],
     contacts: &[(Contact, u64)],
     least_depth: f32,
     least_pocket: f32,
+    wall: f32,
 ) -> (Vec<bool>, Vec<Space>) {
     let mut order: Vec<usize> = (0..contacts.len()).collect();
     order.sort_by(|&a, &b| contacts[b].0.pass.total_cmp(&contacts[a].0.pass).then(a.cmp(&b)));
@@ -63,13 +65,13 @@ pub fn inside(
     let deep = |pass: f32| (PERSISTENCE * pass).max(least_depth);
     // Pockets first, for how deep they are is that of all of them.
     for Contact { regions: [a, b], pass, .. } in order.iter().map(|&n| contacts[n].0) {
-        if [a, b].iter().all(|&region| regions[region as usize].pocket > 0.0) {
+        if pass >= wall && [a, b].iter().all(|&region| regions[region as usize].pocket > 0.0) {
             merged.meet(a, b, deep(pass));
         }
     }
     merged.fill_shallow_pockets(least_pocket);
     for Contact { regions: [a, b], pass, .. } in order.iter().map(|&n| contacts[n].0) {
-        if merged.is_pocket(a) == merged.is_pocket(b) {
+        if !merged.is_pocket(a) && !merged.is_pocket(b) {
             merged.meet(a, b, deep(pass));
         }
     }
@@ -223,7 +225,7 @@ mod tests {
             contact([1, 3], 0.5, 15),
             contact([1, 4], 2.0, 8),
         ];
-        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0);
+        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0, 2.0);
         assert_eq!(sides, [false, true, true, false, true]);
         assert_eq!(spaces, [Space { depth: 8.0, voxels: 20, hole: 1 }, Space { depth: 5.0, voxels: 10, hole: 3 }]);
     }
@@ -232,7 +234,7 @@ mod tests {
     fn a_hollow_is_outside_and_a_body_within_it_inside_again() {
         let regions = [region(9.0), region(3.0), region(4.0), region(2.0)];
         let contacts = [contact([0, 1], 0.7, 300), contact([1, 2], 0.8, 200), contact([2, 3], 0.6, 50)];
-        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0);
+        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0, 2.0);
         assert_eq!(sides, [false, true, false, true]);
         assert_eq!(spaces.iter().map(|s| (s.depth, s.hole)).collect::<Vec<_>>(), [(3.0, 1), (2.0, 2)]);
     }
@@ -241,7 +243,7 @@ mod tests {
     fn what_is_open_or_shallow_is_outside() {
         let regions = [region(9.0), region(5.0), region(0.9)];
         let contacts = [contact([0, 1], 2.6, 300), contact([0, 2], 0.1, 20)];
-        assert_eq!(inside(&regions, &contacts, 1.0, 1.0), (vec![false; 3], Vec::new()));
+        assert_eq!(inside(&regions, &contacts, 1.0, 1.0, 2.0), (vec![false; 3], Vec::new()));
     }
 
     /// An open body: its depth, its bell in two parts of one pocket, and a dent of its side.
@@ -260,7 +262,7 @@ mod tests {
             contact([1, 5], 0.7, 20),
             contact([2, 3], 5.5, 80),
         ];
-        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0);
+        let (sides, spaces) = inside(&regions, &contacts, 1.0, 1.0, 2.0);
         assert_eq!(sides, [false, true, true, true, false, false]);
         assert_eq!(spaces, [Space { depth: 9.0, voxels: 30, hole: 1 }]);
     }
