@@ -89,6 +89,17 @@ fn motion(args: &MotionArgs, defaults: Motion) -> Result<Motion> {
     })
 }
 
+/// More ranks than this are no use in one process.
+const MOST_RANKS: usize = 64;
+
+/// Refuses numbers of ranks that are of no use.
+pub(super) fn check_ranks(ranks: usize) -> Result<()> {
+    if (1..=MOST_RANKS).contains(&ranks) {
+        return Ok(());
+    }
+    Err(Error::usage(format!("--ranks is {ranks}; give 1 to {MOST_RANKS}")))
+}
+
 /// A range of numbers and how to say it.
 type Range = (fn(f64) -> bool, &'static str);
 const AT_LEAST_ZERO: Range = (|v| v >= 0.0, "0 or more");

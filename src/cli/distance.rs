@@ -24,9 +24,6 @@ use crate::kernel::distance::precision::Precision;
 use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, Schedule, Textbook, distance};
 use crate::store::free_space;
 
-/// More ranks than this are no use in one process.
-const MOST_RANKS: usize = 64;
-
 /// A distance that is ready to be computed: all inputs are read and checked.
 struct Job {
     args: DistanceJobArgs,
@@ -207,9 +204,7 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     if sweeps && field.max_distance.is_some() {
         return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
     }
-    if !(1..=MOST_RANKS).contains(&args.ranks) {
-        return Err(Error::usage(format!("--ranks is {}; give 1 to {MOST_RANKS}", args.ranks)));
-    }
+    config::check_ranks(args.ranks)?;
     if field.iterations == 0 {
         return Err(Error::usage("--iterations is 0; give 1 or more"));
     }

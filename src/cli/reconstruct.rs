@@ -61,6 +61,7 @@ impl Job {
         let cancel = signals::cancel_on_signals()?;
         let settings = config::reconstruct_settings(&args.motion, args.distance.method)?;
         let spacing = config::spacing("--spacing", args.grid.spacing)?;
+        config::check_ranks(args.ranks)?;
         config::check_outputs(&args.output.output, &[&args.output.report, &args.mesh], args.output.overwrite)?;
         args.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
@@ -122,7 +123,7 @@ impl Job {
     }
 
     fn run(&self, window: u64, estimate: &Estimate) -> Result<()> {
-        let engine = self.resources.engine(window, &self.cancel, &self.console)?;
+        let engine = self.resources.engine(window, &self.cancel, &self.console)?.with_ranks(self.args.ranks);
         engine.reserve(estimate.held)?;
         let result = self.solve_and_write(&engine);
         self.console.clear();

@@ -22,6 +22,9 @@ pub(super) struct ReconstructArgs {
     pub(super) distance: DistanceArgs,
     #[command(flatten)]
     pub(super) resources: ResourceArgs,
+    /// Ranks that share the cells, each a thread with files of its own; results do not depend on it
+    #[arg(long, value_name = "N", default_value_t = 1, hide = true)]
+    pub(super) ranks: usize,
     #[command(flatten)]
     pub(super) output: FieldOutputArgs,
     /// Write the surface once more, in a file of its own, in the format of its name

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! faces   | brick u64 | faces u8, a bit for each | edge^2 values for each of these |  brick ...
-//! values  | brick u64 | f64 |  brick ...                                            little-endian, no padding
+//! values  | brick u64 | f64, or six of them |  brick ...                             little-endian, no padding
 //! ```
 
 use std::collections::BTreeMap;
@@ -118,6 +118,33 @@ impl<'a> Exchange<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Tells the others six values of each of this rank's `bricks`, one for each face; returns what they tell of ghosts.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    pub fn of_faces(&self, bricks: impl Iterator<Item = (Slot, [f64; 6])>) -> Result<Vec<(Slot, [f64; 6])>> {
+        let mut messages = vec![Vec::new(); self.peers.len()];
+        for (slot, values) in bricks {
+            for &peer in self.readers.get(&slot).into_iter().flat_map(BTreeMap::keys) {
+                messages[peer].extend_from_slice(&self.set.id(slot).to_le_bytes());
+                values.iter().for_each(|value| messages[peer].extend_from_slice(&value.to_le_bytes()));
+            }
+        }
+        let mut told = Vec::new();
+        for message in self.comm.exchange(&self.peers, messages)? {
+            let mut message = Message(&message);
+            while !message.0.is_empty() {
+                let ghost = self.slot(BrickId::from_le_bytes(message.word()?))?;
+                let mut values = [0.0; 6];
+                for value in &mut values {
+                    *value = f64::from_le_bytes(message.word()?);
+                }
+                told.push((ghost, values));
+            }
+        }
+        Ok(told)
     }
 
     fn slot(&self, id: BrickId) -> Result<Slot> {

@@ -28,6 +28,31 @@ pub struct Band {
     pub voxels: u64,
 }
 
+impl Band {
+    /// A rank's own part of the band, over its own set of cells; the faces of ghosts are for the ranks to exchange.
+    ///
+    /// # Errors
+    /// When scratch runs out.
+    pub(super) fn part(&self, engine: &Engine, own: &Arc<BrickSet>) -> Result<Band> {
+        let new = || BrickArray::<f32>::with_faces(engine.scratch(), own);
+        let solved = BrickArray::new(engine.scratch(), own)?;
+        let mut part = Band { u: new()?, distance: new()?, solved, voxels: self.voxels };
+        for id in (0..own.grid().len()).filter(|&id| self.solved.set().slot(id).is_none()) {
+            part.u.set_absent(id, self.u.absent(id));
+            part.distance.set_absent(id, self.distance.absent(id));
+        }
+        for to in own.owned() {
+            let Some(from) = self.solved.set().slot(own.id(to)) else { continue };
+            for (whole, part) in [(&self.u, &part.u), (&self.distance, &part.distance)] {
+                whole.read(from, |from| part.write(to, |to| to.copy_from_slice(from)));
+                part.refresh_faces(to);
+            }
+            self.solved.read(from, |from| part.solved.write(to, |to| to.copy_from_slice(from)));
+        }
+        Ok(part)
+    }
+}
+
 /// Makes the band from the distance and the sides, both over the same cells.
 ///
 /// # Errors

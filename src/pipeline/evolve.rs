@@ -5,9 +5,11 @@
 //! up again until the corrections are small. A scheme is made again at each visit: most cells are visited once a step,
 //! and writing it to memory and reading it back would cost as much.
 
+use std::sync::Arc;
+
 use super::band::{Band, read_mask};
-use crate::error::Result;
-use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Stage, Workers, checkerboard};
+use crate::error::{Error, Result};
+use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Ownership, Reach, Stage, Workers, checkerboard};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::level_set::border::Border;
 use crate::kernel::level_set::covolume::{Fields, Planes, Velocity, assemble};
@@ -169,7 +171,11 @@ pub fn evolve(
     let cells = &Cells::new(band.solved.set());
     let exchange = &Exchange::new(engine.comm(), band.solved.set(), all)?;
     let mut cell_iterations = 0;
+    let owned = crate::exec::one_wave(band.solved.set());
+    exchange.faces(&band.distance, &owned)?;
+    exchange.faces(&band.u, &owned)?;
     let mut next = second_level(stage, engine, &band.u)?;
+    exchange.faces(&next, &owned)?;
     while done.steps < settings.max_steps {
         let (kept, first) = (kept.as_ref(), done.steps == 0);
         let solver = Solver {
@@ -203,9 +209,48 @@ pub fn evolve(
         }
     }
     // Cells are relaxed as often as they need: reported is the mean over all of them.
-    done.sor_iterations = cell_iterations.div_ceil(band.solved.set().len().max(1) as u64);
+    let sums = [cell_iterations as f64, owned.len() as f64].map(|count| engine.comm().sum(&[count]));
+    let [iterations, cells] = sums;
+    done.sor_iterations = (iterations? / cells?.max(1.0)).ceil() as u64;
     stage.iterated(done.sor_iterations, done.residual);
     Ok(done)
+}
+
+/// The same on all ranks of the stage's engine, each with its own cells of the band; no image.
+///
+/// # Errors
+/// When scratch runs out, the run is interrupted or a rank ends early.
+pub fn evolve_on_ranks(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    band: &mut Band,
+    spacing: [f64; 3],
+    settings: &TimeLoop,
+) -> Result<Evolution> {
+    if stage.ranks() == 1 {
+        return evolve(stage, engine, band, None, spacing, settings);
+    }
+    let set = band.solved.set().clone();
+    let ownership = Ownership::balanced(&set, stage.ranks());
+    let plan = HaloPlan::new(*set.grid(), Reach::All);
+    let whole = &*band;
+    let parts = stage.on_ranks(|stage, engine| {
+        let own = Arc::new(ownership.part(&set, engine.comm().rank(), &plan));
+        let mut part = whole.part(engine, &own)?;
+        let done = evolve(stage, engine, &mut part, None, spacing, settings)?;
+        Ok((part.u, done))
+    })?;
+    let mut last = None;
+    for (u, done) in parts {
+        for slot in u.set().owned() {
+            if let Some(to) = set.slot(u.set().id(slot)) {
+                u.read(slot, |from| band.u.write(to, |to| to.copy_from_slice(from)));
+                band.u.refresh_faces(to);
+            }
+        }
+        last = Some(done);
+    }
+    last.ok_or_else(|| Error::failed("no rank has solved the level set"))
 }
 
 /// What is kept of a cell: its distance and its edges with their halos, which never change.
@@ -257,7 +302,8 @@ impl Solver<'_> {
     fn step(&self) -> Result<(Step, u64)> {
         let set = self.band.solved.set();
         let mut visits = vec![Visit::default(); set.len()];
-        let mut unknown = vec![0.0; set.len()];
+        // Beside each face of a cell what moved there since the cell was visited.
+        let mut unknown = vec![[0.0; 6]; set.len()];
         let mut visited = 0;
         for round in 0..MAX_VISITS {
             let mut resting = true;
@@ -267,16 +313,23 @@ impl Solver<'_> {
                 let results =
                     self.stage.run(&wave, self.workers, |worker, &slot| Ok(self.visit(worker, slot, round, colour)))?;
                 self.exchange.faces(self.next, &wave)?;
+                let borders = wave.iter().copied().zip(results.iter().map(|visit| visit.border));
+                let told = self.exchange.of_faces(borders.clone())?;
+                for (slot, border) in borders.chain(told) {
+                    unknown[slot as usize] = [0.0; 6];
+                    for (face, &beside) in FACES.iter().zip(&self.cells.beside[slot as usize]) {
+                        if beside != Slot::MAX {
+                            unknown[beside as usize][face.opposite().index()] += border[face.index()];
+                        }
+                    }
+                }
                 for (&slot, visit) in wave.iter().zip(results) {
                     visits[slot as usize] = visit;
-                    unknown[slot as usize] = 0.0;
-                    let beside = self.cells.beside[slot as usize].iter().zip(visit.border);
-                    beside.filter(|(q, _)| **q != Slot::MAX).for_each(|(&q, moved)| unknown[q as usize] += moved);
                 }
                 visited += wave.len() as u64;
                 resting &= wave.is_empty();
             }
-            if resting {
+            if !self.engine.comm().any(!resting)? {
                 break;
             }
         }
@@ -290,15 +343,16 @@ impl Solver<'_> {
 
     /// True when the corrections that a cell was left with, and those for what moved beside it since, which is unknown
     /// to it, may exceed the tolerance (root mean square).
-    fn is_due(&self, visits: &[Visit], unknown: &[f64], slot: Slot) -> bool {
+    fn is_due(&self, visits: &[Visit], unknown: &[[f64; 6]], slot: Slot) -> bool {
         let here = &visits[slot as usize];
-        let corrections = here.left.sqrt() + GHOST_WEIGHT * unknown[slot as usize];
+        let corrections = here.left.sqrt() + GHOST_WEIGHT * unknown[slot as usize].iter().sum::<f64>();
         corrections > self.settings.solver_tolerance * f64::from(here.count).sqrt()
     }
 
     /// Sums over cells in grid order.
     fn sum(&self, visits: &[Visit], of: impl Fn(&Visit) -> f64) -> Result<f64> {
-        let partial: Vec<f64> = visits.iter().map(of).collect();
+        let owned = self.band.solved.set().owned();
+        let partial: Vec<f64> = visits[owned.start as usize..owned.end as usize].iter().map(of).collect();
         self.engine.comm().sum(&partial)
     }
 

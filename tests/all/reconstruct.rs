@@ -237,9 +237,9 @@ fn a_given_beta_finds_the_same_space_and_hole() {
     assert_eq!((given.spaces, width(&given)), (1, width(&automatic)));
 }
 
-/// u and the mesh, vertex for vertex, for any number of threads and for a window that drops what it loads.
+/// u and the mesh, vertex for vertex, for any number of threads and ranks and for a window that drops what it loads.
 #[test]
-fn threads_and_memory_change_no_bit() {
+fn threads_ranks_and_memory_change_no_bit() {
     let cloud = sponge();
     let grid = grid_around(&cloud, 0.04);
     let run = |lab: &Lab| {
@@ -252,7 +252,11 @@ fn threads_and_memory_change_no_bit() {
         (read("meshes/surface.ply"), read("0/c/0/0/0"))
     };
     let first = run(&Lab::new(1));
-    for lab in [Lab::new(2), Lab::new(4), Lab::with_window(2, 2 << 20)] {
+    let with_ranks = |ranks| {
+        let lab = Lab::new(2);
+        Lab { engine: lab.engine.with_ranks(ranks), ..lab }
+    };
+    for lab in [Lab::new(2), Lab::new(4), Lab::with_window(2, 2 << 20), with_ranks(2), with_ranks(3)] {
         assert!(run(&lab) == first);
     }
 }

@@ -11,7 +11,7 @@ use strandline::store::{BoxSink, BoxSource, BrickArray, Element, Scratch};
 /// An engine, and the folder it works in for as long as it lives.
 pub(crate) struct Lab {
     pub(crate) engine: Engine,
-    _folder: tempfile::TempDir,
+    pub(crate) _folder: tempfile::TempDir,
 }
 
 impl Lab {

@@ -8,7 +8,7 @@ use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::Band;
 use crate::pipeline::enclosure::{Found, Hole, Search, Start, enclose, first_reach_for};
-use crate::pipeline::evolve::{Evolution, evolve};
+use crate::pipeline::evolve::{Evolution, evolve_on_ranks};
 use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::ElementType;
@@ -37,7 +37,8 @@ pub struct Reconstruction {
 }
 
 /// Reconstructs the surface of a cloud on a grid, whose box grows as far around the cloud as is needed; `store` gets
-/// the results, none of them when it is absent.
+/// the results, none of them when it is absent. Distance and level set are solved by all ranks of the engine, whose
+/// number changes no bit.
 ///
 /// # Errors
 /// When the cloud encloses nothing, the output cannot be written, scratch runs out, or the run is interrupted.
@@ -68,7 +69,7 @@ pub fn reconstruct(
     let stage = engine.stage("level set", 0);
     stage.voxels(band.voxels);
     let time_loop = settings.motion.time_loop(&geometry);
-    let evolution = evolve(&stage, engine, &mut band, None, geometry.spacing, &time_loop)?;
+    let evolution = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
     stage.finish();
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
