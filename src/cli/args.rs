@@ -7,9 +7,11 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::distance_args::DistanceJobArgs;
 use super::reconstruct_args::ReconstructArgs;
 use super::values::{
-    Crop, Output, parse_crop, parse_pair, parse_size, parse_sweeping_method, parse_triple, sweeping_solvers_help,
+    Crop, Output, parse_crop, parse_pair, parse_seed, parse_size, parse_sweeping_method, parse_triple,
+    sweeping_solvers_help,
 };
 use crate::pipeline::distance::Method;
+use crate::pipeline::marks::Seed;
 
 /// Finds surfaces in 3-D volumes larger than memory.
 #[derive(Debug, Parser)]
@@ -53,8 +55,12 @@ pub(super) struct SegmentArgs {
     pub(super) image: PathBuf,
     /// Border points: CSV (x,y,z and optionally object,contour), XYZ or PLY; given several times, the n-th file is
     /// object n, and objects named in later files are numbered on from those of the earlier ones
-    #[arg(long, required = true, value_name = "CLOUD")]
+    #[arg(long, required_unless_present = "seed", value_name = "CLOUD")]
     pub(super) points: Vec<PathBuf>,
+    /// Object without points: a ball, centre and radius, from which the surface goes to the image's edges; several times
+    /// for several objects, numbered on from those of the points
+    #[arg(long, value_name = "X,Y,Z,R", value_parser = parse_seed, allow_hyphen_values = true)]
+    pub(super) seed: Vec<Seed>,
     #[command(flatten)]
     pub(super) picture: ImageArgs,
     #[command(flatten)]

@@ -39,6 +39,8 @@ pub(super) struct Report<S, R> {
 pub(super) struct Settings {
     pub(super) image: String,
     pub(super) points: Vec<String>,
+    /// Balls that objects without points start as: x, y, z, radius.
+    pub(super) seeds: Vec<[f64; 4]>,
     pub(super) output: Option<String>,
     pub(super) channel: u32,
     pub(super) time: u32,

@@ -18,7 +18,9 @@ use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stacks::{Select, Stack};
 use crate::pipeline::marks::split;
-use crate::pipeline::segment::{Estimate, Guides, Outcome, SegmentSettings, check_marks, estimate, segment};
+use crate::pipeline::segment::{
+    Estimate, Guides, Outcome, SegmentSettings, check_marks, check_seed, estimate, segment,
+};
 use crate::store::free_space;
 
 /// A segmentation that is ready to start: all inputs are open and checked.
@@ -85,6 +87,7 @@ impl Job {
             let file = &marks.files[&object.object];
             checked.map_err(|error| error.at(file))?.iter().for_each(|note| console.note(note));
         }
+        args.seed.iter().try_for_each(|seed| check_seed(seed, &geometry))?;
         let typed = typed.to_vec();
         let stack = opened.stack;
         Ok(Self {
@@ -104,9 +107,13 @@ impl Job {
         })
     }
 
+    fn guides(&self) -> Guides<'_> {
+        Guides { geometry: &self.geometry, cloud: &self.marks.cloud, seeds: &self.args.seed }
+    }
+
     /// What the run will take.
     pub(super) fn estimate(&self) -> Estimate {
-        let guides = Guides { geometry: &self.geometry, cloud: &self.marks.cloud };
+        let guides = self.guides();
         let threads = self.resources.threads as u64;
         estimate(self.stack.as_ref(), &self.crop, &guides, &self.settings, threads, self.needs_store())
     }
@@ -148,7 +155,7 @@ impl Job {
         self.console.say(&format!(
             "{}: {}, about {}; memory up to {}, {} of temporary fields in {}",
             self.names.image,
-            match self.marks.files.len() {
+            match self.marks.files.len() + self.args.seed.len() {
                 1 => "1 object".into(),
                 objects => format!("{objects} objects"),
             },
@@ -181,8 +188,7 @@ impl Job {
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
             None => None,
         };
-        let guides = Guides { geometry: &self.geometry, cloud: &self.marks.cloud };
-        let outcome = segment(engine, self.stack.as_ref(), &self.crop, &guides, &self.settings, store.as_ref())?;
+        let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())?;
         if let Some(store) = &store {
             if self.command == "demo" {
                 picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;
@@ -228,7 +234,8 @@ impl Job {
 
     /// The middle of all marks, kept inside the image.
     fn centre(&self) -> [f64; 3] {
-        let (low, high) = self.marks.cloud.bounds().unwrap_or_default();
+        let seed = self.args.seed.first().map_or([0.0; 3], |seed| seed.centre);
+        let (low, high) = self.marks.cloud.bounds().unwrap_or((seed, seed));
         std::array::from_fn(|a| 0.5 * (low[a] + high[a]))
     }
 
@@ -237,6 +244,7 @@ impl Job {
         let settings = Settings {
             image: self.names.image.clone(),
             points: self.names.points.clone(),
+            seeds: self.args.seed.iter().map(|s| [s.centre[0], s.centre[1], s.centre[2], s.radius]).collect(),
             output: output.store().map(|path| path.display().to_string()),
             channel: picture.channel,
             time: picture.time,
@@ -289,6 +297,10 @@ impl Job {
             let file = self.marks.files[&object.object].display();
             let contours = if object.drawn { format!(" on {} contours", object.contours.len()) } else { String::new() };
             lines.push(format!("object {}: {points} marks{contours}, {file}", object.object));
+        }
+        for (n, seed) in self.args.seed.iter().enumerate() {
+            let at = triple(seed.centre);
+            lines.push(format!("seed {}: a ball of radius {} at {at}", n + 1, number(seed.radius)));
         }
         let (held, allowed) = (bytes(estimate.held), bytes(self.resources.memory));
         let (scratch, folder) = (bytes(estimate.scratch), self.resources.scratch.display());

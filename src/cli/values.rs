@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use crate::kernel::distance::Neighbours;
 use crate::pipeline::distance::{Method, SOLVERS, Solver, Textbook};
+use crate::pipeline::marks::Seed;
 
 /// A crop as typed: for each axis where it begins and ends, where that was said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +74,11 @@ pub(super) fn parse_whole_triple(text: &str) -> Result<[i64; 3], String> {
     let number = |part: &str| part.trim().parse::<i64>().map_err(|_| format!("'{}' is no whole number", part.trim()));
     let values = text.split(',').map(number).collect::<Result<Vec<i64>, String>>()?;
     values.try_into().map_err(|_| "give 3 whole numbers with commas between them".into())
+}
+
+/// `x,y,z,radius`.
+pub(super) fn parse_seed(text: &str) -> Result<Seed, String> {
+    numbers(text).map(|[x, y, z, radius]| Seed { centre: [x, y, z], radius })
 }
 
 /// `low,high`.

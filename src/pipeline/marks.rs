@@ -9,6 +9,15 @@ use std::collections::BTreeMap;
 
 use crate::grid::{Geometry, PointCloud};
 
+/// A ball that an object starts as, where it has no marks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seed {
+    /// Its centre, world coordinates.
+    pub centre: [f64; 3],
+    /// Its radius, physical.
+    pub radius: f64,
+}
+
 /// The marks of one object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectMarks {
@@ -18,6 +27,8 @@ pub struct ObjectMarks {
     pub contours: Vec<Vec<[f64; 3]>>,
     /// True when the file names contours: only then are marks joined and ends capped.
     pub drawn: bool,
+    /// The ball it starts as; then it has no marks.
+    pub seed: Option<Seed>,
 }
 
 /// Splits a cloud into objects, in order of their numbers, and their contours.
@@ -32,8 +43,18 @@ pub fn split(cloud: &PointCloud) -> Vec<ObjectMarks> {
     let drawn = !cloud.contours.is_empty();
     objects
         .into_iter()
-        .map(|(object, contours)| ObjectMarks { object, contours: contours.into_values().collect(), drawn })
+        .map(|(object, contours)| ObjectMarks { object, contours: contours.into_values().collect(), drawn, seed: None })
         .collect()
+}
+
+/// The objects of a cloud, and one for each seed, numbered on.
+#[must_use]
+pub fn split_and_seed(cloud: &PointCloud, seeds: &[Seed]) -> Vec<ObjectMarks> {
+    let mut objects = split(cloud);
+    let first = objects.last().map_or(1, |marks| marks.object + 1);
+    let seeded = |(object, &seed)| ObjectMarks { object, contours: Vec::new(), drawn: false, seed: Some(seed) };
+    objects.extend((first..).zip(seeds).map(seeded));
+    objects
 }
 
 /// The largest distance between neighbouring contours of an object, along the axis it was sliced on.
@@ -173,7 +194,7 @@ mod tests {
 
     #[test]
     fn caps_lie_half_a_slice_beyond_and_cover_the_area() {
-        let marks = ObjectMarks { object: 1, contours: vec![square(4.0), square(6.0)], drawn: true };
+        let marks = ObjectMarks { object: 1, contours: vec![square(4.0), square(6.0)], drawn: true, seed: None };
         let cloud = cloud_of(&marks, &grid(), true);
         let cap: Vec<_> = cloud.iter().filter(|p| p[2] == 3.0).collect();
         assert!(cap.len() >= 15 * 15 && cap.len() <= 17 * 17 + 64, "{}", cap.len());

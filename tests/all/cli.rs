@@ -252,6 +252,25 @@ fn check_report(bench: &Bench, ball: &Ball, labels: &[f64]) {
     assert_eq!(bench.json("out/r.json")["result"], *result);
 }
 
+/// Without points, from a ball that is larger than the object and beside its middle (Kósa 2015, Fig. 2.3).
+#[test]
+fn a_seed_goes_to_the_edges_of_the_image() {
+    let ball = Ball::small();
+    let bench = Bench::new(&ball);
+    let plain = "--edge plain --rho 1 --k 100 --delta 0.1 --max-steps 400 --tol 0.005";
+    bench.succeed(&format!("segment image.tif --seed 10.5,9.5,9,8.5 {plain} -q -o out/s.zarr"));
+    let report = bench.json("out/s.zarr/report.json");
+    assert_eq!(report["settings"]["seeds"], serde_json::json!([[10.5, 9.5, 9.0, 8.5]]));
+    let labels = volume(&bench.path("out/s.zarr/labels/segmentation"));
+    let overlap = dice(&labels, 1.0, ball.geometry.shape, |v| ball.holds(v));
+    assert!(overlap > 0.95, "{overlap}, {}", report["result"]);
+    for (seed, said) in [("1,2,3", "4 numbers"), ("1,2,3,0", "radius above 0"), ("90,2,3,4", "holds no voxel")] {
+        let text = bench.fail(&format!("segment image.tif --seed {seed} -o out/x.zarr"), 2);
+        assert!(text.contains(said), "{seed}: {text}");
+    }
+    assert_eq!(bench.entries("out"), ["s.zarr"]);
+}
+
 #[test]
 fn layout_threads_and_memory_change_no_bit() {
     let bench = Bench::new(&Ball::small());

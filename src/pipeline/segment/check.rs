@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
-use crate::pipeline::marks::ObjectMarks;
+use crate::pipeline::marks::{ObjectMarks, Seed};
 
 /// Fewer points than this enclose nothing.
 const FEWEST_POINTS: usize = 4;
@@ -47,6 +47,32 @@ pub fn check_marks(marks: &ObjectMarks, image: &Geometry) -> Result<Vec<String>>
         ));
     }
     Ok(notes)
+}
+
+/// Checks that a seed is a ball that holds a voxel of the image.
+///
+/// # Errors
+/// When it is not, with the box that the image fills.
+pub fn check_seed(seed: &Seed, image: &Geometry) -> Result<()> {
+    let Seed { centre, radius } = *seed;
+    let is_ball = centre.iter().chain([&radius]).all(|v| v.is_finite()) && radius > 0.0;
+    if !is_ball {
+        return Err(Error::usage("--seed needs three finite coordinates and a radius above 0: X,Y,Z,R"));
+    }
+    let last = image.shape.map(|n| (n - 1) as f64);
+    let voxel = image.to_voxels(centre);
+    let nearest = image.position(std::array::from_fn(|a| voxel[a].round().clamp(0.0, last[a]) as i64));
+    let away = (0..3).map(|a| (nearest[a] - centre[a]).powi(2)).sum::<f64>().sqrt();
+    if away <= radius {
+        return Ok(());
+    }
+    Err(Error::usage(format!(
+        "--seed {},{},{},{radius} holds no voxel of the image, which spans {}; give physical coordinates within it",
+        centre[0],
+        centre[1],
+        centre[2],
+        spans(&extent(image), image)
+    )))
 }
 
 /// The physical box that the image's voxels fill, `[lowest, highest]`.
@@ -120,7 +146,7 @@ mod tests {
     }
 
     fn marks(points: Vec<[f64; 3]>) -> ObjectMarks {
-        ObjectMarks { object: 3, contours: vec![points], drawn: true }
+        ObjectMarks { object: 3, contours: vec![points], drawn: true, seed: None }
     }
 
     fn ring(centre: [f64; 3], radius: [f64; 2]) -> Vec<[f64; 3]> {

@@ -7,12 +7,12 @@
 use super::reach::first_reach;
 use super::settings::{Guides, SegmentSettings};
 use crate::grid::{Box3, BrickGrid};
-use crate::kernel::level_set::CELL_LEN;
+use crate::kernel::level_set::{CELL, CELL_LEN};
 use crate::pipeline::cell_needs::{
     COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, KEPT_BYTES, POINT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES,
     STORED_CELL_BYTES, THREAD_BYTES,
 };
-use crate::pipeline::marks::{cloud_of, split};
+use crate::pipeline::marks::{cloud_of, split_and_seed};
 use crate::pipeline::vicinity::Vicinity;
 use crate::store::PlaneSource;
 
@@ -52,9 +52,16 @@ pub fn estimate(
     let size = stack.element().size() as u64;
     let plane = stack.shape()[0].unsigned_abs() * stack.shape()[1].unsigned_abs() * size;
     let (mut points, mut grid_cells, mut largest, mut near) = (0, 0, 0, 0);
-    for marks in split(guides.cloud) {
-        let cloud = cloud_of(&marks, guides.geometry, settings.caps);
-        let reach = first_reach(&marks, guides.geometry, settings);
+    let objects = split_and_seed(guides.cloud, guides.seeds);
+    for marks in &objects {
+        if marks.seed.is_some() {
+            // Without marks the surface may go anywhere.
+            let all = BrickGrid::new(guides.geometry.shape, CELL as i64).len();
+            (grid_cells, largest, near) = (grid_cells.max(all), largest.max(all), near + all);
+            continue;
+        }
+        let cloud = cloud_of(marks, guides.geometry, settings.caps);
+        let reach = first_reach(marks, guides.geometry, settings);
         let cells = Vicinity::new(guides.geometry, &cloud, reach).cells;
         points = points.max(cloud.len() as u64);
         grid_cells = grid_cells.max(cells.grid().len());

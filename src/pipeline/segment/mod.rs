@@ -12,9 +12,10 @@ mod labels;
 mod object;
 mod output;
 mod reach;
+mod seed;
 mod settings;
 
-pub use check::check_marks;
+pub use check::{check_marks, check_seed};
 pub use estimate::{Estimate, estimate};
 pub use labels::Overlap;
 pub use object::ObjectReport;

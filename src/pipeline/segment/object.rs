@@ -1,6 +1,7 @@
 //! One object: from its marks to the segmentation function on a box of its own.
 
 use super::reach::first_reach;
+use super::seed::grow;
 use super::settings::SegmentSettings;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
@@ -78,6 +79,9 @@ pub(super) fn solve<T: Element>(
     marks: &ObjectMarks,
     settings: &SegmentSettings,
 ) -> Result<Solution> {
+    if let Some(seed) = marks.seed {
+        return grow(engine, picture, marks, &seed, settings);
+    }
     let cloud = cloud_of(marks, picture.geometry, settings.caps);
     let suffix = format!(" {}", marks.object);
     let search = Search {
@@ -107,11 +111,11 @@ pub(super) fn solve<T: Element>(
     Ok(Solution { geometry, window, u, distance, cloud_points: cloud.len() as u64, beta, hole, band_voxels, evolution })
 }
 
-fn name(what: &str, marks: &ObjectMarks) -> String {
+pub(super) fn name(what: &str, marks: &ObjectMarks) -> String {
     format!("{what} {}", marks.object)
 }
 
-fn edge_field<T: Element>(
+pub(super) fn edge_field<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
     marks: &ObjectMarks,

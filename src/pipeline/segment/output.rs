@@ -12,7 +12,7 @@ use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
 use crate::kernel::image::labels;
 use crate::kernel::image::palette::label_color;
 use crate::pipeline::ingest::{Image, Sample, ingest};
-use crate::pipeline::marks::{ObjectMarks, split};
+use crate::pipeline::marks::{ObjectMarks, split_and_seed};
 use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::{BoxSource, Element, ElementType, PlaneSource};
@@ -60,7 +60,7 @@ fn run<T: Sample>(
     settings: &SegmentSettings,
     store: Option<&StoreWriter>,
 ) -> Result<Outcome> {
-    let objects = split(guides.cloud);
+    let objects = split_and_seed(guides.cloud, guides.seeds);
     let stage = engine.stage("read stack", crop.shape()[2].unsigned_abs());
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();

@@ -4,6 +4,7 @@ use super::labels::Overlap;
 use crate::grid::{Geometry, PointCloud};
 use crate::pipeline::distance::Method;
 use crate::pipeline::image_terms::EdgeSettings;
+use crate::pipeline::marks::Seed;
 use crate::pipeline::motion::Motion;
 
 /// What the user may set; `None` leaves a length to the image's spacing.
@@ -68,4 +69,6 @@ pub struct Guides<'a> {
     pub geometry: &'a Geometry,
     /// The marks, physical coordinates.
     pub cloud: &'a PointCloud,
+    /// Balls that further objects start as, which no marks guide.
+    pub seeds: &'a [Seed],
 }
