@@ -7,8 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::distance_args::DistanceJobArgs;
 use super::reconstruct_args::ReconstructArgs;
 use super::values::{
-    Crop, Output, parse_crop, parse_pair, parse_seed, parse_size, parse_sweeping_method, parse_triple,
-    sweeping_solvers_help,
+    Crop, Output, parse_crop, parse_method, parse_pair, parse_seed, parse_size, parse_triple, solvers_help,
 };
 use crate::pipeline::distance::Method;
 use crate::pipeline::marks::Seed;
@@ -157,7 +156,7 @@ pub(super) struct PullArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Distance")]
 pub(super) struct DistanceArgs {
-    #[arg(long, value_name = "NAME", value_parser = parse_sweeping_method, default_value = "vdt", help = sweeping_solvers_help())]
+    #[arg(long, value_name = "NAME", value_parser = parse_method, default_value = "vdt", help = solvers_help())]
     pub(super) method: Method,
 }
 

@@ -100,6 +100,11 @@ pub(super) fn check_ranks(ranks: usize) -> Result<()> {
     Err(Error::usage(format!("--ranks is {ranks}; give 1 to {MOST_RANKS}")))
 }
 
+/// A number above 0, or none.
+pub(super) fn above_zero(flag: &str, value: Option<f64>) -> Result<Option<f64>> {
+    optional(flag, value, ABOVE_ZERO)
+}
+
 /// A range of numbers and how to say it.
 type Range = (fn(f64) -> bool, &'static str);
 const AT_LEAST_ZERO: Range = (|v| v >= 0.0, "0 or more");

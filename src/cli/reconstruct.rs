@@ -21,7 +21,8 @@ use crate::grid::Geometry;
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
 use crate::pipeline::reconstruct::{
-    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct,
+    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, mean_spacing, reconstruct,
+    without_isolated,
 };
 use crate::store::free_space;
 
@@ -55,6 +56,20 @@ pub(super) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
     job.run(window, &estimate)
 }
 
+/// Leaves out points that stand alone, if that was asked for, and says how many.
+fn drop_isolated(cloud: Vec<[f64; 3]>, spacings: Option<f64>, console: &Console) -> Result<Vec<[f64; 3]>> {
+    let Some(spacings) = config::above_zero("--drop-isolated", spacings)? else { return Ok(cloud) };
+    let Some(spacing) = mean_spacing(&cloud) else { return Ok(cloud) };
+    let kept = without_isolated(&cloud, spacings * spacing);
+    let dropped = (cloud.len() - kept.len()) as u64;
+    console.note(&format!(
+        "{} of {} points stand alone and are left out",
+        grouped(dropped),
+        grouped(cloud.len() as u64)
+    ));
+    Ok(kept)
+}
+
 impl Job {
     fn new(args: ReconstructArgs, typed: &[String]) -> Result<Self> {
         let started = Instant::now();
@@ -73,6 +88,7 @@ impl Job {
                 mesh.vertices
             }
         };
+        let cloud = drop_isolated(cloud, args.grid.drop_isolated, &console)?;
         let grid = grid_for(&cloud, spacing).ok_or_else(|| {
             let what = "all points lie in one place, which tells no spacing and encloses nothing";
             Error::input(what).at(&args.cloud)

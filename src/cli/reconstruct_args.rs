@@ -39,4 +39,7 @@ pub(super) struct CloudGridArgs {
     /// Distance between voxel centres, one for all axes or three [default: half the mean spacing of the points]
     #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
     pub(super) spacing: Option<[f64; 3]>,
+    /// Leave out points that have not three others within so many mean spacings [without a number: 4]
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "4", allow_hyphen_values = true)]
+    pub(super) drop_isolated: Option<f64>,
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use crate::kernel::distance::Neighbours;
-use crate::pipeline::distance::{Method, SOLVERS, Solver, Textbook};
+use crate::pipeline::distance::{Method, SOLVERS};
 use crate::pipeline::marks::Seed;
 
 /// A crop as typed: for each axis where it begins and ends, where that was said.
@@ -131,29 +131,7 @@ pub(super) fn parse_neighbours(text: &str) -> Result<Neighbours, String> {
 
 /// The line of the help that lists the methods.
 pub(super) fn solvers_help() -> String {
-    help_of(|_| true)
-}
-
-/// The methods that go brick by brick in any order: those that a job on part of a grid can use.
-fn sweeps(solver: &Solver<f32>) -> bool {
-    solver.textbook == Textbook::Sweeps
-}
-
-/// A method of ordered sweeps by its name in the table.
-pub(super) fn parse_sweeping_method(text: &str) -> Result<Method, String> {
-    let names: Vec<&str> = SOLVERS.iter().filter(|solver| sweeps(solver)).map(|solver| solver.name).collect();
-    let method = Method::named(text).filter(|method| sweeps(&method.solver()));
-    method.ok_or_else(|| format!("give one of {}", names.join(", ")))
-}
-
-/// The line of the help that lists the methods of ordered sweeps.
-pub(super) fn sweeping_solvers_help() -> String {
-    help_of(sweeps)
-}
-
-fn help_of(listed: fn(&Solver<f32>) -> bool) -> String {
-    let rows = SOLVERS.iter().filter(|solver| listed(solver));
-    let list: Vec<String> = rows.map(|solver| format!("{} ({})", solver.name, solver.about)).collect();
+    let list: Vec<String> = SOLVERS.iter().map(|solver| format!("{} ({})", solver.name, solver.about)).collect();
     format!("Distance method: {}", list.join(", "))
 }
 
@@ -202,8 +180,5 @@ mod tests {
             assert!(solvers_help().contains(solver.name));
         }
         assert!(parse_method("fim").unwrap_err().contains("vdt"));
-        assert_eq!(parse_sweeping_method("vdt").map(Method::name), Ok("vdt"));
-        assert!(parse_sweeping_method("fmm").unwrap_err().contains("fsm, vdt"));
-        assert!(!sweeping_solvers_help().contains("fmm"));
     }
 }

@@ -129,7 +129,9 @@ impl<'a> Exchange<'a> {
         for (slot, values) in bricks {
             for &peer in self.readers.get(&slot).into_iter().flat_map(BTreeMap::keys) {
                 messages[peer].extend_from_slice(&self.set.id(slot).to_le_bytes());
-                values.iter().for_each(|value| messages[peer].extend_from_slice(&value.to_le_bytes()));
+                for value in values {
+                    messages[peer].extend_from_slice(&value.to_le_bytes());
+                }
             }
         }
         let mut told = Vec::new();

@@ -213,6 +213,21 @@ fn what_encloses_nothing_is_refused_with_the_reason() {
     assert!(grid_for(&[[1.0; 3]; 5], None).is_none());
 }
 
+/// Every row of the table of methods does.
+#[test]
+fn any_method_gives_the_surface() {
+    let cloud = sphere([0.0; 3], 2.0, 4000, |_| true);
+    let grid = grid_for(&cloud, None).expect("a spacing");
+    for method in Method::all() {
+        let settings = ReconstructSettings { method, ..ReconstructSettings::default() };
+        let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface");
+        let off = found.hausdorff.expect("points");
+        println!("{}: {:?}, {off:?}", method.name(), found.measures);
+        assert!((found.measures.volume / (4.0 / 3.0 * PI * 8.0) - 1.0).abs() < 0.02, "{}", method.name());
+        assert!(off.mean < 0.12 * grid.spacing[0] && found.measures.components == 1, "{}: {off:?}", method.name());
+    }
+}
+
 #[test]
 fn a_beta_that_leaks_is_named() {
     let cloud = sphere([0.0; 3], 2.0, 400, |_| true);

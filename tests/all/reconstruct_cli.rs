@@ -48,6 +48,21 @@ fn a_run_is_told_and_reported() {
     assert!((mean(&measured) / mean(&report["result"]) - 1.0).abs() < 1e-3, "{measured}");
 }
 
+/// A clump of stray points would be a second body.
+#[test]
+fn points_that_stand_alone_are_left_out() {
+    let bench = bench();
+    let stray: Vec<[f64; 3]> = (0..40).map(|n| [9.0 + f64::from(n % 4), f64::from(n / 4), 2.0]).collect();
+    bench.write("stray.xyz", &format!("{}\n{}", lines(&sphere([1.0, 2.0, 3.0], 2.0, 1500, |_| true)), lines(&stray)));
+    bench.succeed("reconstruct stray.xyz --drop-isolated -q -o none --report out/r.json");
+    let report = bench.json("out/r.json");
+    assert_eq!(report["result"]["cloud_points"], 1500, "{report}");
+    assert!(report["notes"][0].as_str().unwrap().starts_with("40 of 1 540 points stand alone"), "{}", report["notes"]);
+    assert_eq!((&report["result"]["lost_points"], &report["result"]["components"]), (&0.into(), &1.into()));
+    let text = bench.fail("reconstruct stray.xyz --drop-isolated=0 -o none", 2);
+    assert!(text.contains("--drop-isolated is 0; it must be a number, more than 0"), "{text}");
+}
+
 /// Every format holds the same surface; the readers of other programs' files read ours.
 #[test]
 fn meshes_come_in_the_format_of_their_name() {

@@ -6,10 +6,12 @@
 
 mod estimate;
 mod grid;
+mod isolated;
 mod output;
 mod settings;
 
 pub use estimate::{Estimate, estimate, least_memory};
 pub use grid::{grid_for, mean_spacing};
+pub use isolated::without_isolated;
 pub use output::{Reconstruction, reconstruct};
 pub use settings::ReconstructSettings;
