@@ -11,15 +11,16 @@ from pathlib import Path
 from common import page
 from common.program import METHODS, Program
 
-from . import cube, sponge, teddy
+from . import cube, sponge, surface, teddy
 from .setting import Setting
 
-SECTIONS = {"cube": cube.section, "teddy": teddy.section, "sponge": sponge.section}
+SECTIONS = {"cube": cube.section, "teddy": teddy.section, "sponge": sponge.section, "surface": surface.section}
 TITLE = """# Reproduction
 
 B. Kósa, K. Mikula: *Direct simple computation of middle surface between 3D point clouds and/or discrete surfaces by
-tracking sources in distance function calculation algorithms*, 2023: the tables of its distance experiments, and what
-this program gives. Tables are numbered as in the paper. `scripts/reproduce` runs the experiments and writes this page.
+tracking sources in distance function calculation algorithms*, 2023: the tables of its distance experiments; B. Kósa,
+K. Mikula, 2015, and B. Kósa's PhD thesis: surfaces from point clouds; and what this program gives. Tables are numbered
+as printed. `scripts/reproduce` runs the experiments and writes this page.
 
     scripts/reproduce --data FOLDER            # all grids, up to 893 x 1279 x 482
     scripts/reproduce --finest 340             # those of at most 340 points along an axis

@@ -160,7 +160,7 @@ impl Known<'_> {
     fn start_of_cell(&self, id: BrickId) -> f32 {
         let slot = self.inside.set().slot(id);
         let side = slot.map_or_else(|| self.inside.absent(id), |slot| self.inside.read(slot, |inside| inside[0]));
-        f32::from(u8::from(side > 0))
+        start::value(side)
     }
 
     fn fill_cell(&self, band: &Band, slot: Slot) -> u64 {
@@ -170,7 +170,7 @@ impl Known<'_> {
         let fill = |sides: Sides<'_>| {
             band.distance.write(slot, |out| out.copy_from_slice(sides.d));
             band.u.write(slot, |u| {
-                u.iter_mut().zip(sides.inside).for_each(|(u, &side)| *u = f32::from(u8::from(side > 0)));
+                u.iter_mut().zip(sides.inside).for_each(|(u, &side)| *u = start::value(side));
             });
             band.solved.write(slot, |solved| start::mark(sides, edge, valid, self.reaches, solved))
         };

@@ -28,7 +28,7 @@ pub(super) const WALL_VOXELS: f64 = 4.0;
 
 /// The sides of a cloud.
 pub struct Sides {
-    /// 1 inside, 0 outside; [`HELD`](crate::kernel::level_set::start::HELD) once [`hold_sheets`] held it.
+    /// 1 inside, 0 outside.
     pub inside: BrickArray<u8>,
     /// The spaces inside, deepest first.
     pub basins: Vec<Basin>,

@@ -5,13 +5,19 @@
 //! value. Comparisons alone, voxel by voxel, so the result does not depend on how the volume is divided.
 //!
 //! Bricks are dense `[z][y][x]` with row length and plane height `edge`; `valid` voxels along each axis are inside the
-//! domain. `d` is the distance to the cloud, physical lengths; `inside` is 1, 0 or [`HELD`]; `near` is above 0 near the border.
+//! domain. `d` is the distance to the cloud, physical lengths; `inside` is 1 or 0, with [`HELD`]; `near` is above 0 near the border.
 
 use crate::grid::FACES;
 use crate::tile::HaloTile;
 
-/// The side of voxels that are inside and stay so.
+/// Added to the side of voxels that stay on it.
 pub const HELD: u8 = 2;
+
+/// The start value on a side.
+#[must_use]
+pub fn value(side: u8) -> f32 {
+    f32::from(side & 1)
+}
 
 /// How far the band reaches on both sides of the cloud. Physical lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +33,7 @@ impl Reaches {
     #[inline]
     #[must_use]
     pub fn solves(self, d: f32, inside: u8) -> bool {
-        d <= if inside == 0 { self.outer } else { self.inner }
+        d <= if inside & 1 == 0 { self.outer } else { self.inner }
     }
 }
 
@@ -36,7 +42,7 @@ impl Reaches {
 pub struct Sides<'a> {
     /// Distance to the cloud.
     pub d: &'a [f32],
-    /// 1 inside, 0 outside, [`HELD`].
+    /// 1 inside, 0 outside; with [`HELD`] where it stays so.
     pub inside: &'a [u8],
     /// Above 0 near the border, where that is far from the cloud anywhere.
     pub near: Option<&'a [u8]>,
@@ -45,7 +51,7 @@ pub struct Sides<'a> {
 impl Sides<'_> {
     fn solves(&self, place: usize, reaches: Reaches) -> bool {
         let (d, inside) = (self.d[place], self.inside[place]);
-        inside != HELD && (reaches.solves(d, inside) || self.near.is_some_and(|near| near[place] > 0))
+        inside & HELD == 0 && (reaches.solves(d, inside) || self.near.is_some_and(|near| near[place] > 0))
     }
 }
 
@@ -72,7 +78,7 @@ pub fn border(d: &[f32], inside: &HaloTile<u8>, reaches: Reaches, near: &mut [u8
     near.fill(0);
     let mut found = false;
     for_each_with_beside(inside, |place, here, beside| {
-        if beside.iter().any(|side| (*side > 0) != (here > 0)) && !reaches.solves(d[place], here) {
+        if beside.iter().any(|side| side & 1 != here & 1) && !reaches.solves(d[place], here) {
             near[place] = 1;
             found = true;
         }
@@ -149,7 +155,7 @@ mod tests {
         near[63] = 3;
         let sides = Sides { near: Some(&near), ..sides };
         assert!(holds(sides, EDGE, [4; 3], nothing) && !holds(sides, EDGE, [4, 4, 3], nothing));
-        inside.fill(HELD);
+        inside.fill(HELD | 1);
         assert!(!holds(Sides { d: &d, inside: &inside, near: Some(&near) }, EDGE, [4; 3], REACHES));
     }
 

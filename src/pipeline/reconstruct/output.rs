@@ -2,7 +2,7 @@
 
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
-use crate::exec::Engine;
+use crate::exec::{Engine, Stage};
 use crate::grid::Geometry;
 use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
@@ -10,6 +10,7 @@ use crate::pipeline::band::Band;
 use crate::pipeline::enclosure::{Found, Hole, Search, Start, enclose, first_reach_for};
 use crate::pipeline::evolve::{Evolution, evolve_on_ranks};
 use crate::pipeline::pyramid::{Reduce, write_levels};
+use crate::pipeline::sheets::hold_sheets;
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::ElementType;
 
@@ -69,7 +70,12 @@ pub fn reconstruct(
     let stage = engine.stage("level set", 0);
     stage.voxels(band.voxels);
     let time_loop = settings.motion.time_loop(&geometry);
-    let evolution = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
+    let mut evolution = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
+    if settings.beta.is_none() && hold_what_was_lost(&stage, &geometry, cloud, &band)? {
+        let again = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
+        let (steps, sor_iterations) = (evolution.steps + again.steps, evolution.sor_iterations + again.sor_iterations);
+        evolution = Evolution { steps, sor_iterations, ..again };
+    }
     stage.finish();
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
@@ -81,6 +87,14 @@ pub fn reconstruct(
     }
     let band_voxels = band.voxels;
     Ok(Reconstruction { geometry, beta, hole, spaces, band_voxels, evolution, measures, hausdorff, lost_points })
+}
+
+/// Holds the sheets that the surface has left by more than a voxel; returns whether there are any.
+fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]], band: &Band) -> Result<bool> {
+    let off = surface::distances_to(stage, &band.u, geometry, cloud)?;
+    let is_lost = |(_, off): &(u32, &Option<f64>)| off.is_some_and(|off| off > geometry.max_spacing());
+    let lost: Vec<u32> = (0..).zip(&off).filter(is_lost).map(|(point, _)| point).collect();
+    Ok(!lost.is_empty() && hold_sheets(geometry, cloud, &lost, band) > 0)
 }
 
 fn write_fields(engine: &Engine, geometry: &Geometry, band: &Band, store: &StoreWriter) -> Result<()> {
