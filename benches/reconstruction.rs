@@ -18,6 +18,7 @@ use strandline::grid::{Geometry, TriangleMesh};
 use strandline::io::ome_zarr::StoreWriter;
 use strandline::io::sources::{Source, read_source};
 use strandline::kernel::surface::PatchIndex;
+use strandline::pipeline::distance::Method;
 use strandline::pipeline::motion::Motion;
 use strandline::pipeline::reconstruct::{ReconstructSettings, reconstruct};
 
@@ -67,7 +68,9 @@ fn main() {
     let grid = Geometry { shape, spacing: [h; 3], origin, unit: None };
     println!("{} points, {shape:?} voxels", cloud.len());
     let motion = Motion { delta: Some(0.1 * h), ..ReconstructSettings::default().motion };
-    let settings = ReconstructSettings { motion, ..ReconstructSettings::default() };
+    // By the same distance as the plain program.
+    let settings = ReconstructSettings { motion, method: Method::FSM, ..ReconstructSettings::default() };
+    let mut hole = 0.0;
     for threads in [1, 2] {
         let mut best = f64::INFINITY;
         for _ in 0..REPEATS {
@@ -75,6 +78,7 @@ fn main() {
             let started = Instant::now();
             let found = reconstruct(&lab.engine, &grid, &cloud, &settings, None).expect("a surface");
             let seconds = started.elapsed().as_secs_f64();
+            hole = found.hole.expect("a hole between points").width;
             if seconds < best {
                 best = seconds;
                 println!(
@@ -88,9 +92,10 @@ fn main() {
         }
     }
     // A little beyond the widest gap between points.
+    let beta = 1.1 * 0.5 * hole;
     let plain = PlainSettings {
-        beta: 4.5 * h,
-        gamma: 9.0 * h,
+        beta,
+        gamma: 2.0 * beta,
         delta: 0.1 * h,
         epsilon: 0.01,
         tau: 0.25 * h,
