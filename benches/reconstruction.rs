@@ -8,12 +8,11 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use std::f64::consts::PI;
 use std::time::Instant;
 
+use common::clouds::scan;
 use common::lab::Lab;
 use common::plain_reconstruction::{PlainSettings, reconstruct_plainly};
-use common::random::Random;
 use strandline::grid::{Geometry, TriangleMesh};
 use strandline::io::ome_zarr::StoreWriter;
 use strandline::io::sources::{Source, read_source};
@@ -25,26 +24,6 @@ use strandline::pipeline::reconstruct::{ReconstructSettings, reconstruct};
 const REPEATS: usize = 3;
 /// In the unit of the cloud, whose body is about two across, like the papers'.
 const SPACING: f64 = 2.0 / 330.0;
-
-/// A body with bumps and dents, sampled as a scanner does: unevenly, with noise, some points missing.
-fn scan(shape: [i64; 3], points: usize, h: f64) -> Vec<[f64; 3]> {
-    let mut random = Random(7);
-    let golden = PI * (3.0 - 5.0_f64.sqrt());
-    let all = points * 10 / 9;
-    let half = shape.map(|n| (n as f64 / 2.0 - 26.0) * h / 1.17);
-    let mut cloud = Vec::new();
-    for n in 0..all {
-        let (height, turn) = (1.0 - (2 * n + 1) as f64 / all as f64, golden * n as f64);
-        let ring = (1.0 - height * height).sqrt();
-        let p = [ring * turn.cos(), ring * turn.sin(), height];
-        let bumps = 1.0 + 0.08 * (5.0 * p[0]).sin() * (4.0 * p[1] + 1.0).cos() + 0.06 * (9.0 * p[2] + 3.0 * p[0]).sin();
-        let noise = 1.0 + 0.1 * h * (random.unit() - 0.5);
-        if random.below(10) > 0 && cloud.len() < points {
-            cloud.push(std::array::from_fn(|a| p[a] * half[a] * bumps * noise));
-        }
-    }
-    cloud
-}
 
 /// Our surface, of a run that is not timed.
 fn our_mesh(grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructSettings) -> TriangleMesh {
@@ -63,7 +42,8 @@ fn main() {
     let scale: f64 = std::env::args().skip(1).find_map(|a| a.parse().ok()).unwrap_or(1.0);
     let shape = [277, 457, 377].map(|n: i64| (n as f64 * scale).round() as i64);
     let h = SPACING / scale;
-    let cloud = scan(shape, (43_000.0 * scale * scale) as usize, h);
+    let half = shape.map(|n| (n as f64 / 2.0 - 26.0) * h / 1.17);
+    let cloud = scan(half, (43_000.0 * scale * scale) as usize, 0.1 * h);
     let origin = shape.map(|n| -0.5 * (n - 1) as f64 * h);
     let grid = Geometry { shape, spacing: [h; 3], origin, unit: None };
     println!("{} points, {shape:?} voxels", cloud.len());

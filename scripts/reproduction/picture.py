@@ -15,7 +15,11 @@ def read_ply(path):
     """Vertices and triangles of a binary PLY as this program writes it."""
     data = Path(path).read_bytes()
     head, _, body = data.partition(b"end_header\n")
-    counts = {words[1]: int(words[2]) for words in (line.split() for line in head.decode().splitlines()) if words[0] == "element"}
+    counts = {
+        words[1]: int(words[2])
+        for words in (line.split() for line in head.decode().splitlines())
+        if words[0] == "element"
+    }
     vertices = np.frombuffer(body, "<f4", 3 * counts["vertex"]).reshape(-1, 3)
     face = np.dtype([("n", "u1"), ("v", "<u4", 3)])
     return vertices.astype(float), np.frombuffer(body, face, counts["face"], offset=12 * counts["vertex"])["v"]

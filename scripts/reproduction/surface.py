@@ -11,18 +11,41 @@ from common import page, shapes
 from . import paper, picture
 
 DELTAS = (0.0, 0.025, 0.05, 0.1, 0.15)
-PAPERS = ("--stop", "l2", "--tol", "1e-4", "--epsilon", "0.01", "--max-steps", "1000", "--beta", "0.25", "--method", "fsm")
+PAPERS = (
+    "--stop",
+    "l2",
+    "--tol",
+    "1e-4",
+    "--epsilon",
+    "0.01",
+    "--max-steps",
+    "1000",
+    "--beta",
+    "0.25",
+    "--method",
+    "fsm",
+)
 
 
 def section(setting):
     """All tables as Markdown."""
-    return "\n\n".join([sponge(setting), scan(setting), noise(setting), image(setting)])
+    return "\n\n".join([sponge(setting), scan(setting), band(), noise(setting), image(setting)])
 
 
 def run(setting, command, flags, *, store=None):
     """A run of the program: its report, or the sentence that says why there is none."""
     report = setting.scratch / "report.json"
-    words = [setting.program.path, *command, "-o", str(store or "none"), "--report", str(report), "--overwrite", "-q", *flags]
+    words = [
+        setting.program.path,
+        *command,
+        "-o",
+        str(store or "none"),
+        "--report",
+        str(report),
+        "--overwrite",
+        "-q",
+        *flags,
+    ]
     print(f"  {' '.join(map(str, [*command, *flags]))}", flush=True)
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
     if done.returncode != 0:
@@ -99,7 +122,10 @@ def scan(setting):
             # A band holds far fewer voxels than a grid.
             if extent > 1.5 * setting.finest:
                 continue
-            ours = [run(setting, ["reconstruct", cloud], ["--spacing", h, "--delta", d, "--method", method]) for d in paper.SEALER_DELTAS]
+            ours = [
+                run(setting, ["reconstruct", cloud], ["--spacing", h, "--delta", d, "--method", method])
+                for d in paper.SEALER_DELTAS
+            ]
             off = [None if isinstance(r, str) else r["result"]["hausdorff"] for r in ours]
             rows.append([h, "MeanHD, Sealer", *means])
             rows.append([None, "MeanHD, ours", *(f"{o['mean']:.5f}" if o else "-" for o in off)])
@@ -112,6 +138,45 @@ def scan(setting):
         "The papers' Sealer is not public. Ours is a made body with 42,970 points that are as far apart (0.4087 in the mean),\n"
         "so the columns can be compared in how they fall with h and grow with delta, not digit by digit.\n\n"
         + "\n\n".join(tables)
+    )
+
+
+def band():
+    """T15, Tables 1 and 2: the plain program in Rust on the whole grid and in its band, and this one."""
+    print("  cargo bench --bench full_and_band", flush=True)
+    command = [
+        "cargo",
+        "bench",
+        "--quiet",
+        "--locked",
+        "--bench",
+        "full_and_band",
+        "--manifest-path",
+        page.ROOT / "Cargo.toml",
+    ]
+    done = subprocess.run(
+        [*map(str, command), "--", str(max(grid for grid, _ in paper.BANDS))], capture_output=True, text=True
+    )
+    ours = [line.strip("| ").split(" | ") for line in done.stdout.splitlines() if line.startswith("| ")]
+    rows = []
+    for grid, printed in paper.BANDS:
+        rows.append([f"{grid}^3", "bracelet", *printed[0], None])
+        rows.append([None, "sealer", *printed[1], None])
+        rows += [[None, "plain, here", *line[1:]] for line in ours if line[0] == f"{grid}^3"]
+    header = [
+        "grid",
+        "cloud",
+        "points in band",
+        "seconds, all points",
+        "band",
+        "mean squared difference",
+        "this program",
+    ]
+    return (
+        "## The band (Kósa & Mikula 2015, Tables 1 and 2)\n\n"
+        "The papers' program solves u on all points of the grid, or in a band of twice beta. `plain, here` is a program written\n"
+        "from the paper (f64, one thread) on a made body like the one above; the last column is this program's whole run, on\n"
+        "two threads, surface and measures included.\n\n" + page.table(header, rows)
     )
 
 
@@ -131,7 +196,9 @@ def noise(setting):
         path, mesh = setting.scratch / "noise.xyz", setting.scratch / f"noise-{len(rows)}.ply"
         np.savetxt(path, cloud, fmt="%.7f")
         report = run(setting, ["reconstruct", path], ["--spacing", spacing, "--mesh", mesh])
-        told = subprocess.run([setting.program.path, "measure", mesh, "--points", kept, "--json"], capture_output=True, text=True)
+        told = subprocess.run(
+            [setting.program.path, "measure", mesh, "--points", kept, "--json"], capture_output=True, text=True
+        )
         measured = json.loads(told.stdout)
         first = first or measured
         rows.append(
@@ -165,8 +232,32 @@ def image(setting):
     path = setting.scratch / "sponge.tif"
     tifffile.imwrite(path, (255 * inside).astype(np.uint8), imagej=True, metadata={"axes": "ZYX"})
     middle = half
-    flags = ["--seed", f"{middle},{middle},{middle},1.35", "--image-spacing", f"{h},{h},{h}", "--edge", "plain", "--rho", 1]
-    flags += ["--delta", 0.025, "--k", 10, "--sigma", h, "--tau", h / 4, "--epsilon", 0.01, "--max-steps", 4000, "--tol", 0.001]
+    flags = [
+        "--seed",
+        f"{middle},{middle},{middle},1.35",
+        "--image-spacing",
+        f"{h},{h},{h}",
+        "--edge",
+        "plain",
+        "--rho",
+        1,
+    ]
+    flags += [
+        "--delta",
+        0.025,
+        "--k",
+        10,
+        "--sigma",
+        h,
+        "--tau",
+        h / 4,
+        "--epsilon",
+        0.01,
+        "--max-steps",
+        4000,
+        "--tol",
+        0.001,
+    ]
     mesh = setting.scratch / "image.ply"
     report = run(setting, ["segment", path], [*flags, "--mesh", mesh])
     if isinstance(report, str):

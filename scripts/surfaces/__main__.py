@@ -68,7 +68,12 @@ def row(name, mesh, seconds, truth, points, h):
 
 def main():
     parser = argparse.ArgumentParser(prog="scripts/bench_surfaces", description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder with points/whale-cranium-vertices.xyz and meshes/pilot-whale-cranium.ply")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        required=True,
+        help="folder with points/whale-cranium-vertices.xyz and meshes/pilot-whale-cranium.ply",
+    )
     parser.add_argument("--depth", type=int, nargs="+", default=[8, 9], help="depths of Poisson's octree (8 9)")
     settings = parser.parse_args()
     cloud = settings.data / "points" / "whale-cranium-vertices.xyz"
@@ -80,7 +85,19 @@ def main():
     for depth in settings.depth:
         mesh, seconds = poisson(points, depth)
         rows.append(row(f"Open3D Poisson, depth {depth}, normals estimated", mesh, seconds, truth, points, h))
-    header = ["program", "seconds", "triangles", "closed", "pieces", "points off, mean", "within h", "to the truth", "from the truth", "both, mean", "99 % within"]
+    header = [
+        "program",
+        "seconds",
+        "triangles",
+        "closed",
+        "pieces",
+        "points off, mean",
+        "within h",
+        "to the truth",
+        "from the truth",
+        "both, mean",
+        "99 % within",
+    ]
     version = subprocess.run([os.environ["STRANDLINE"], "--version"], capture_output=True, text=True).stdout.split()[-1]
     text = (
         "## Surfaces from points: a whale's skull\n\n"

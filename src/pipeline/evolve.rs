@@ -5,11 +5,9 @@
 //! up again until the corrections are small. A scheme is made again at each visit: most cells are visited once a step,
 //! and writing it to memory and reading it back would cost as much.
 
-use std::sync::Arc;
-
 use super::band::{Band, read_mask};
-use crate::error::{Error, Result};
-use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Ownership, Reach, Stage, Workers, checkerboard};
+use crate::error::Result;
+use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Stage, Workers, checkerboard};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::level_set::border::Border;
 use crate::kernel::level_set::covolume::{Fields, Planes, Velocity, assemble};
@@ -214,43 +212,6 @@ pub fn evolve(
     done.sor_iterations = (iterations? / cells?.max(1.0)).ceil() as u64;
     stage.iterated(done.sor_iterations, done.residual);
     Ok(done)
-}
-
-/// The same on all ranks of the stage's engine, each with its own cells of the band; no image.
-///
-/// # Errors
-/// When scratch runs out, the run is interrupted or a rank ends early.
-pub fn evolve_on_ranks(
-    stage: &Stage<'_>,
-    engine: &Engine,
-    band: &mut Band,
-    spacing: [f64; 3],
-    settings: &TimeLoop,
-) -> Result<Evolution> {
-    if stage.ranks() == 1 {
-        return evolve(stage, engine, band, None, spacing, settings);
-    }
-    let set = band.solved.set().clone();
-    let ownership = Ownership::balanced(&set, stage.ranks());
-    let plan = HaloPlan::new(*set.grid(), Reach::All);
-    let whole = &*band;
-    let parts = stage.on_ranks(|stage, engine| {
-        let own = Arc::new(ownership.part(&set, engine.comm().rank(), &plan));
-        let mut part = whole.part(engine, &own)?;
-        let done = evolve(stage, engine, &mut part, None, spacing, settings)?;
-        Ok((part.u, done))
-    })?;
-    let mut last = None;
-    for (u, done) in parts {
-        for slot in u.set().owned() {
-            if let Some(to) = set.slot(u.set().id(slot)) {
-                u.read(slot, |from| band.u.write(to, |to| to.copy_from_slice(from)));
-                band.u.refresh_faces(to);
-            }
-        }
-        last = Some(done);
-    }
-    last.ok_or_else(|| Error::failed("no rank has solved the level set"))
 }
 
 /// What is kept of a cell: its distance and its edges with their halos, which never change.

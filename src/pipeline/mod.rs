@@ -5,6 +5,7 @@ mod cell_needs;
 pub mod distance;
 pub mod enclosure;
 pub mod evolve;
+mod evolve_ranks;
 mod far_regions;
 pub mod image_terms;
 pub mod ingest;

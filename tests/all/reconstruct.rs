@@ -13,7 +13,7 @@ use strandline::pipeline::evolve::Stop;
 use strandline::pipeline::motion::Motion;
 use strandline::pipeline::reconstruct::{ReconstructSettings, Reconstruction, grid_for, reconstruct};
 
-use crate::common::clouds::{grid_around, sphere, sponge};
+use crate::common::clouds::{grid_around, scan, sphere, sponge};
 use crate::common::lab::Lab;
 use crate::common::plain_reconstruction::{PlainSettings, reconstruct_plainly};
 use crate::common::random::Random;
@@ -196,9 +196,7 @@ fn mesh_of(grid: &Geometry, cloud: &[[f64; 3]]) -> TriangleMesh {
 #[test]
 fn missing_and_moved_points_do_not_move_the_surface() {
     let mut random = Random(11);
-    let dents = |p: [f64; 3]| 1.0 + 0.06 * (4.0 * p[0]).sin() * (3.0 * p[1] + 1.0).cos();
-    let cloud: Vec<[f64; 3]> =
-        sphere([0.0; 3], 2.0, 12_000, |_| true).into_iter().map(|p| p.map(|x| x * dents(p))).collect();
+    let cloud = scan([2.0; 3], 12_000, 0.01);
     let grid = grid_for(&cloud, None).expect("a spacing");
     let h = grid.spacing[0];
     let fewer: Vec<[f64; 3]> = cloud.iter().copied().filter(|_| random.below(10) > 0).collect();

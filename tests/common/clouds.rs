@@ -66,3 +66,23 @@ pub(crate) fn random_cloud(geometry: &Geometry, count: usize, seed: u64) -> Vec<
     }
     cloud
 }
+
+/// A body with bumps and dents about the origin, of these half extents but for the bumps, sampled as a scanner does: not
+/// quite evenly, a tenth of the points missing, with noise as large as that.
+pub(crate) fn scan(half: [f64; 3], points: usize, noise: f64) -> Vec<[f64; 3]> {
+    let mut random = Random(7);
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    let all = points * 10 / 9;
+    let mut cloud = Vec::new();
+    for n in 0..all {
+        let (height, turn) = (1.0 - (2 * n + 1) as f64 / all as f64, golden * n as f64);
+        let ring = (1.0 - height * height).sqrt();
+        let p = [ring * turn.cos(), ring * turn.sin(), height];
+        let bumps = 1.0 + 0.08 * (5.0 * p[0]).sin() * (4.0 * p[1] + 1.0).cos() + 0.06 * (9.0 * p[2] + 3.0 * p[0]).sin();
+        let off = noise * (random.unit() - 0.5);
+        if random.below(10) > 0 && cloud.len() < points {
+            cloud.push(std::array::from_fn(|a| p[a] * (half[a] * bumps + off)));
+        }
+    }
+    cloud
+}
