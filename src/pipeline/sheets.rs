@@ -11,7 +11,7 @@ use crate::kernel::level_set::start::{HELD, value};
 use crate::store::BrickArray;
 
 /// A voxel is held within so many largest spacings of a sheet's point, and of the lines between points beside each other.
-const HELD_VOXELS: f64 = 0.75;
+const HELD_VOXELS: f64 = 0.7;
 /// Points are a sheet where so many others are as near as so many largest spacings; what is fewer is noise.
 const NEIGHBOURS: usize = 3;
 const NEAR_VOXELS: f64 = 6.0;
@@ -58,7 +58,7 @@ impl Holds for Band {
     }
 
     fn hold(&self, slot: Slot, at: usize, side: u8) {
-        self.u.write(slot, |u| u[at] = value(side));
+        self.u.write(slot, |u| u[at] = value(side | HELD));
         self.solved.write(slot, |solved| solved[at] = 0);
     }
 

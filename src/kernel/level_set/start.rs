@@ -13,10 +13,18 @@ use crate::tile::HaloTile;
 /// Added to the side of voxels that stay on it.
 pub const HELD: u8 = 2;
 
+/// How far u of a held voxel is from the surface's 1/2: little, so that a shell of such voxels is thin.
+const HELD_OFF: f32 = 0.02;
+
 /// The start value on a side.
 #[must_use]
 pub fn value(side: u8) -> f32 {
-    f32::from(side & 1)
+    let inside = side & 1 == 1;
+    match (side & HELD == HELD, inside) {
+        (true, true) => 0.5 + HELD_OFF,
+        (true, false) => 0.5 - HELD_OFF,
+        (false, _) => f32::from(u8::from(inside)),
+    }
 }
 
 /// How far the band reaches on both sides of the cloud. Physical lengths.
