@@ -59,6 +59,12 @@ impl Motion {
         self.delta.unwrap_or(DELTA_VOXELS * geometry.min_spacing())
     }
 
+    /// True unless a stronger curvature was asked for than the default.
+    #[must_use]
+    pub fn smooths_no_more_than_usual(&self, geometry: &Geometry) -> bool {
+        self.delta_on(geometry) <= 1.001 * DELTA_VOXELS * geometry.min_spacing()
+    }
+
     /// The time step on a grid.
     #[must_use]
     pub fn tau_on(&self, geometry: &Geometry) -> f64 {

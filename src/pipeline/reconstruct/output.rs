@@ -72,7 +72,9 @@ pub fn reconstruct(
     stage.voxels(band.voxels);
     let time_loop = settings.motion.time_loop(&geometry);
     let mut evolution = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
-    if settings.beta.is_none() && hold_what_was_lost(&stage, &geometry, cloud, &band)? {
+    // Where more smoothing was asked for, the surface leaves points because it shall.
+    let keeps_points = settings.beta.is_none() && settings.motion.smooths_no_more_than_usual(&geometry);
+    if keeps_points && hold_what_was_lost(&stage, &geometry, cloud, &band)? {
         let again = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
         let (steps, sor_iterations) = (evolution.steps + again.steps, evolution.sor_iterations + again.sor_iterations);
         evolution = Evolution { steps, sor_iterations, ..again };
