@@ -192,3 +192,20 @@ proptest! {
         prop_assert!(problem.residual(&new) < 2e-6, "{}", problem.residual(&new));
     }
 }
+
+/// A step of 900 spacings without curvature, whose system over-relaxation does not converge for: it went round in
+/// circles between 0 and 1. Solved it is all the same.
+#[test]
+fn a_step_that_over_relaxation_cannot_solve_is_solved() {
+    let problem = Problem::random(
+        [31, 20, 21],
+        [0.3, 0.45, 1.1],
+        10_f64.powf(2.432_272_796_295_079),
+        1.447_959e-3,
+        5_133_450_607_741_588_280,
+    );
+    let (new, _) = problem.step(1, 1e-6);
+    assert_within(&new, problem.bounds());
+    let residual = problem.residual(&new);
+    assert!(residual < 1e-5, "{residual}");
+}
