@@ -172,7 +172,8 @@ fn main() {
         for (name, cost) in [("plain f64", &reference), ("1 thread ", &one), ("2 threads", &two)] {
             let errors = || cost.u.iter().zip(&solved).map(|(a, b)| (a - b).abs());
             println!(
-                "  {name}    {:7.1} ns, {:.1} iterations a step, ratio {:.2}, cells {:.0} % full, error of u {:.1e} (largest {:.1e})",
+                "  {name}    {:7.1} ns, {:.1} iterations a step, ratio {:.2}, cells {:.0} % full, error of u {:.1e} \
+                 (largest {:.1e})",
                 per_step(cost.seconds),
                 cost.iterations as f64 / f64::from(STEPS),
                 reference.seconds / cost.seconds,

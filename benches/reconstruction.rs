@@ -1,7 +1,7 @@
 //! A whole reconstruction from a cloud like that of a scan, as the papers' program does it and as ours does.
 //!
-//! The plain program runs once, on one thread, and stops at u; ours draws and measures the surface too. Both surfaces are
-//! compared: mean and largest distance of the plain one's vertices from ours.
+//! The plain program runs once, on one thread, and stops at u; ours draws and measures the surface too. Both surfaces
+//! are compared: mean and largest distance of the plain one's vertices from ours.
 //! `cargo bench --bench reconstruction [-- SCALE]`: 1 is 277 x 457 x 377 voxels and 43,000 points.
 #![allow(missing_docs, dead_code)]
 
@@ -85,7 +85,8 @@ fn main() {
     let found = reconstruct_plainly(&grid, &cloud, plain);
     let [distance, start, level_set] = found.seconds;
     println!(
-        "plain: {:.2} s (distance {distance:.2}, start {start:.2}, level set {level_set:.2}): {} band voxels, {} steps, {} iterations, {:.0} ns a voxel and step",
+        "plain: {:.2} s (distance {distance:.2}, start {start:.2}, level set {level_set:.2}): {} band voxels, {} \
+         steps, {} iterations, {:.0} ns a voxel and step",
         distance + start + level_set,
         found.band,
         found.steps,

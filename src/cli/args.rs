@@ -56,8 +56,8 @@ pub(super) struct SegmentArgs {
     /// object n, and objects named in later files are numbered on from those of the earlier ones
     #[arg(long, required_unless_present = "seed", value_name = "CLOUD")]
     pub(super) points: Vec<PathBuf>,
-    /// Object without points: a ball, centre and radius, from which the surface goes to the image's edges; several times
-    /// for several objects, numbered on from those of the points
+    /// Object without points: a ball, centre and radius, from which the surface goes to the image's edges; several
+    /// times for several objects, numbered on from those of the points
     #[arg(long, value_name = "X,Y,Z,R", value_parser = parse_seed, allow_hyphen_values = true)]
     pub(super) seed: Vec<Seed>,
     #[command(flatten)]

@@ -119,7 +119,8 @@ impl Job {
                 format!(", or leave --schedule out: in the textbook's order {name} keeps all voxels in one heap")
             };
             Error::usage(format!(
-                "a grid of {} voxels needs {} of memory and {} of temporary fields; {error}, or a coarser grid{textbook}",
+                "a grid of {} voxels needs {} of memory and {} of temporary fields; {error}, or a coarser \
+                 grid{textbook}",
                 grouped(self.geometry.domain().volume()),
                 bytes(needs.held),
                 bytes(needs.scratch)
@@ -128,8 +129,8 @@ impl Job {
         let on_disk = needs.scratch.saturating_sub(window / 2);
         match free_space(&self.resources.scratch) {
             Some(free) if free < on_disk => Err(Error::failed(format!(
-                "a grid of {} voxels needs {} of temporary fields, but {} are free and {} of memory are allowed; give a \
-                 larger --spacing, or another folder with --scratch",
+                "a grid of {} voxels needs {} of temporary fields, but {} are free and {} of memory are allowed; give \
+                 a larger --spacing, or another folder with --scratch",
                 grouped(self.geometry.domain().volume()),
                 bytes(needs.scratch),
                 bytes(free),
@@ -147,7 +148,8 @@ impl Job {
             return Ok(());
         }
         Err(Error::usage(format!(
-            "a grid of {} voxels falls into {} bricks, more than can be numbered; give a larger --brick or a coarser grid",
+            "a grid of {} voxels falls into {} bricks, more than can be numbered; give a larger --brick or a coarser \
+             grid",
             grouped(self.geometry.domain().volume()),
             grouped(bricks)
         )))

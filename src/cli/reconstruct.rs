@@ -222,6 +222,9 @@ fn describe_found(found: &Reconstruction) -> String {
         };
         format!("points off the surface: {} in the mean, {} at most{lost}", number(h.mean), number(h.max))
     }));
+    if found.sheet_points > 0 {
+        lines.push(format!("sheets without an inside: {} points, held as thin shells", grouped(found.sheet_points)));
+    }
     lines.extend(
         found
             .hole
@@ -275,6 +278,8 @@ struct Found {
     cloud_points: u64,
     /// Points farther from the surface than a voxel.
     lost_points: u64,
+    /// Points held as thin shells or slits.
+    sheet_points: u64,
     spaces: usize,
     beta: f64,
     hole: Option<Hole>,
@@ -297,6 +302,7 @@ impl Found {
             hausdorff: found.hausdorff.map(Into::into),
             cloud_points,
             lost_points: found.lost_points,
+            sheet_points: found.sheet_points,
             spaces: found.spaces,
             beta: found.beta,
             hole: found.hole.map(Into::into),

@@ -120,7 +120,8 @@ impl<'a> Exchange<'a> {
         Ok(())
     }
 
-    /// Tells the others six values of each of this rank's `bricks`, one for each face; returns what they tell of ghosts.
+    /// Tells the others six values of each of this rank's `bricks`, one for each face; returns what they tell of
+    /// ghosts.
     ///
     /// # Errors
     /// When another rank is gone.

@@ -107,8 +107,8 @@ fn read(path: &Path) -> Result<Source> {
     }
     if let Some((line, text)) = points::foreign_line(head) {
         return Err(Error::input(format!(
-            "is neither a point cloud nor a mesh: line {line}, {}, holds no numbers, no names x, y, z of columns and no \
-             start of a mesh; give one of {}",
+            "is neither a point cloud nor a mesh: line {line}, {}, holds no numbers, no names x, y, z of columns and \
+             no start of a mesh; give one of {}",
             quoted(&text),
             names()
         )));

@@ -32,6 +32,7 @@ macro_rules! vectorised {
 }
 
 pub mod distance;
+pub mod forest;
 pub mod image;
 pub mod level_set;
 pub mod surface;

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
 use crate::grid::{BrickId, BrickSet, NEIGHBOURS_26, Slot};
 use crate::kernel::level_set::mask::CellMask;
-use crate::kernel::level_set::start::{self, Sides};
+use crate::kernel::level_set::start::{self, CellSides};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
 
@@ -146,12 +146,12 @@ struct Known<'a> {
 
 impl Known<'_> {
     /// Lends out a stored cell.
-    fn read<R>(&self, slot: Slot, f: impl FnOnce(Sides<'_>) -> R) -> R {
+    fn read<R>(&self, slot: Slot, f: impl FnOnce(CellSides<'_>) -> R) -> R {
         let near = self.near.filter(|near| near.unwritten(slot).is_none());
         self.distance.read(slot, |d| {
             self.inside.read(slot, |inside| match near {
-                Some(near) => near.read(slot, |near| f(Sides { d, inside, near: Some(near) })),
-                None => f(Sides { d, inside, near: None }),
+                Some(near) => near.read(slot, |near| f(CellSides { d, inside, near: Some(near) })),
+                None => f(CellSides { d, inside, near: None }),
             })
         })
     }
@@ -167,7 +167,7 @@ impl Known<'_> {
         let set = band.solved.set();
         let (id, edge) = (set.id(slot), set.grid().edge() as usize);
         let valid = set.grid().brick_box(id).shape().map(|n| n as usize);
-        let fill = |sides: Sides<'_>| {
+        let fill = |sides: CellSides<'_>| {
             band.distance.write(slot, |out| out.copy_from_slice(sides.d));
             band.u.write(slot, |u| {
                 u.iter_mut().zip(sides.inside).for_each(|(u, &side)| *u = start::value(side));

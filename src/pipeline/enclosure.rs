@@ -96,6 +96,7 @@ pub struct Enclosure {
     distance: BrickArray<f32>,
     inside: BrickArray<u8>,
     basins: Vec<Basin>,
+    sheet: Vec<u32>,
 }
 
 /// What a search ends with.
@@ -150,8 +151,8 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         }
         if !sides.basins.is_empty() && (all || enough(&sides)) {
             let reaches = Reaches { inner: half_width as f32, outer: half_width as f32 };
-            hold_sheets(&around.vicinity.geometry, search.cloud, &sides.lost, &sides.inside);
-            return Ok(around.enclosed(0.0, reaches, sides.inside, sides.basins));
+            let sheet = hold_sheets(&around.vicinity.geometry, search.cloud, &sides.lost, &sides.inside);
+            return Ok(Found::Enclosed(Box::new(around.enclosed(0.0, reaches, sides.inside, sides.basins, sheet))));
         }
         farthest *= 2.0;
     }
@@ -193,7 +194,8 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         let inside = tagging.inside(&stage, engine, beta as f32)?;
         stage.finish();
         let reaches = Reaches { inner: half_width as f32, outer: outer as f32 };
-        return Ok(around.enclosed(beta, reaches, inside, tagging.basins));
+        let enclosure = around.enclosed(beta, reaches, inside, tagging.basins, Vec::new());
+        return Ok(Found::Enclosed(Box::new(enclosure)));
     }
 }
 
@@ -242,17 +244,16 @@ impl Around {
         stage
     }
 
-    fn enclosed(self, beta: f64, reaches: Reaches, inside: BrickArray<u8>, basins: Vec<Basin>) -> Found {
+    fn enclosed(
+        self,
+        beta: f64,
+        reaches: Reaches,
+        inside: BrickArray<u8>,
+        basins: Vec<Basin>,
+        sheet: Vec<u32>,
+    ) -> Enclosure {
         let Vicinity { geometry, window, .. } = self.vicinity;
-        Found::Enclosed(Box::new(Enclosure {
-            geometry,
-            window,
-            beta,
-            reaches,
-            distance: self.distance,
-            inside,
-            basins,
-        }))
+        Enclosure { geometry, window, beta, reaches, distance: self.distance, inside, basins, sheet }
     }
 }
 
@@ -268,6 +269,12 @@ impl Enclosure {
     #[must_use]
     pub fn spaces(&self) -> usize {
         self.basins.len()
+    }
+
+    /// The points that are held as thin shells or slits, in order.
+    #[must_use]
+    pub fn sheet(&self) -> &[u32] {
+        &self.sheet
     }
 
     /// Makes the band; the fields of the search go.

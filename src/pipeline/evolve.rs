@@ -61,8 +61,8 @@ const LOCAL_ITERATIONS: usize = 4;
 /// Visits of a cell in one step at most; only steps far longer than a spacing need more than a few.
 const MAX_VISITS: usize = 1000;
 
-/// Rounds of a step after which nothing is over-relaxed any more. Over-relaxation converges for most systems, but not for
-/// all that are unsymmetric: without curvature, in steps of many spacings, it can go round in circles. Gauss-Seidel
+/// Rounds of a step after which nothing is over-relaxed any more. Over-relaxation converges for most systems, but not
+/// for all that are unsymmetric: without curvature, in steps of many spacings, it can go round in circles. Gauss-Seidel
 /// relaxation always ends at the solution, for the matrix is an M-matrix.
 const OVER_RELAXED_ROUNDS: usize = 50;
 

@@ -1,8 +1,8 @@
 //! Pockets: what a ball of some radius cannot reach that rolls around the cloud from outside (the complement of the
 //! closing of Edelsbrunner & Mücke's alpha shapes, on the grid). An open body's bell is one, and so is every dent.
 //!
-//! Where the flood from outside reaches at that radius, the ball's centre may be; pockets are farther than the radius from
-//! there and not reached themselves.
+//! Where the flood from outside reaches at that radius, the ball's centre may be; pockets are farther than the radius
+//! from there and not reached themselves.
 
 use super::distance::{Method, Sources, cloud_distance};
 use super::tagging::level_of;
@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
 use crate::grid::{Geometry, PointBins};
 use crate::kernel::level_set::flood::shore;
+use crate::kernel::level_set::pocket::{self, Ball};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
 
@@ -36,16 +37,14 @@ pub(super) fn pockets(
     let bins = PointBins::new(*set.grid(), geometry, &centres);
     let sources = Sources::cloud(geometry, &centres, &bins);
     let away = cloud_distance(stage, engine, &sources, set, Method::VDT, f32::INFINITY)?;
-    let from = (radius + SLACK_VOXELS * geometry.max_spacing()) as f32;
-    let wall = (WALL_VOXELS * geometry.min_spacing()) as f32;
+    let ball = Ball {
+        radius: radius as f32,
+        from: (radius + SLACK_VOXELS * geometry.max_spacing()) as f32,
+        wall: (WALL_VOXELS * geometry.min_spacing()) as f32,
+    };
     stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
         let known = |d: &[f32], level: &[f32], inside: &[u8]| {
-            away.write(slot, |away| {
-                for (n, away) in away.iter_mut().enumerate() {
-                    let open = level[n] < radius as f32 && d[n] >= wall && inside[n] == 0;
-                    *away = if open { (*away - from).max(0.0) } else { 0.0 };
-                }
-            });
+            away.write(slot, |away| pocket::depth(ball, d, level, inside, away));
         };
         distance.read(slot, |d| level.read(slot, |level| inside.read(slot, |inside| known(d, level, inside))));
         Ok(())

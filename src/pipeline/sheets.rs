@@ -1,5 +1,6 @@
 //! Sheets: points with the same side all around them, so that a surface would close over them. Outside, the voxels that
-//! hold them are held inside, as a thin shell (algorithms: section 5, "Sheets"); inside they are held outside, as a slit.
+//! hold them are held inside, as a thin shell (algorithms: section 5, "Sheets"); inside they are held outside, as a
+//! slit.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +11,8 @@ use crate::grid::{Box3, BrickSet, Geometry, Slot};
 use crate::kernel::level_set::start::{HELD, value};
 use crate::store::BrickArray;
 
-/// A voxel is held within so many largest spacings of a sheet's point, and of the lines between points beside each other.
+/// A voxel is held within so many largest spacings of a sheet's point, and of the lines between points beside each
+/// other.
 const HELD_VOXELS: f64 = 0.7;
 /// Points are a sheet where so many others are as near as so many largest spacings; what is fewer is noise.
 const NEIGHBOURS: usize = 3;
@@ -68,25 +70,26 @@ impl Holds for Band {
 }
 
 /// Holds the voxels around those of the `lost` points that form sheets, and between them and their neighbours in the
-/// cloud, each on the side opposite to what is there; returns how many points these are.
-pub(super) fn hold_sheets(geometry: &Geometry, positions: &[[f64; 3]], lost: &[u32], target: &impl Holds) -> u64 {
-    let places: Vec<[f64; 3]> = lost.iter().map(|&point| positions[point as usize]).collect();
-    let tree = RTree::bulk_load(places.clone());
+/// cloud, each on the side opposite to what is there; returns these points.
+pub(super) fn hold_sheets(geometry: &Geometry, positions: &[[f64; 3]], lost: &[u32], target: &impl Holds) -> Vec<u32> {
+    let tree = RTree::bulk_load(lost.iter().map(|&point| positions[point as usize]).collect());
     let near = (NEAR_VOXELS * geometry.max_spacing()).powi(2);
-    let is_sheet = |p: &&[f64; 3]| tree.locate_within_distance(**p, near).take(NEIGHBOURS + 1).count() > NEIGHBOURS;
+    let is_sheet = |p: [f64; 3]| tree.locate_within_distance(p, near).take(NEIGHBOURS + 1).count() > NEIGHBOURS;
     // All sides are told before anything is held.
-    let side = |p: &[f64; 3]| {
-        let (slot, at) = place_of(target.set(), geometry.to_voxels(*p).map(|v| v.round() as i64))?;
-        Some((*p, target.side(slot, at)))
+    let side = |&point: &u32| {
+        let place = positions[point as usize];
+        let (slot, at) = place_of(target.set(), geometry.to_voxels(place).map(|v| v.round() as i64))?;
+        is_sheet(place).then(|| (point, target.side(slot, at)))
     };
-    let sheet: Vec<([f64; 3], u8)> = places.iter().filter(is_sheet).filter_map(side).collect();
+    let sheet: Vec<(u32, u8)> = lost.iter().filter_map(side).collect();
     if sheet.is_empty() {
-        return 0;
+        return Vec::new();
     }
     let all = RTree::bulk_load(positions.to_vec());
     let mut touched = BTreeSet::new();
     let step = 0.5 * geometry.min_spacing();
-    for &(from, side) in &sheet {
+    for &(point, side) in &sheet {
+        let from = positions[point as usize];
         let mut hold = |place: [f64; 3]| {
             for voxel in voxels_near(geometry, place) {
                 if let Some((slot, at)) = place_of(target.set(), voxel) {
@@ -107,7 +110,7 @@ pub(super) fn hold_sheets(geometry: &Geometry, positions: &[[f64; 3]], lost: &[u
     for slot in touched {
         target.refresh(slot);
     }
-    sheet.len() as u64
+    sheet.into_iter().map(|(point, _)| point).collect()
 }
 
 /// The brick of a voxel and its place there; none where nothing is stored.

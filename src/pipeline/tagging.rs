@@ -17,7 +17,7 @@ use crate::tile::HaloTile;
 /// A space that the cloud encloses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Basin {
-    /// Number of voxels deeper than the saddle.
+    /// Number of its voxels; of the flood's basins those deeper than the saddle.
     pub voxels: u64,
     /// The largest distance to the cloud in it.
     pub depth: f32,
@@ -48,9 +48,7 @@ impl Tagging {
         }
         stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
             self.level.read(slot, |level| {
-                inside.write(slot, |inside: &mut [u8]| {
-                    inside.iter_mut().zip(level).for_each(|(inside, &level)| *inside = u8::from(level < beta));
-                });
+                inside.write(slot, |inside| flood::beyond(level, beta, inside));
             });
             inside.refresh_faces(slot);
             Ok(())

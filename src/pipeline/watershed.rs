@@ -13,7 +13,8 @@ use super::tagging::Basin;
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
 use crate::grid::{Box3, BrickId, BrickSet, FACES, Face, Slot};
-use crate::kernel::level_set::ascent::{Ascent, Contact, OUTSIDE, UNKNOWN, contacts};
+use crate::kernel::level_set::ascent::{Ascent, OUTSIDE, renumber};
+use crate::kernel::level_set::contacts::{Contact, contacts, count};
 use crate::kernel::level_set::spaces::{self, Region, Space};
 use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
@@ -131,9 +132,7 @@ impl Watershed<'_> {
             regions.extend(peaks.iter().map(|peak| Region { depth: peak.depth, voxels: 0, pocket: peak.pocket }));
         }
         self.stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
-            of_voxel.write(slot, |dense| {
-                dense.iter_mut().filter(|r| **r != UNKNOWN).for_each(|r| *r += first[slot as usize]);
-            });
+            of_voxel.write(slot, |dense| renumber(dense, first[slot as usize]));
             of_voxel.refresh_faces(slot);
             Ok(())
         })?;
@@ -193,36 +192,18 @@ impl Watershed<'_> {
     fn sides(&self, engine: &Engine, of_voxel: &BrickArray<u32>, is_inside: &[bool]) -> Result<BrickArray<u8>> {
         let set = self.set();
         let mut inside = BrickArray::with_faces(engine.scratch(), set)?;
-        let side = |region: u32| u8::from(is_inside.get(region as usize).copied().unwrap_or(false));
         for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
-            inside.set_absent(id, side(of_voxel.absent(id)));
+            inside.set_absent(id, spaces::side_of(of_voxel.absent(id), is_inside));
         }
         self.stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
             of_voxel.read(slot, |regions| {
-                inside.write(slot, |inside: &mut [u8]| {
-                    inside.iter_mut().zip(regions).for_each(|(inside, &region)| *inside = side(region));
-                });
+                inside.write(slot, |inside| spaces::tell(regions, is_inside, inside));
             });
             inside.refresh_faces(slot);
             Ok(())
         })?;
         Ok(inside)
     }
-}
-
-/// Voxels of each region in a brick.
-fn count(regions: &HaloTile<u32>) -> Vec<(u32, u64)> {
-    let valid = regions.valid();
-    let mut counts: Vec<(u32, u64)> = Vec::new();
-    for (z, y) in (0..valid[2]).flat_map(|z| (0..valid[1]).map(move |y| (z, y))) {
-        for &region in &regions.data()[regions.at(0, y as isize, z as isize)..][..valid[0]] {
-            match counts.iter_mut().rev().find(|(known, _)| *known == region) {
-                Some((_, count)) => *count += 1,
-                None => counts.push((region, 1)),
-            }
-        }
-    }
-    counts
 }
 
 fn basin(space: &Space, contacts: &[(Contact, BrickId)], set: &BrickSet) -> Basin {

@@ -33,7 +33,8 @@ fn bench() -> Bench {
 fn a_run_is_told_and_reported() {
     let bench = bench();
     let printed = bench.succeed(
-        "distance sponge.xyz sphere.xyz --spacing 0.1 --labels --closest-point -o out/x.zarr --report out/r.json --threads 2",
+        "distance sponge.xyz sphere.xyz --spacing 0.1 --labels --closest-point -o out/x.zarr --report out/r.json \
+         --threads 2",
     );
     assert!(printed.starts_with("stage ") && printed.lines().all(|line| line.chars().count() <= 100), "{printed}");
     assert!(
@@ -106,7 +107,8 @@ fn triangle_distances_are_counted_for_each_voxel() {
 fn fields_fit_together() {
     let bench = bench();
     bench.succeed(
-        "distance sponge.xyz sphere.xyz --spacing 0.1,0.12,0.15 --labels --closest-point --precision f64 -q -o out/x.zarr",
+        "distance sponge.xyz sphere.xyz --spacing 0.1,0.12,0.15 --labels --closest-point --precision f64 -q -o \
+         out/x.zarr",
     );
     let [distance, label] = ["", "/labels/nearest"].map(|group| volume(&bench.path(&format!("out/x.zarr{group}"))));
     let closest = ["x", "y", "z"].map(|axis| volume(&bench.path(&format!("out/x.zarr/closest-point/{axis}"))));
@@ -219,8 +221,8 @@ fn other_programs_read_distances() {
     let bench = bench();
     for (precision, dtype) in [("f16", "float16"), ("f32", "float32"), ("f64", "float64")] {
         bench.succeed(&format!(
-            "distance ball.off box.stl --spacing 0.02,0.04,0.05 --signed --labels --closest-point --precision {precision} \
-             --overwrite -q -o out/x.zarr"
+            "distance ball.off box.stl --spacing 0.02,0.04,0.05 --signed --labels --closest-point --precision \
+             {precision} --overwrite -q -o out/x.zarr"
         ));
         let report = bench.json("out/x.zarr/report.json");
         let grid = &report["grid"];

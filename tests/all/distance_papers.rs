@@ -158,9 +158,9 @@ fn sponge_and_sphere_share_all_voxels() {
     }
 }
 
-/// Sec. 4, Experiment 2: the grid points on each vertex, open edge and open face of the cube are a data set of their own.
-/// By Alg. 7 all vertices get as many voxels (one has the centre too), all edges, all faces: algorithms, section 10. In
-/// single precision: the last bits of f64 differ where distances are equal by symmetry.
+/// Sec. 4, Experiment 2: the grid points on each vertex, open edge and open face of the cube are a data set of their
+/// own. By Alg. 7 all vertices get as many voxels (one has the centre too), all edges, all faces: algorithms, section
+/// 10. In single precision: the last bits of f64 differ where distances are equal by symmetry.
 #[test]
 fn subsets_of_the_cube_share_its_voxels_evenly() {
     let count = 37;

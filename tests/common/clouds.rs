@@ -67,8 +67,8 @@ pub(crate) fn random_cloud(geometry: &Geometry, count: usize, seed: u64) -> Vec<
     cloud
 }
 
-/// A body with bumps and dents about the origin, of these half extents but for the bumps, sampled as a scanner does: not
-/// quite evenly, a tenth of the points missing, with noise as large as that.
+/// A body with bumps and dents about the origin, of these half extents but for the bumps, sampled as a scanner does:
+/// not quite evenly, a tenth of the points missing, with noise as large as that.
 pub(crate) fn scan(half: [f64; 3], points: usize, noise: f64) -> Vec<[f64; 3]> {
     let mut random = Random(7);
     let golden = PI * (3.0 - 5.0_f64.sqrt());

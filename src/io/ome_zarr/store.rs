@@ -47,8 +47,8 @@ impl StoreWriter {
     /// end. What killed runs left in the making of the same store is removed.
     ///
     /// # Errors
-    /// `Usage` when something is at `path` that may not be replaced, or the folder it is to lie in does not exist; `Failed`
-    /// when that folder cannot be written to.
+    /// `Usage` when something is at `path` that may not be replaced, or the folder it is to lie in does not exist;
+    /// `Failed` when that folder cannot be written to.
     pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
         let path = resolve(path)?;
         check_target(&path, overwrite)?;

@@ -167,7 +167,8 @@ impl TiffFile {
         };
         if count == 0 || count > MAX_ENTRIES {
             return Err(self.error(format!(
-                "the page directory at byte {offset} has {count} entries (1 to {MAX_ENTRIES} can be); the file is damaged"
+                "the page directory at byte {offset} has {count} entries (1 to {MAX_ENTRIES} can be); the file is \
+                 damaged"
             )));
         }
         let end = head + count as usize * width;

@@ -117,7 +117,8 @@ impl Description {
         };
         if let Some(beyond) = pages.iter().find(|&&page| page >= available) {
             return Err(file.error(format!(
-                "the description places a plane on page {} but the file holds {available} pages: it is truncated or was edited",
+                "the description places a plane on page {} but the file holds {available} pages: it is truncated or \
+                 was edited",
                 beyond.saturating_add(1)
             )));
         }

@@ -21,7 +21,8 @@ impl Contiguous {
         let file = tags.file;
         if page.compression != Compression::None || page.tiled || page.planar {
             return Err(file.error(format!(
-                "the description promises {planes} planes but there is 1 page, and only uncompressed strips can follow it without pages: the file is truncated or was edited"
+                "the description promises {planes} planes but there is 1 page, and only uncompressed strips can \
+                 follow it without pages: the file is truncated or was edited"
             )));
         }
         let strips = page.chunks(tags, 0)?;
@@ -36,7 +37,8 @@ impl Contiguous {
         if end > file.len {
             let held = file.len.saturating_sub(first) / plane;
             return Err(file.error(format!(
-                "the description promises {planes} planes, up to byte {end}, but the file ends at {}: only {held} planes are complete and {} bytes are missing",
+                "the description promises {planes} planes, up to byte {end}, but the file ends at {}: only {held} \
+                 planes are complete and {} bytes are missing",
                 file.len,
                 end - file.len
             )));

@@ -10,7 +10,8 @@
 //! voxels of all.
 //!
 //! In: source indices, [`NO_SOURCE`] where none is known, halo 2 on all 26 sides; out: source indices and squared
-//! distances, f64. Bends are looked for in f32. Ties keep the source that was there; of equally near others the first in
+//! distances, f64. Bends are looked for in f32. Ties keep the source that was there; of equally near others the first
+//! in
 //! `[z][y][x]` order is taken.
 
 use super::initialise::NO_SOURCE;
@@ -20,7 +21,8 @@ use crate::grid::{Box3, Geometry};
 
 /// How far around a voxel others are asked.
 pub const MARGIN: i64 = 2;
-/// How much farther sources must be carried than they count, in voxels: those that may come to count, and what they ask.
+/// How much farther sources must be carried than they count, in voxels: those that may come to count, and what they
+/// ask.
 pub const REACH: i64 = MARGIN + 1;
 /// How much nearer a source may be without being looked for, t above, in the smallest spacing.
 const TOLERANCE: f64 = 0.05;

@@ -18,8 +18,8 @@ pub trait TrackedSource: DistanceMethod<State = u32> {
     /// The squared distance of a place to the source of a state; infinite to none.
     fn squared(&self, here: [Self::Number; 3], state: u32) -> Self::Number;
 
-    /// The squared distance of a voxel to a source, physical units, in f64: of which [`DistanceMethod::distance`] is the
-    /// root.
+    /// The squared distance of a voxel to a source, physical units, in f64: of which [`DistanceMethod::distance`] is
+    /// the root.
     fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64;
 
     /// Those of a row of voxels along x, the first at `start`, each to its own source.

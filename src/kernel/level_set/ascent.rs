@@ -23,19 +23,6 @@ pub struct Peak {
     pub pocket: f32,
 }
 
-/// Where two regions meet.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
-    /// The smaller of the two numbers first.
-    pub regions: [u32; 2],
-    /// The largest distance to the cloud on the border between them: half as wide as the opening.
-    pub pass: f32,
-    /// The voxel that has it, the first in the brick; as a place of the dense brick.
-    pub place: u32,
-    /// Number of faces between voxels of the one and the other.
-    pub faces: u32,
-}
-
 /// Work buffers for one brick.
 #[derive(Clone, Debug, Default)]
 pub struct Ascent {
@@ -129,6 +116,13 @@ impl Ascent {
     }
 }
 
+/// Adds `first` to the numbers of all known regions.
+pub fn renumber(regions: &mut [u32], first: u32) {
+    for region in regions.iter_mut().filter(|region| **region != UNKNOWN) {
+        *region += first;
+    }
+}
+
 /// Names the voxels that are connected to `seed` by such as `joins` says yes to.
 fn fill(
     d: &HaloTile<f32>,
@@ -179,54 +173,10 @@ fn point_all(d: &HaloTile<f32>, inverse: [f32; 3], ways: &mut [i32]) {
 
 /// Starts of the rows inside the domain: in the dense brick and in the tile.
 #[inline(always)]
-fn rows(d: &HaloTile<f32>) -> impl Iterator<Item = (usize, usize)> {
+pub(super) fn rows(d: &HaloTile<f32>) -> impl Iterator<Item = (usize, usize)> {
     let (edge, pitch, valid) = (d.edge(), d.pitch(), d.valid());
     let row = move |y: usize, z: usize| ((z * edge + y) * edge, ((z + 1) * pitch + y + 1) * pitch + 1);
     (0..valid[2]).flat_map(move |z| (0..valid[1]).map(move |y| row(y, z)))
-}
-
-/// Where regions meet in a brick and across its upper faces, and across those lower ones that `lower` names; in no
-/// order. `d` and `regions` have their ghosts across faces.
-#[must_use]
-pub fn contacts(d: &HaloTile<f32>, regions: &HaloTile<u32>, lower: [bool; 3]) -> Vec<Contact> {
-    let (edge, pitch, valid) = (d.edge(), d.pitch(), d.valid());
-    let strides = [1, pitch, pitch * pitch];
-    let mut found: Vec<Contact> = Vec::new();
-    for (row, start) in rows(d) {
-        let mut compare = |x: usize, next: usize| {
-            let at = start + x;
-            let (a, b) = (regions.data()[at], regions.data()[next]);
-            if a != b {
-                let (pass, place) = (d.data()[at].min(d.data()[next]), (row + x) as u32);
-                add(&mut found, Contact { regions: [a.min(b), a.max(b)], pass, place, faces: 1 });
-            }
-        };
-        for stride in strides {
-            (0..valid[0]).for_each(|x| compare(x, start + x + stride));
-        }
-        if lower[0] {
-            compare(0, start - 1);
-        }
-        for (axis, at) in [(1, row / edge % edge), (2, row / (edge * edge))] {
-            if at == 0 && lower[axis] {
-                (0..valid[0]).for_each(|x| compare(x, start + x - strides[axis]));
-            }
-        }
-    }
-    found
-}
-
-/// Few regions meet in one brick: a list is searched faster than anything else, from its end.
-fn add(found: &mut Vec<Contact>, contact: Contact) {
-    match found.iter_mut().rev().find(|known| known.regions == contact.regions) {
-        Some(known) => {
-            known.faces += 1;
-            if contact.pass > known.pass {
-                (known.pass, known.place) = (contact.pass, contact.place);
-            }
-        }
-        None => found.push(contact),
-    }
 }
 
 fn place_in<T: Copy + Default>(tile: &HaloTile<T>, place: usize) -> usize {
@@ -247,6 +197,7 @@ fn neighbours(at: usize, edge: usize, valid: [usize; 3]) -> [Option<usize>; 6] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::level_set::contacts::{Contact, contacts};
 
     /// A row of four voxels in a brick of edge 4, walls of the domain all around but across x.
     fn row(d: [f32; 4], beyond: [f32; 2]) -> HaloTile<f32> {

@@ -20,6 +20,13 @@ pub fn relax(b: &mut HaloTile<f32>, d: &[f32]) -> bool {
     }
 }
 
+/// Sets 1 where the flood at a threshold does not reach, 0 elsewhere.
+pub fn beyond(level: &[f32], threshold: f32, inside: &mut [u8]) {
+    for (inside, &level) in inside.iter_mut().zip(level) {
+        *inside = u8::from(level < threshold);
+    }
+}
+
 /// The highest level of a layer of voxels, 0 at least: what a region beside it is flooded with.
 #[must_use]
 pub fn highest(layer: &[f32]) -> f32 {

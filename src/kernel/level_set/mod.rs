@@ -4,14 +4,17 @@
 //! same whatever the brick size. Source: Kósa 2015, chapter 3; Kósa PhD, chapter 3 (algorithms: section 5).
 
 pub mod ascent;
+pub mod ball;
 pub mod basins;
 pub mod border;
 pub(crate) mod coefficients;
+pub mod contacts;
 pub mod covolume;
 pub mod flood;
 pub mod gradients;
 pub mod mask;
 pub mod persistence;
+pub mod pocket;
 pub mod scheme;
 pub mod sor;
 pub mod spaces;

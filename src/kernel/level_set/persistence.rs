@@ -1,10 +1,9 @@
 //! Which basins persist (algorithms: section 5, "Automatic beta"): the pieces of all bricks, joined where they touch,
-//! their depths compared with their saddles.
-//!
-//! A forest over the pieces (union-find, paths halved on the way). The smallest number of a tree is its root, so names
-//! and sums do not depend on the order in which pieces are joined; depths and saddles are only compared.
+//! their depths compared with their saddles. Depths and saddles are only compared, so names and sums do not depend on
+//! the order in which pieces are joined.
 
 use super::basins::Piece;
+use crate::kernel::forest::Forest;
 
 /// A basin persists when its depth is at least this many times its saddle; noise stays below 1.5.
 pub const PERSISTENCE: f32 = 2.0;
@@ -13,35 +12,37 @@ pub const PERSISTENCE: f32 = 2.0;
 #[derive(Clone, Debug)]
 pub struct Joins {
     pieces: Vec<Piece>,
-    parent: Vec<u32>,
+    forest: Forest,
 }
 
 impl Joins {
     /// Pieces of which none touch yet; they are numbered in this order.
     #[must_use]
     pub fn new(pieces: Vec<Piece>) -> Self {
-        let parent = (0..pieces.len() as u32).collect();
-        Self { pieces, parent }
+        let forest = Forest::of_singles(pieces.len());
+        Self { pieces, forest }
     }
 
     /// Joins what touches across a face between two bricks: `labels` of the voxels on its two sides, in the same order,
     /// 0 for none; `first` are the pieces that label 1 stands for on each side.
     pub fn across(&mut self, labels: [&[u16]; 2], first: [u32; 2]) {
         for (&a, &b) in labels[0].iter().zip(labels[1]).filter(|(a, b)| **a != 0 && **b != 0) {
-            self.union(first[0] + u32::from(a) - 1, first[1] + u32::from(b) - 1);
+            self.forest.join(first[0] + u32::from(a) - 1, first[1] + u32::from(b) - 1);
         }
     }
 
     /// Joins everything labelled on a face with the one piece that lies beyond all of it.
     pub fn beyond(&mut self, labels: &[u16], first: u32, piece: u32) {
-        labels.iter().filter(|label| **label != 0).for_each(|&label| self.union(first + u32::from(label) - 1, piece));
+        for &label in labels.iter().filter(|label| **label != 0) {
+            self.forest.join(first + u32::from(label) - 1, piece);
+        }
     }
 
-    /// Adds up what was joined and keeps the basins so many times as deep as their saddle, in order of their roots; tells for each piece which
-    /// of them it is part of.
+    /// Adds up what was joined and keeps the basins so many times as deep as their saddle, in order of their roots;
+    /// tells for each piece which of them it is part of.
     #[must_use]
     pub fn persisting(mut self, ratio: f32) -> (Vec<Piece>, Vec<Option<u32>>) {
-        let roots: Vec<u32> = (0..self.parent.len() as u32).map(|n| self.root(n)).collect();
+        let roots = self.forest.roots();
         let mut whole = self.pieces.clone();
         for (n, &root) in roots.iter().enumerate().filter(|(n, root)| *n as u32 != **root) {
             let sum = &mut whole[root as usize];
@@ -56,20 +57,6 @@ impl Joins {
             }
         }
         (basins, roots.iter().map(|&root| names[root as usize]).collect())
-    }
-
-    fn root(&mut self, mut n: u32) -> u32 {
-        while self.parent[n as usize] != n {
-            let above = self.parent[self.parent[n as usize] as usize];
-            self.parent[n as usize] = above;
-            n = above;
-        }
-        n
-    }
-
-    fn union(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b) as usize] = a.min(b);
     }
 }
 

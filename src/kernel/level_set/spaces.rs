@@ -9,8 +9,10 @@
 //! *Pockets* are what a large ball cannot reach from outside. They stay apart from what is not a pocket, and their
 //! borders tell their side too: a dent meets the inside with most of its border, the bell of an open body the outside.
 
-use super::ascent::{Contact, OUTSIDE};
+use super::ascent::OUTSIDE;
+use super::contacts::Contact;
 use super::persistence::PERSISTENCE;
+use crate::kernel::forest::Forest;
 
 /// What a region of steepest ascent is like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -49,8 +51,8 @@ pub fn joined(mut contacts: Vec<(Contact, u64)>) -> Vec<(Contact, u64)> {
 }
 
 /// Tells which regions are inside, and the spaces they form, deepest first. Region [`OUTSIDE`] is outside whatever
-/// happens; no space less deep than `least_depth` stays apart, and no pocket less deep than `least_pocket`. Pockets meet
-/// where no wall of points is between them: where the distance to the cloud is at least `wall`.
+/// happens; no space less deep than `least_depth` stays apart, and no pocket less deep than `least_pocket`. Pockets
+/// meet where no wall of points is between them: where the distance to the cloud is at least `wall`.
 #[must_use]
 pub fn inside(
     regions: &[Region],
@@ -75,7 +77,7 @@ pub fn inside(
             merged.meet(a, b, deep(pass));
         }
     }
-    let roots: Vec<u32> = (0..regions.len() as u32).map(|region| merged.root(region)).collect();
+    let roots = merged.forest.roots();
     let sides = sides_of(&roots, contacts);
     let inside: Vec<bool> = roots.iter().map(|&root| sides[root as usize] == Side::Inside).collect();
     // A pocket inside is part of the body that it opens into.
@@ -84,14 +86,27 @@ pub fn inside(
             merged.meet(a, b, f32::INFINITY);
         }
     }
-    let roots: Vec<u32> = (0..regions.len() as u32).map(|region| merged.root(region)).collect();
+    let roots = merged.forest.roots();
     let spaces = spaces_of(regions, &roots, &inside, contacts);
     (inside, spaces)
 }
 
-/// A forest over the regions; the smallest number of a tree is its root.
+/// Tells each voxel its side, 1 inside and 0 outside, from its region.
+pub fn tell(regions: &[u32], is_inside: &[bool], side: &mut [u8]) {
+    for (side, &region) in side.iter_mut().zip(regions) {
+        *side = side_of(region, is_inside);
+    }
+}
+
+/// The side of a region, 1 inside and 0 outside; what is no region is outside.
+#[must_use]
+pub fn side_of(region: u32, is_inside: &[bool]) -> u8 {
+    u8::from(is_inside.get(region as usize).copied().unwrap_or(false))
+}
+
+/// Regions merged to spaces; what a space is like stands at its root.
 struct Merged {
-    parent: Vec<u32>,
+    forest: Forest,
     depth: Vec<f32>,
     pocket: Vec<f32>,
 }
@@ -103,12 +118,11 @@ impl Merged {
             *outside = f32::INFINITY;
         }
         let pocket = regions.iter().map(|region| region.pocket).collect();
-        Self { parent: (0..regions.len() as u32).collect(), depth, pocket }
+        Self { forest: Forest::of_singles(regions.len()), depth, pocket }
     }
 
     fn is_pocket(&mut self, region: u32) -> bool {
-        let root = self.root(region);
-        self.pocket[root as usize] > 0.0
+        self.pocket[self.forest.root(region) as usize] > 0.0
     }
 
     /// Makes pockets less deep than that nothing special.
@@ -116,26 +130,15 @@ impl Merged {
         self.pocket.iter_mut().filter(|pocket| **pocket < least).for_each(|pocket| *pocket = 0.0);
     }
 
-    fn root(&mut self, mut n: u32) -> u32 {
-        while self.parent[n as usize] != n {
-            let above = self.parent[self.parent[n as usize] as usize];
-            self.parent[n as usize] = above;
-            n = above;
-        }
-        n
-    }
-
     /// Makes two spaces one, unless both are at least so deep.
     fn meet(&mut self, a: u32, b: u32, deep: f32) {
-        let (a, b) = (self.root(a), self.root(b));
-        let (kept, gone) = (a.min(b), a.max(b));
+        let (a, b) = (self.forest.root(a), self.forest.root(b));
         let depths = [self.depth[a as usize], self.depth[b as usize]];
-        if a == b || depths[0].min(depths[1]) >= deep {
-            return;
+        if depths[0].min(depths[1]) < deep && self.forest.join(a, b) {
+            let kept = self.forest.root(a) as usize;
+            self.depth[kept] = depths[0].max(depths[1]);
+            self.pocket[kept] = self.pocket[a as usize].max(self.pocket[b as usize]);
         }
-        self.depth[kept as usize] = depths[0].max(depths[1]);
-        self.pocket[kept as usize] = self.pocket[a as usize].max(self.pocket[b as usize]);
-        self.parent[gone as usize] = kept;
     }
 }
 

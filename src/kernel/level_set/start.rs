@@ -5,7 +5,8 @@
 //! value. Comparisons alone, voxel by voxel, so the result does not depend on how the volume is divided.
 //!
 //! Bricks are dense `[z][y][x]` with row length and plane height `edge`; `valid` voxels along each axis are inside the
-//! domain. `d` is the distance to the cloud, physical lengths; `inside` is 1 or 0, with [`HELD`]; `near` is above 0 near the border.
+//! domain. `d` is the distance to the cloud, physical lengths; `inside` is 1 or 0, with [`HELD`]; `near` is above 0
+//! near the border.
 
 use crate::grid::FACES;
 use crate::tile::HaloTile;
@@ -47,7 +48,7 @@ impl Reaches {
 
 /// What tells the band of a brick.
 #[derive(Clone, Copy, Debug)]
-pub struct Sides<'a> {
+pub struct CellSides<'a> {
     /// Distance to the cloud.
     pub d: &'a [f32],
     /// 1 inside, 0 outside; with [`HELD`] where it stays so.
@@ -56,7 +57,7 @@ pub struct Sides<'a> {
     pub near: Option<&'a [u8]>,
 }
 
-impl Sides<'_> {
+impl CellSides<'_> {
     fn solves(&self, place: usize, reaches: Reaches) -> bool {
         let (d, inside) = (self.d[place], self.inside[place]);
         inside & HELD == 0 && (reaches.solves(d, inside) || self.near.is_some_and(|near| near[place] > 0))
@@ -64,7 +65,7 @@ impl Sides<'_> {
 }
 
 /// Sets 1 at voxels of the domain that are solved, 0 elsewhere; returns how many there are.
-pub fn mark(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches, solved: &mut [u8]) -> u64 {
+pub fn mark(sides: CellSides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches, solved: &mut [u8]) -> u64 {
     solved.fill(0);
     let mut count = 0;
     for place in rows(edge, valid).flatten() {
@@ -76,12 +77,12 @@ pub fn mark(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches, 
 
 /// True when any voxel of the domain is solved.
 #[must_use]
-pub fn holds(sides: Sides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches) -> bool {
+pub fn holds(sides: CellSides<'_>, edge: usize, valid: [usize; 3], reaches: Reaches) -> bool {
     rows(edge, valid).flatten().any(|place| sides.solves(place, reaches))
 }
 
-/// Sets 1 at voxels beside the border that no reach solves, 0 elsewhere; returns whether there are any. `inside` has its
-/// ghosts across faces.
+/// Sets 1 at voxels beside the border that no reach solves, 0 elsewhere; returns whether there are any. `inside` has
+/// its ghosts across faces.
 pub fn border(d: &[f32], inside: &HaloTile<u8>, reaches: Reaches, near: &mut [u8]) -> bool {
     near.fill(0);
     let mut found = false;
@@ -144,7 +145,7 @@ mod tests {
         let (d, inside) = fields();
         let mut solved = [7; 64];
         // x + y <= 3 inside, x + y <= 5 outside; of 3 x 4 x 3 voxels.
-        let count = mark(Sides { d: &d, inside: &inside, near: None }, EDGE, [3, 4, 3], REACHES, &mut solved);
+        let count = mark(CellSides { d: &d, inside: &inside, near: None }, EDGE, [3, 4, 3], REACHES, &mut solved);
         let wanted = |n: usize| {
             let [x, y, z] = [n % EDGE, n / EDGE % EDGE, n / 16];
             x < 3 && z < 3 && x + y <= if z < 2 { 3 } else { 5 }
@@ -157,14 +158,14 @@ mod tests {
     fn what_is_held_is_not_solved_and_what_is_near_the_border_is() {
         let (d, mut inside) = fields();
         let nothing = Reaches { inner: 0.0, outer: 0.0 };
-        let sides = Sides { d: &d, inside: &inside, near: None };
+        let sides = CellSides { d: &d, inside: &inside, near: None };
         assert!(holds(sides, EDGE, [4; 3], REACHES) && !holds(sides, EDGE, [4; 3], nothing));
         let mut near = [0; 64];
         near[63] = 3;
-        let sides = Sides { near: Some(&near), ..sides };
+        let sides = CellSides { near: Some(&near), ..sides };
         assert!(holds(sides, EDGE, [4; 3], nothing) && !holds(sides, EDGE, [4, 4, 3], nothing));
         inside.fill(HELD | 1);
-        assert!(!holds(Sides { d: &d, inside: &inside, near: Some(&near) }, EDGE, [4; 3], REACHES));
+        assert!(!holds(CellSides { d: &d, inside: &inside, near: Some(&near) }, EDGE, [4; 3], REACHES));
     }
 
     #[test]

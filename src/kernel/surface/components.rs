@@ -1,12 +1,11 @@
-//! `Components`: how many connected pieces a mesh has, counted while its triangles pass (union-find).
+//! `Components`: how many connected pieces a mesh has, counted while its triangles pass.
 
-const UNUSED: u32 = u32::MAX;
+use crate::kernel::forest::Forest;
 
-/// A forest over vertices; two vertices are in one tree when triangles connect them.
+/// The pieces of a mesh; two vertices are in one when triangles connect them.
 #[derive(Clone, Debug, Default)]
 pub struct Components {
-    /// The vertex above each vertex, itself at the root, [`UNUSED`] while no triangle has it.
-    parent: Vec<u32>,
+    forest: Forest,
     count: u64,
     vertices: u64,
 }
@@ -17,11 +16,10 @@ impl Components {
     /// # Panics
     /// When a corner is `u32::MAX`, which no mesh of this crate has.
     pub fn add(&mut self, corners: [u32; 3]) {
-        for corner in corners {
-            self.enter(corner);
-        }
-        self.join(corners[0], corners[1]);
-        self.join(corners[0], corners[2]);
+        let entered: u64 = corners.map(|corner| u64::from(self.forest.enter(corner))).iter().sum();
+        let joined = [corners[1], corners[2]].map(|corner| u64::from(self.forest.join(corners[0], corner)));
+        self.vertices += entered;
+        self.count = self.count + entered - joined.iter().sum::<u64>();
     }
 
     /// Number of connected pieces; vertices without a triangle do not count.
@@ -34,41 +32,6 @@ impl Components {
     #[must_use]
     pub fn vertices(&self) -> u64 {
         self.vertices
-    }
-
-    fn enter(&mut self, vertex: u32) {
-        assert!(vertex != UNUSED, "a vertex number must lie below 2^32 - 1");
-        let place = vertex as usize;
-        if place >= self.parent.len() {
-            self.parent.resize(place + 1, UNUSED);
-        }
-        if self.parent[place] == UNUSED {
-            self.parent[place] = vertex;
-            self.count += 1;
-            self.vertices += 1;
-        }
-    }
-
-    /// Joins two trees; the lower root stays, so that the forest does not depend on how it was built.
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        if a != b {
-            self.parent[a.max(b) as usize] = a.min(b);
-            self.count -= 1;
-        }
-    }
-
-    /// The root above a vertex; halves the path on its way.
-    fn root(&mut self, mut vertex: u32) -> u32 {
-        loop {
-            let above = self.parent[vertex as usize];
-            if above == vertex {
-                return vertex;
-            }
-            let next = self.parent[above as usize];
-            self.parent[vertex as usize] = next;
-            vertex = next;
-        }
     }
 }
 

@@ -67,8 +67,8 @@ impl Options {
     }
 }
 
-/// Distance to the nearest point in f32, physical units, on the bricks of `set`, no value above `farthest`; on all ranks
-/// of the stage's engine. No bit depends on threads or ranks.
+/// Distance to the nearest point in f32, physical units, on the bricks of `set`, no value above `farthest`; on all
+/// ranks of the stage's engine. No bit depends on threads or ranks.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.

@@ -26,6 +26,8 @@ pub struct Reconstruction {
     pub hole: Option<Hole>,
     /// Number of spaces that the cloud encloses.
     pub spaces: usize,
+    /// Points held as thin shells, or as slits inside a body, since the surface would close over them.
+    pub sheet_points: u64,
     /// Number of voxels that were solved.
     pub band_voxels: u64,
     /// How the time loop ended.
@@ -66,7 +68,7 @@ pub fn reconstruct(
         Found::Nothing => return Err(encloses_nothing(grid)),
     };
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
-    let beta = enclosure.beta;
+    let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
     let mut band = enclosure.into_band(engine, "")?;
     let stage = engine.stage("level set", 0);
     stage.voxels(band.voxels);
@@ -74,7 +76,11 @@ pub fn reconstruct(
     let mut evolution = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
     // Where more smoothing was asked for, the surface leaves points because it shall.
     let keeps_points = settings.beta.is_none() && settings.motion.smooths_no_more_than_usual(&geometry);
-    if keeps_points && hold_what_was_lost(&stage, &geometry, cloud, &band)? {
+    let late = if keeps_points { hold_what_was_lost(&stage, &geometry, cloud, &band)? } else { Vec::new() };
+    if !late.is_empty() {
+        sheet.extend(late);
+        sheet.sort_unstable();
+        sheet.dedup();
         let again = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
         let (steps, sor_iterations) = (evolution.steps + again.steps, evolution.sor_iterations + again.sor_iterations);
         evolution = Evolution { steps, sor_iterations, ..again };
@@ -88,16 +94,26 @@ pub fn reconstruct(
     if let Some(store) = store {
         write_fields(engine, &geometry, &band, store)?;
     }
-    let band_voxels = band.voxels;
-    Ok(Reconstruction { geometry, beta, hole, spaces, band_voxels, evolution, measures, hausdorff, lost_points })
+    Ok(Reconstruction {
+        geometry,
+        beta,
+        hole,
+        spaces,
+        sheet_points: sheet.len() as u64,
+        band_voxels: band.voxels,
+        evolution,
+        measures,
+        hausdorff,
+        lost_points,
+    })
 }
 
-/// Holds the sheets that the surface has left by more than a voxel; returns whether there are any.
-fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]], band: &Band) -> Result<bool> {
+/// Holds the sheets that the surface has left by more than a voxel; returns their points.
+fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]], band: &Band) -> Result<Vec<u32>> {
     let off = surface::distances_to(stage, &band.u, geometry, cloud)?;
     let is_lost = |(_, off): &(u32, &Option<f64>)| off.is_some_and(|off| off > geometry.max_spacing());
     let lost: Vec<u32> = (0..).zip(&off).filter(is_lost).map(|(point, _)| point).collect();
-    Ok(!lost.is_empty() && hold_sheets(geometry, cloud, &lost, band) > 0)
+    Ok(hold_sheets(geometry, cloud, &lost, band))
 }
 
 fn write_fields(engine: &Engine, geometry: &Geometry, band: &Band, store: &StoreWriter) -> Result<()> {

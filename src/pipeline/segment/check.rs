@@ -29,7 +29,8 @@ pub fn check_marks(marks: &ObjectMarks, image: &Geometry) -> Result<Vec<String>>
             "give physical coordinates (voxel index times spacing), or correct the spacing with --image-spacing".into(),
         );
         return Err(Error::input(format!(
-            "{outside} of the {} marks of object {object} lie outside of the image: they span {}, the image {}; {advice}",
+            "{outside} of the {} marks of object {object} lie outside of the image: they span {}, the image {}; \
+             {advice}",
             points.len(),
             spans(&bounds(&points), image),
             spans(&extent(image), image)
@@ -42,7 +43,8 @@ pub fn check_marks(marks: &ObjectMarks, image: &Geometry) -> Result<Vec<String>>
     }
     if outside == 0 && whole_numbers(&points) && image.spacing.iter().any(|h| h.fract() != 0.0) {
         notes.push(format!(
-            "all marks of object {object} are whole numbers; if they are voxel indices, multiply them by the spacing {}",
+            "all marks of object {object} are whole numbers; if they are voxel indices, multiply them by the spacing \
+             {}",
             triple(image.spacing)
         ));
     }

@@ -100,22 +100,53 @@ pub(super) fn solve<T: Element>(
     };
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
     let beta = enclosure.beta;
-    let mut band = enclosure.into_band(engine, &suffix)?;
-    let edge_field = edge_field(engine, picture, marks, settings, &geometry, window, &band)?;
-    let stage = engine.stage(&name("level set", marks), 0);
-    stage.voxels(band.voxels);
-    let time_loop = settings.motion.time_loop(&geometry);
-    let evolution = evolve(&stage, engine, &mut band, edge_field.as_ref(), geometry.spacing, &time_loop)?;
-    stage.finish();
-    let Band { u, distance, voxels: band_voxels, .. } = band;
-    Ok(Solution { geometry, window, u, distance, cloud_points: cloud.len() as u64, beta, hole, band_voxels, evolution })
+    let band = enclosure.into_band(engine, &suffix)?;
+    Begun { geometry, window, band, cloud_points: cloud.len() as u64, beta, hole }
+        .solve(engine, picture, marks, settings)
+}
+
+/// An object before its surface moves.
+pub(super) struct Begun {
+    /// The grid of its box.
+    pub geometry: Geometry,
+    /// Its box in voxels of the image; may reach past it.
+    pub window: Box3,
+    /// What is solved, at its start.
+    pub band: Band,
+    /// Points of the cloud.
+    pub cloud_points: u64,
+    /// Where the start surface lies.
+    pub beta: f64,
+    /// The cloud's largest hole.
+    pub hole: Option<Hole>,
+}
+
+impl Begun {
+    /// Finds the image's edges around it and moves its surface to them.
+    pub(super) fn solve<T: Element>(
+        self,
+        engine: &Engine,
+        picture: &Picture<'_, T>,
+        marks: &ObjectMarks,
+        settings: &SegmentSettings,
+    ) -> Result<Solution> {
+        let Self { geometry, window, mut band, cloud_points, beta, hole } = self;
+        let edge_field = edge_field(engine, picture, marks, settings, &geometry, window, &band)?;
+        let stage = engine.stage(&name("level set", marks), 0);
+        stage.voxels(band.voxels);
+        let time_loop = settings.motion.time_loop(&geometry);
+        let evolution = evolve(&stage, engine, &mut band, edge_field.as_ref(), geometry.spacing, &time_loop)?;
+        stage.finish();
+        let Band { u, distance, voxels: band_voxels, .. } = band;
+        Ok(Solution { geometry, window, u, distance, cloud_points, beta, hole, band_voxels, evolution })
+    }
 }
 
 pub(super) fn name(what: &str, marks: &ObjectMarks) -> String {
     format!("{what} {}", marks.object)
 }
 
-pub(super) fn edge_field<T: Element>(
+fn edge_field<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
     marks: &ObjectMarks,
@@ -152,7 +183,7 @@ fn leak(marks: &ObjectMarks, settings: &SegmentSettings, saddle: f32, image: &Ge
 fn encloses_nothing(marks: &ObjectMarks) -> Error {
     let object = marks.object;
     Error::input(format!(
-        "the marks of object {object} enclose nothing at this spacing; mark its border all around, on every few slices, \
-         in the order of the contour"
+        "the marks of object {object} enclose nothing at this spacing; mark its border all around, on every few \
+         slices, in the order of the contour"
     ))
 }

@@ -66,7 +66,8 @@ fn run<T: Sample>(
     stage.finish();
     if settings.motion.rho > 0.0 && image.extremes[0] == image.extremes[1] {
         return Err(Error::input(format!(
-            "the image holds only the value {}; check --channel, --time and --crop, or give --rho 0 to use the marks alone",
+            "the image holds only the value {}; check --channel, --time and --crop, or give --rho 0 to use the marks \
+             alone",
             image.extremes[0]
         )));
     }
