@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::band::{Band, Reaches, make_band};
 use super::distance::{Method, Sources, cloud_distance};
 use super::pockets::pockets;
-use super::sheets::hold_sheets;
+use super::sheets::{Company, hold_sheets};
 use super::tagging::{Basin, tag};
 use super::vicinity::{Vicinity, voxel_bounds};
 use super::watershed::{Sides, watershed};
@@ -151,8 +151,10 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         }
         if !sides.basins.is_empty() && (all || enough(&sides)) {
             let reaches = Reaches { inner: half_width as f32, outer: half_width as f32 };
-            let sheet = hold_sheets(&around.vicinity.geometry, search.cloud, &sides.lost, &sides.inside);
-            return Ok(Found::Enclosed(Box::new(around.enclosed(0.0, reaches, sides.inside, sides.basins, sheet))));
+            let Sides { inside, basins, lost } = sides;
+            let geometry = &around.vicinity.geometry;
+            let sheet = hold_sheets(geometry, search.cloud, &lost, Company::AT_THE_START, &inside);
+            return Ok(Found::Enclosed(Box::new(around.enclosed(0.0, reaches, inside, basins, sheet))));
         }
         farthest *= 2.0;
     }

@@ -14,11 +14,26 @@ use crate::store::BrickArray;
 /// A voxel is held within so many largest spacings of a sheet's point, and of the lines between points beside each
 /// other.
 const HELD_VOXELS: f64 = 0.7;
-/// Points are a sheet where so many others are as near as so many largest spacings; what is fewer is noise.
-const NEIGHBOURS: usize = 3;
+/// Lines are as long as so many largest spacings at most.
 const NEAR_VOXELS: f64 = 6.0;
 /// Lines are drawn to so many nearest points: to those all around, on a sheet.
 const LINES: usize = 6;
+
+/// Which of the lost points are taken for a sheet: those with so many others of them so near; the rest is noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Company {
+    /// How many others.
+    others: usize,
+    /// How near, in largest spacings.
+    near: f64,
+}
+
+impl Company {
+    /// For points that have one side all around them before anything was solved.
+    pub(super) const AT_THE_START: Self = Self { others: 3, near: 6.0 };
+    /// For points that a solved surface has left: what sticks out by a voxel is two points or three.
+    pub(super) const AT_THE_END: Self = Self { others: 1, near: 3.0 };
+}
 
 /// Where sides are told, and voxels can be held on one.
 pub(super) trait Holds {
@@ -71,10 +86,16 @@ impl Holds for Band {
 
 /// Holds the voxels around those of the `lost` points that form sheets, and between them and their neighbours in the
 /// cloud, each on the side opposite to what is there; returns these points.
-pub(super) fn hold_sheets(geometry: &Geometry, positions: &[[f64; 3]], lost: &[u32], target: &impl Holds) -> Vec<u32> {
+pub(super) fn hold_sheets(
+    geometry: &Geometry,
+    positions: &[[f64; 3]],
+    lost: &[u32],
+    company: Company,
+    target: &impl Holds,
+) -> Vec<u32> {
     let tree = RTree::bulk_load(lost.iter().map(|&point| positions[point as usize]).collect());
-    let near = (NEAR_VOXELS * geometry.max_spacing()).powi(2);
-    let is_sheet = |p: [f64; 3]| tree.locate_within_distance(p, near).take(NEIGHBOURS + 1).count() > NEIGHBOURS;
+    let within = (company.near * geometry.max_spacing()).powi(2);
+    let is_sheet = |p| tree.locate_within_distance(p, within).take(company.others + 1).count() > company.others;
     // All sides are told before anything is held.
     let side = |&point: &u32| {
         let place = positions[point as usize];
@@ -87,6 +108,7 @@ pub(super) fn hold_sheets(geometry: &Geometry, positions: &[[f64; 3]], lost: &[u
     }
     let all = RTree::bulk_load(positions.to_vec());
     let mut touched = BTreeSet::new();
+    let longest = (NEAR_VOXELS * geometry.max_spacing()).powi(2);
     let step = 0.5 * geometry.min_spacing();
     for &(point, side) in &sheet {
         let from = positions[point as usize];
@@ -99,7 +121,8 @@ pub(super) fn hold_sheets(geometry: &Geometry, positions: &[[f64; 3]], lost: &[u
             }
         };
         hold(from);
-        for (to, squared) in all.nearest_neighbor_iter_with_distance_2(from).take(LINES + 1).filter(|n| n.1 <= near) {
+        for (to, squared) in all.nearest_neighbor_iter_with_distance_2(from).take(LINES + 1).filter(|n| n.1 <= longest)
+        {
             let steps = (squared.sqrt() / step).ceil();
             for n in 1..steps as u32 {
                 let part = f64::from(n) / steps;

@@ -11,9 +11,12 @@ use crate::pipeline::enclosure::{Found, Hole, Search, Start, enclose, first_reac
 use crate::pipeline::evolve::Evolution;
 use crate::pipeline::evolve_ranks::evolve_on_ranks;
 use crate::pipeline::pyramid::{Reduce, write_levels};
-use crate::pipeline::sheets::hold_sheets;
+use crate::pipeline::sheets::{Company, hold_sheets};
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::ElementType;
+
+/// Points farther from the solved surface than so many largest spacings have been left by it.
+const LEFT_VOXELS: f64 = 0.6;
 
 /// What a reconstruction found.
 #[derive(Clone, Debug)]
@@ -108,12 +111,12 @@ pub fn reconstruct(
     })
 }
 
-/// Holds the sheets that the surface has left by more than a voxel; returns their points.
+/// Holds what the surface has left; returns these points.
 fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]], band: &Band) -> Result<Vec<u32>> {
     let off = surface::distances_to(stage, &band.u, geometry, cloud)?;
-    let is_lost = |(_, off): &(u32, &Option<f64>)| off.is_some_and(|off| off > geometry.max_spacing());
+    let is_lost = |(_, off): &(u32, &Option<f64>)| off.is_some_and(|off| off > LEFT_VOXELS * geometry.max_spacing());
     let lost: Vec<u32> = (0..).zip(&off).filter(is_lost).map(|(point, _)| point).collect();
-    Ok(hold_sheets(geometry, cloud, &lost, band))
+    Ok(hold_sheets(geometry, cloud, &lost, Company::AT_THE_END, band))
 }
 
 fn write_fields(engine: &Engine, geometry: &Geometry, band: &Band, store: &StoreWriter) -> Result<()> {
