@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::distance_args::DistanceJobArgs;
+use super::middle_args::MiddleArgs;
 use super::reconstruct_args::ReconstructArgs;
 use super::values::{
     Crop, Output, parse_crop, parse_method, parse_pair, parse_seed, parse_size, parse_triple, solvers_help,
@@ -28,6 +29,9 @@ pub(super) enum Command {
     /// Compute the distance to point clouds and triangle meshes
     #[command(after_help = HELP_ON_DISTANCE)]
     Distance(Box<DistanceJobArgs>),
+    /// Compute the surface equally far from labelled point clouds and triangle meshes
+    #[command(after_help = HELP_ON_DISTANCE)]
+    Middle(Box<MiddleArgs>),
     /// Reconstruct a closed surface from a point cloud, without normals
     #[command(after_help = HELP_ON_DISTANCE)]
     Reconstruct(Box<ReconstructArgs>),

@@ -1,15 +1,16 @@
 //! `strandline distance`: reads the sources, lays the grid, says what it will take, runs, writes, tells what was found.
 
-use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 use half::f16;
-use serde::Serialize;
 
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::distance_args::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
+use super::distance_report::{Found, Settings, describe_found};
+use super::files::{export_mesh, mesh_format};
 use super::grid::grid;
 use super::report::{Ran, Report};
 use super::text::{bytes, duration, grouped, number, triple};
@@ -21,12 +22,14 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::{Source, read_source};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::precision::Precision;
-use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Needs, Schedule, Textbook, distance};
+use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, Textbook, distance};
+use crate::pipeline::middle::{LabelMode, MiddleSettings, SurfaceKind, middle};
 use crate::store::free_space;
 
 /// A distance that is ready to be computed: all inputs are read and checked.
 struct Job {
     args: DistanceJobArgs,
+    middle: Option<MiddleChoice>,
     typed: Vec<String>,
     settings: DistanceSettings,
     resources: Resources,
@@ -39,20 +42,29 @@ struct Job {
 
 /// Runs the command.
 pub(super) fn run(args: &DistanceJobArgs, typed: &[String]) -> Result<()> {
-    let job = Job::new(args.clone(), typed)?;
-    match args.field.precision {
-        PrecisionArg::F16 => job.run::<f16>(),
-        PrecisionArg::F32 => job.run::<f32>(),
-        PrecisionArg::F64 => job.run::<f64>(),
-    }
+    Job::new(args.clone(), None, typed)?.run_precise()
+}
+
+/// Runs `middle`: a distance with labels, and the surface between them.
+pub(super) fn run_middle(args: DistanceJobArgs, choice: MiddleChoice, typed: &[String]) -> Result<()> {
+    choice.mesh.as_deref().map(mesh_format).transpose()?;
+    Job::new(args, Some(choice), typed)?.run_precise()
+}
+
+/// What `middle` asks for beside the distance.
+pub(super) struct MiddleChoice {
+    pub(super) surface: SurfaceKind,
+    pub(super) labels: LabelMode,
+    pub(super) mesh: Option<PathBuf>,
 }
 
 impl Job {
-    fn new(args: DistanceJobArgs, typed: &[String]) -> Result<Self> {
+    fn new(args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[String]) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
         let mut settings = settings(&args)?;
-        config::check_outputs(&args.output.output, &[&args.output.report], args.output.overwrite)?;
+        let mesh = middle.as_ref().map_or(&None, |choice| &choice.mesh);
+        config::check_outputs(&args.output.output, &[&args.output.report, mesh], args.output.overwrite)?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
         let sets = read_sets(&args, &console)?;
@@ -66,12 +78,24 @@ impl Job {
             settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
         }
         let typed = typed.to_vec();
-        Ok(Self { args, typed, settings, resources, sets, geometry, console, cancel, started })
+        Ok(Self { args, middle, typed, settings, resources, sets, geometry, console, cancel, started })
+    }
+
+    fn run_precise(&self) -> Result<()> {
+        match self.args.field.precision {
+            PrecisionArg::F16 => self.run::<f16>(),
+            PrecisionArg::F32 => self.run::<f32>(),
+            PrecisionArg::F64 => self.run::<f64>(),
+        }
     }
 
     fn run<P: Precision>(&self) -> Result<()> {
         check_range::<P>(&self.geometry)?;
-        let needs = self.settings.needs::<P>(&self.geometry, &self.sets, self.resources.threads, self.args.ranks);
+        let (threads, ranks) = (self.resources.threads, self.args.ranks);
+        let needs = match self.middle_settings() {
+            Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks),
+            None => self.settings.needs::<P>(&self.geometry, &self.sets, threads, ranks),
+        };
         let plan = self.plan(&needs);
         if self.args.output.dry_run {
             print(&format!("{plan}\n"));
@@ -92,20 +116,46 @@ impl Job {
         Ok(())
     }
 
-    fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<DistanceFound> {
+    fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {
         let output = &self.args.output;
-        let store = output.output.path().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
-        let found = distance::<P>(engine, &self.geometry, &self.sets, &self.settings, store.as_ref())?;
+        let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
+        // A mesh comes out of a store, if only for a while.
+        let passing = tempfile::tempdir_in(&self.resources.scratch)
+            .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let target: Option<PathBuf> = match output.output.path() {
+            Some(path) => Some(path.to_path_buf()),
+            None => mesh.map(|_| passing.path().join("passing.zarr")),
+        };
+        let store = target.as_deref().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let found = self.solve::<P>(engine, store.as_ref())?;
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;
             store.finish()?;
+        }
+        if let (Some(mesh), Some(folder)) = (mesh, &target) {
+            export_mesh(&folder.join("meshes/surface.ply"), mesh)?;
         }
         match &output.report {
             Some(path) => self.report(engine, &found).write(path)?,
             None => engine.check()?,
         }
         Ok(found)
+    }
+
+    fn solve<P: Precision>(&self, engine: &Engine, store: Option<&StoreWriter>) -> Result<Found> {
+        let (geometry, sets) = (&self.geometry, &self.sets);
+        match self.middle_settings() {
+            Some(settings) => {
+                Ok(Found::of_middle(&middle::<P>(engine, geometry, sets, &settings, store)?, sets.count()))
+            }
+            None => Ok(Found::new(&distance::<P>(engine, geometry, sets, &self.settings, store)?)),
+        }
+    }
+
+    fn middle_settings(&self) -> Option<MiddleSettings> {
+        let MiddleChoice { surface, labels, .. } = *self.middle.as_ref()?;
+        Some(MiddleSettings { distance: self.settings, surface, labels })
     }
 
     /// Refuses a run that cannot fit memory or disk.
@@ -178,9 +228,9 @@ impl Job {
         )
     }
 
-    fn report(&self, engine: &Engine, found: &DistanceFound) -> Report<Settings, Found> {
+    fn report<'a>(&self, engine: &Engine, found: &'a Found) -> Report<Settings, &'a Found> {
         let ran = Ran {
-            command: "distance",
+            command: if self.middle.is_some() { "middle" } else { "distance" },
             typed: &self.typed,
             resources: &self.resources,
             console: &self.console,
@@ -188,7 +238,12 @@ impl Job {
             ranks: engine.ranks(),
             started: self.started,
         };
-        Report::new(&ran, Settings::new(&self.args, &self.settings, &self.resources), &self.geometry, Found::new(found))
+        Report::new(
+            &ran,
+            Settings::new(&self.args, self.middle.as_ref(), &self.settings, &self.resources),
+            &self.geometry,
+            found,
+        )
     }
 }
 
@@ -223,9 +278,9 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
             InitArg::Grid => Init::Grid,
         },
         farthest: field.max_distance,
-        signed: field.signed,
-        labels: field.labels,
-        closest_point: field.closest_point,
+        signed: args.choice.signed,
+        labels: args.choice.labels,
+        closest_point: args.choice.closest_point,
         brick: config::brick(args.resources.brick.unwrap_or(row.brick))?,
     })
 }
@@ -235,7 +290,7 @@ fn read_sets(args: &DistanceJobArgs, console: &Console) -> Result<DataSets> {
     let mut sets = DataSets::default();
     for path in &args.sources {
         match read_source(path)? {
-            Source::Cloud(_) if args.field.signed => {
+            Source::Cloud(_) if args.choice.signed => {
                 let what = "holds points, which have no inside; --signed needs triangle meshes";
                 return Err(Error::input(what).at(path));
             }
@@ -243,13 +298,13 @@ fn read_sets(args: &DistanceJobArgs, console: &Console) -> Result<DataSets> {
             Source::Mesh(mesh) => {
                 let edges = mesh.boundary_edges();
                 let name = path.display();
-                if args.field.signed && !edges.is_closed() {
+                if args.choice.signed && !edges.is_closed() {
                     console.note(&format!(
                         "{name} is open: {} boundary edges; inside is where it winds around more than half",
                         grouped(edges.open)
                     ));
                 }
-                if args.field.signed && !edges.is_oriented() {
+                if args.choice.signed && !edges.is_oriented() {
                     console.note(&format!(
                         "{name} has {} edges whose triangles disagree on what is outside; signs there may be wrong",
                         grouped(edges.flipped)
@@ -277,95 +332,4 @@ fn check_range<P: Precision>(geometry: &Geometry) -> Result<()> {
         number(diagonal),
         P::TYPE.name()
     )))
-}
-
-fn describe_found(found: &DistanceFound) -> String {
-    let mut lines = vec![format!(
-        "largest distance {}; {} voxels fixed by sources, {} not reached",
-        number(found.max),
-        grouped(found.fixed_voxels),
-        grouped(found.unlabelled_voxels)
-    )];
-    let triangles = found.triangle_distances;
-    lines.extend(triangles.map(|n| format!("{} distances to triangles were computed to fix voxels", grouped(n))));
-    lines.extend(found.label_voxels.iter().map(|(label, n)| format!("label {label}: {} voxels", grouped(*n))));
-    lines.join("\n") + "\n"
-}
-
-/// Every setting, also those that nobody gave; lengths physical.
-#[derive(Debug, Serialize)]
-struct Settings {
-    sources: Vec<String>,
-    output: Option<String>,
-    method: &'static str,
-    schedule: &'static str,
-    neighbours: u32,
-    iterations: Option<u32>,
-    init: &'static str,
-    precision: &'static str,
-    max_distance: Option<f64>,
-    signed: bool,
-    labels: bool,
-    closest_point: bool,
-    brick: i64,
-    scratch: String,
-}
-
-impl Settings {
-    fn new(args: &DistanceJobArgs, settings: &DistanceSettings, resources: &Resources) -> Self {
-        let (schedule, iterations) = match settings.schedule {
-            Schedule::Front => ("front", None),
-            Schedule::Sweep { iterations } => ("sweep", Some(iterations)),
-        };
-        Self {
-            sources: args.sources.iter().map(|path| path.display().to_string()).collect(),
-            output: args.output.output.path().map(|path| path.display().to_string()),
-            method: settings.method.name(),
-            schedule,
-            neighbours: match settings.neighbours {
-                Neighbours::Faces => 6,
-                Neighbours::All => 26,
-            },
-            iterations,
-            init: match settings.init {
-                Init::Cell => "cell",
-                Init::Contiguous => "contiguous",
-                Init::Grid => "grid",
-            },
-            precision: match args.field.precision {
-                PrecisionArg::F16 => "f16",
-                PrecisionArg::F32 => "f32",
-                PrecisionArg::F64 => "f64",
-            },
-            max_distance: settings.farthest,
-            signed: settings.signed,
-            labels: settings.labels,
-            closest_point: settings.closest_point,
-            brick: settings.brick,
-            scratch: resources.scratch.display().to_string(),
-        }
-    }
-}
-
-/// What was found.
-#[derive(Debug, Serialize)]
-struct Found {
-    max: f64,
-    fixed_voxels: u64,
-    unlabelled_voxels: u64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    triangle_distances: Option<u64>,
-    label_voxels: BTreeMap<String, u64>,
-}
-
-impl Found {
-    fn new(found: &DistanceFound) -> Self {
-        Self {
-            max: found.max,
-            fixed_voxels: found.fixed_voxels,
-            unlabelled_voxels: found.unlabelled_voxels,
-            triangle_distances: found.triangle_distances,
-            label_voxels: found.label_voxels.iter().map(|(label, n)| (label.to_string(), *n)).collect(),
-        }
-    }
 }

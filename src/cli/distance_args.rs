@@ -21,6 +21,8 @@ pub(super) struct DistanceJobArgs {
     #[command(flatten)]
     pub(super) field: FieldArgs,
     #[command(flatten)]
+    pub(super) choice: ChoiceArgs,
+    #[command(flatten)]
     pub(super) resources: ResourceArgs,
     /// Ranks that share the bricks, each a thread with files of its own; results do not depend on it
     #[arg(long, value_name = "N", default_value_t = 1, hide = true)]
@@ -51,7 +53,7 @@ pub(super) struct GridArgs {
     pub(super) like: Option<PathBuf>,
 }
 
-/// Which fields, and how they are computed.
+/// How distance is computed.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Distance")]
 pub(super) struct FieldArgs {
@@ -77,6 +79,12 @@ pub(super) struct FieldArgs {
     /// As far as this length; voxels farther away hold it [default: everywhere]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(super) max_distance: Option<f64>,
+}
+
+/// Which fields beside or instead of the plain distance.
+#[derive(Clone, Copy, Debug, Default, Args)]
+#[command(next_help_heading = "Distance")]
+pub(super) struct ChoiceArgs {
     /// Negative inside closed meshes
     #[arg(long)]
     pub(super) signed: bool,
@@ -145,7 +153,7 @@ pub(super) enum PrecisionArg {
 }
 
 /// The line of the help that lists the formats.
-fn sources_help() -> String {
+pub(super) fn sources_help() -> String {
     let list: Vec<&str> = crate::io::sources::FORMATS.iter().map(|format| format.name).collect();
     format!("Point clouds and triangle meshes ({}), told apart by content", list.join(", "))
 }

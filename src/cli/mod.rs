@@ -9,11 +9,14 @@ mod console;
 mod demo;
 mod distance;
 mod distance_args;
+mod distance_report;
 mod files;
 mod grid;
 mod info;
 mod input;
 mod measure;
+mod middle;
+mod middle_args;
 mod picture;
 mod reconstruct;
 mod reconstruct_args;
@@ -63,6 +66,7 @@ fn execute(cli: Cli, typed: &[String]) -> Result<()> {
     match cli.command {
         Command::Segment(args) => segment::run(&args, typed),
         Command::Distance(args) => distance::run(&args, typed),
+        Command::Middle(args) => middle::run(&args, typed),
         Command::Reconstruct(args) => reconstruct::run(&args, typed),
         Command::Demo(args) => demo::run(&args, typed),
         Command::Measure(args) => measure::run(&args),

@@ -91,6 +91,11 @@ impl DataSets {
         self.sets.iter().map(|set| set[0].clone())
     }
 
+    /// The places of each data set's points and of its triangles, one of them empty; triangles counted from 0.
+    pub fn places(&self) -> impl Iterator<Item = [Range<u32>; 2]> + '_ {
+        self.sets.iter().cloned()
+    }
+
     /// The label of a source: that of its data set; 0 for a number that is no source.
     #[must_use]
     pub fn label(&self, source: u32) -> u32 {

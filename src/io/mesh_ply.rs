@@ -20,6 +20,7 @@ const BUFFER: usize = 1 << 18;
 pub struct PlyWriter {
     path: PathBuf,
     unit: Option<String>,
+    is_tagged: bool,
     /// The header, or at first the room for it, and the vertices.
     file: BufWriter<NamedTempFile>,
     triangles: BufWriter<File>,
@@ -35,15 +36,27 @@ impl PlyWriter {
     /// # Errors
     /// When no file can be made in that folder.
     pub fn create(path: &Path, unit: Option<&str>) -> Result<Self> {
+        Self::start(path, unit, false)
+    }
+
+    /// As `create`; each triangle has the properties `label_low` and `label_high`, the labels that it separates.
+    ///
+    /// # Errors
+    /// When no file can be made in that folder.
+    pub fn create_tagged(path: &Path, unit: Option<&str>) -> Result<Self> {
+        Self::start(path, unit, true)
+    }
+
+    fn start(path: &Path, unit: Option<&str>, is_tagged: bool) -> Result<Self> {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
         let start = || -> io::Result<_> {
             let mut file = BufWriter::with_capacity(BUFFER, scratch_file(folder)?);
-            file.write_all(&header(unit, u64::MAX, u64::MAX))?;
+            file.write_all(&header(unit, is_tagged, u64::MAX, u64::MAX))?;
             Ok((file, BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?)))
         };
         let (file, triangles) = start().map_err(|e| unwritable(&e, path))?;
         let unit = unit.map(ToOwned::to_owned);
-        Ok(Self { path: path.to_path_buf(), unit, file, triangles, vertex_count: 0, triangle_count: 0 })
+        Ok(Self { path: path.to_path_buf(), unit, is_tagged, file, triangles, vertex_count: 0, triangle_count: 0 })
     }
 
     /// Completes the file and puts it under its name, in place of any file that was there.
@@ -61,7 +74,7 @@ impl PlyWriter {
         triangles.seek(SeekFrom::Start(0))?;
         io::copy(&mut triangles, file.as_file_mut())?;
         file.seek(SeekFrom::Start(0))?;
-        file.write_all(&header(self.unit.as_deref(), self.vertex_count, self.triangle_count))?;
+        file.write_all(&header(self.unit.as_deref(), self.is_tagged, self.vertex_count, self.triangle_count))?;
         file.as_file().sync_all()?;
         file.persist(&self.path).map_err(|e| e.error)?;
         Ok(())
@@ -86,23 +99,33 @@ impl MeshSink for PlyWriter {
         self.triangle_count += 1;
         self.triangles.write_all(&bytes).map_err(|e| unwritable(&e, &self.path))
     }
+
+    fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> Result<()> {
+        self.triangle(corners)?;
+        if !self.is_tagged {
+            return Ok(());
+        }
+        let bytes = labels.map(u32::to_le_bytes).concat();
+        self.triangles.write_all(&bytes).map_err(|e| unwritable(&e, &self.path))
+    }
 }
 
 /// The header, of one length for all counts.
-fn header(unit: Option<&str>, vertices: u64, triangles: u64) -> Vec<u8> {
-    let longest = header_text(unit, u64::MAX, u64::MAX, 0).len();
-    let padding = longest - header_text(unit, vertices, triangles, 0).len();
-    header_text(unit, vertices, triangles, padding).into_bytes()
+fn header(unit: Option<&str>, is_tagged: bool, vertices: u64, triangles: u64) -> Vec<u8> {
+    let longest = header_text(unit, is_tagged, u64::MAX, u64::MAX, 0).len();
+    let padding = longest - header_text(unit, is_tagged, vertices, triangles, 0).len();
+    header_text(unit, is_tagged, vertices, triangles, padding).into_bytes()
 }
 
-fn header_text(unit: Option<&str>, vertices: u64, triangles: u64, padding: usize) -> String {
+fn header_text(unit: Option<&str>, is_tagged: bool, vertices: u64, triangles: u64, padding: usize) -> String {
     // A line end in the unit would end the comment. Signed indices are what most readers expect.
     let unit = unit.map_or(String::new(), |u| format!("comment unit {}\n", u.replace(char::is_control, " ")));
     let index = if vertices <= 1 << 31 { "int" } else { "uint" };
+    let tags = if is_tagged { "property uint label_low\nproperty uint label_high\n" } else { "" };
     format!(
         "ply\nformat binary_little_endian 1.0\ncomment made by strandline\n{unit}comment {:padding$}\n\
          element vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
-         element face {triangles}\nproperty list uchar {index} vertex_indices\nend_header\n",
+         element face {triangles}\nproperty list uchar {index} vertex_indices\n{tags}end_header\n",
         ""
     )
 }
@@ -129,12 +152,13 @@ mod tests {
 
     #[test]
     fn headers_have_one_length() {
-        for unit in [None, Some("micrometer"), Some("two\nlines")] {
-            let sizes = [(0, 0), (7, 12), (1 << 31, 9), (u64::MAX, u64::MAX)].map(|(v, t)| header(unit, v, t).len());
+        for (unit, tags) in [(None, false), (Some("micrometer"), true), (Some("two\nlines"), false)] {
+            let counts = [(0, 0), (7, 12), (1 << 31, 9), (u64::MAX, u64::MAX)];
+            let sizes = counts.map(|(v, t)| header(unit, tags, v, t).len());
             assert!(sizes.iter().all(|&size| size == sizes[0]), "{sizes:?}");
         }
-        let text = String::from_utf8(header(Some("a\nb"), 1 << 31, 1)).unwrap();
+        let text = String::from_utf8(header(Some("a\nb"), false, 1 << 31, 1)).unwrap();
         assert!(text.contains("comment unit a b\n") && text.contains("uchar int "));
-        assert!(String::from_utf8(header(None, (1 << 31) + 1, 1)).unwrap().contains("uchar uint "));
+        assert!(String::from_utf8(header(None, true, (1 << 31) + 1, 1)).unwrap().contains("uchar uint "));
     }
 }

@@ -11,6 +11,7 @@ pub mod image_terms;
 pub mod ingest;
 pub mod intensity;
 pub mod marks;
+pub mod middle;
 pub mod motion;
 mod pockets;
 pub mod pyramid;

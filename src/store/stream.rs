@@ -61,6 +61,14 @@ pub trait MeshSink {
     /// # Errors
     /// When the triangle cannot be written.
     fn triangle(&mut self, corners: [u32; 3]) -> Result<()>;
+
+    /// Takes a triangle that separates two labels.
+    ///
+    /// # Errors
+    /// When the triangle cannot be written.
+    fn facet(&mut self, corners: [u32; 3], _labels: [u32; 2]) -> Result<()> {
+        self.triangle(corners)
+    }
 }
 
 /// A triangle mesh in memory.

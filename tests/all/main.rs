@@ -17,6 +17,7 @@ mod level_set;
 mod maximum_principle;
 mod mesh_ply;
 mod mesh_sources;
+mod middle;
 mod points;
 mod ranks;
 mod reconstruct;

@@ -7,19 +7,21 @@ use std::path::Path;
 const BUFFER: usize = 1 << 18;
 const VERTEX_BYTES: u64 = 12;
 
-/// Vertices as three f32 each, then triangles as a count byte and three indices; little-endian.
+/// Vertices as three f32 each, then triangles as a count byte and three indices, and two labels where they have any;
+/// little-endian.
 pub(super) struct Written {
     file: BufReader<File>,
     /// Where the vertices begin.
     start: u64,
     pub(super) vertices: u64,
     pub(super) triangles: u64,
+    pub(super) is_tagged: bool,
 }
 
 impl Written {
     pub(super) fn open(path: &Path) -> io::Result<Self> {
         let mut file = BufReader::with_capacity(BUFFER, File::open(path)?);
-        let (mut start, mut counts) = (0, [0; 2]);
+        let (mut start, mut counts, mut is_tagged) = (0, [0; 2], false);
         loop {
             let mut line = String::new();
             let read = file.read_line(&mut line)?;
@@ -32,9 +34,10 @@ impl Written {
                     *count = number.trim().parse().map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
                 }
             }
+            is_tagged |= line == "property uint label_low\n";
             if line == "end_header\n" {
                 let [vertices, triangles] = counts;
-                return Ok(Self { file, start, vertices, triangles });
+                return Ok(Self { file, start, vertices, triangles, is_tagged });
             }
         }
     }
@@ -50,11 +53,16 @@ impl Written {
     }
 
     pub(super) fn each_triangle(&mut self, mut f: impl FnMut([u32; 3]) -> io::Result<()>) -> io::Result<()> {
+        self.each_facet(|corners, _| f(corners))
+    }
+
+    /// Each triangle with its two labels, which are 0 where it has none.
+    pub(super) fn each_facet(&mut self, mut f: impl FnMut([u32; 3], [u32; 2]) -> io::Result<()>) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(self.start + VERTEX_BYTES * self.vertices))?;
         for _ in 0..self.triangles {
-            let mut bytes = [0; 13];
-            self.file.read_exact(&mut bytes)?;
-            f(words(&bytes[1..]).map(u32::from_le_bytes))?;
+            let mut bytes = [0; 21];
+            self.file.read_exact(if self.is_tagged { &mut bytes } else { &mut bytes[..13] })?;
+            f(words(&bytes[1..]).map(u32::from_le_bytes), words(&bytes[13..]).map(u32::from_le_bytes))?;
         }
         Ok(())
     }
@@ -66,6 +74,7 @@ impl Written {
     }
 }
 
-fn words(bytes: &[u8]) -> [[u8; 4]; 3] {
+/// As many words of 4 bytes as are asked for.
+fn words<const N: usize>(bytes: &[u8]) -> [[u8; 4]; N] {
     std::array::from_fn(|n| std::array::from_fn(|i| bytes[4 * n + i]))
 }

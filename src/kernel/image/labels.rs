@@ -1,8 +1,8 @@
-//! Label volumes: painting an object where its segmentation function says so, and counting voxels.
+//! Label volumes: painting an object where its segmentation function says so, counting voxels, borders.
 
 use std::collections::BTreeMap;
 
-use crate::grid::Box3;
+use crate::grid::{Box3, FACES};
 use crate::store::Element;
 
 /// Writes `label` into `out` where u is at least 1/2. `u` is dense `[z][y][x]` over the box `from`, `out` over the box
@@ -24,6 +24,22 @@ pub fn count(labels: &[u32]) -> BTreeMap<u32, u64> {
         *counts.entry(run[0]).or_default() += run.len() as u64;
     }
     counts
+}
+
+/// Keeps the labels of voxels that have a face neighbour of another label, and sets all others to the default. `labels` is
+/// dense over `around`, which reaches one voxel around `part` but for the domain's end; `out` is dense over `part`.
+pub fn border<T: Copy + Default + PartialEq>(labels: &[T], around: &Box3, part: &Box3, out: &mut [T]) {
+    let strides = [1, around.shape()[0] as usize, (around.shape()[0] * around.shape()[1]) as usize];
+    let rows = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
+    for (out, voxel) in out.iter_mut().zip(rows) {
+        let at = around.offset_of(voxel);
+        let differs = FACES.into_iter().any(|face| {
+            let (here, stride) = (voxel[face.axis], strides[face.axis]);
+            let has_next = if face.upper { here + 1 < around.hi[face.axis] } else { here > around.lo[face.axis] };
+            has_next && labels[if face.upper { at + stride } else { at - stride }] != labels[at]
+        });
+        *out = if differs { labels[at] } else { T::default() };
+    }
 }
 
 #[cfg(test)]

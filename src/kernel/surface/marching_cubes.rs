@@ -3,8 +3,8 @@
 //! A cell is a cube of 2x2x2 neighbouring voxel centres; it belongs to the brick that holds its lowest corner.
 //! A voxel is inside when `u >= level`. Triangles point outward, from inside to outside (counter-clockwise).
 
-use super::edge_key::{EdgeKey, EdgeKeys};
 use super::tables::{CASES, axis_of, lower_corner};
+use super::vertex_key::{VertexKey, VertexKeys};
 use crate::grid::Box3;
 
 /// How close to a voxel centre a vertex may come, in voxels. Where a voxel has exactly the level, the vertices
@@ -18,17 +18,25 @@ const NO_VERTEX: u32 = u32::MAX;
 pub struct Patch {
     /// The cells that were walked, by their lowest corners.
     pub cells: Box3,
-    /// The grid edge each vertex lies on.
-    pub keys: Vec<EdgeKey>,
+    /// What each vertex lies on or within.
+    pub keys: Vec<VertexKey>,
     /// Positions of the vertices in voxel units of the domain, whole numbers at voxel centres, `[x, y, z]`.
     pub positions: Vec<[f64; 3]>,
     /// Triangles as places in `keys` and `positions`, counter-clockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// The two labels that each triangle separates, the smaller first; empty where there are no labels.
+    pub pairs: Vec<[u32; 2]>,
 }
 
 impl Default for Patch {
     fn default() -> Self {
-        Self { cells: Box3::from_shape([0; 3]), keys: Vec::new(), positions: Vec::new(), triangles: Vec::new() }
+        Self {
+            cells: Box3::from_shape([0; 3]),
+            keys: Vec::new(),
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            pairs: Vec::new(),
+        }
     }
 }
 
@@ -50,7 +58,7 @@ pub fn cells_of_brick(brick: &Box3, shape: [i64; 3], closed_at_border: bool) -> 
 #[derive(Clone, Debug)]
 pub struct MarchingCubes {
     level: f32,
-    keys: EdgeKeys,
+    keys: VertexKeys,
     /// The vertex on each edge of the tile, by `3 * (place of the lower voxel) + axis`.
     vertex_on: Vec<u32>,
 }
@@ -59,7 +67,7 @@ impl MarchingCubes {
     /// For a domain of `shape` voxels, `[x, y, z]`, and the surface `u = level`.
     #[must_use]
     pub fn new(shape: [i64; 3], level: f32) -> Self {
-        Self { level, keys: EdgeKeys::new(shape), vertex_on: Vec::new() }
+        Self { level, keys: VertexKeys::new(shape), vertex_on: Vec::new() }
     }
 
     /// Fills `patch` with the surface in `cells`, given by their lowest corners.
@@ -122,7 +130,7 @@ impl MarchingCubes {
             let mut position = lower.map(|v| v as f64);
             position[axis] += fraction(tile.values[place], tile.values[tile.part.offset_of(upper)], self.level);
             *vertex = patch.keys.len() as u32;
-            patch.keys.push(self.keys.key(lower, axis));
+            patch.keys.push(self.keys.on_edge(lower, axis));
             patch.positions.push(position);
         }
         *vertex

@@ -4,20 +4,27 @@
 //! [`SurfaceMeasure`] sums volume and area as the triangles pass, [`PatchIndex`] answers how far points lie from them.
 
 mod components;
-mod edge_key;
+mod creases;
 mod edge_tally;
+mod equidistant;
+mod interfaces;
 mod marching_cubes;
 mod measure;
 mod nearest;
+mod pairs;
 mod tables;
+mod vertex_key;
 mod weld;
 
 pub use components::Components;
-pub use edge_key::{EdgeKey, EdgeKeys};
 pub use edge_tally::EdgeTally;
+pub use equidistant::{Between, Known};
+pub use interfaces::{Interfaces, TaggedPatch};
 pub use marching_cubes::{MarchingCubes, Patch, cells_of_brick};
 pub use measure::{Measures, SurfaceMeasure};
 pub use nearest::{Hausdorff, Nearest, PatchIndex};
+pub use pairs::{Pair, Pairs};
+pub use vertex_key::{VertexKey, VertexKeys};
 pub use weld::Welder;
 
 pub use crate::kernel::triangle::Triangle;

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::edge_key::{EdgeKey, EdgeKeys};
 use super::marching_cubes::Patch;
+use super::vertex_key::{VertexKey, VertexKeys};
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry};
 use crate::store::MeshSink;
@@ -17,9 +17,9 @@ const VERTEX_LIMIT: u64 = u32::MAX as u64;
 #[derive(Clone, Debug)]
 pub struct Welder {
     geometry: Geometry,
-    keys: EdgeKeys,
+    keys: VertexKeys,
     /// Numbers of the vertices that a later patch may share.
-    shared: HashMap<EdgeKey, u32>,
+    shared: HashMap<VertexKey, u32>,
     /// The z index at which the current layer of cells starts.
     layer: i64,
     vertices: u64,
@@ -35,7 +35,7 @@ impl Welder {
     pub fn new(geometry: &Geometry) -> Self {
         Self {
             geometry: geometry.clone(),
-            keys: EdgeKeys::new(geometry.shape),
+            keys: VertexKeys::new(geometry.shape),
             shared: HashMap::new(),
             layer: i64::MIN,
             vertices: 0,
@@ -71,8 +71,12 @@ impl Welder {
             self.numbers.push(number);
             self.world.push(world);
         }
-        for triangle in &patch.triangles {
-            sink.triangle(triangle.map(|v| self.numbers[v as usize]))?;
+        for (n, triangle) in patch.triangles.iter().enumerate() {
+            let corners = triangle.map(|v| self.numbers[v as usize]);
+            match patch.pairs.get(n) {
+                Some(&pair) => sink.facet(corners, pair)?,
+                None => sink.triangle(corners)?,
+            }
         }
         self.triangles += patch.triangles.len() as u64;
         Ok(())
@@ -94,7 +98,7 @@ impl Welder {
     }
 
     /// The number of a vertex: the one a former patch gave it, or the next one.
-    fn number(&mut self, key: EdgeKey, cells: &Box3, world: [f32; 3], sink: &mut dyn MeshSink) -> Result<u32> {
+    fn number(&mut self, key: VertexKey, cells: &Box3, world: [f32; 3], sink: &mut dyn MeshSink) -> Result<u32> {
         let is_shared = self.touches_border(key, cells);
         if is_shared && let Some(&number) = self.shared.get(&key) {
             return Ok(number);
@@ -113,10 +117,10 @@ impl Welder {
         Ok(number)
     }
 
-    /// True when the edge lies in a face of the box of cells, so that a cell of another brick has it too.
-    fn touches_border(&self, key: EdgeKey, cells: &Box3) -> bool {
-        let (lower, axis) = self.keys.edge(key);
-        (0..3).any(|a| a != axis && (lower[a] == cells.lo[a] || lower[a] == cells.hi[a]))
+    /// True when the vertex lies in a face of the box of cells, so that a cell of another brick has it too.
+    fn touches_border(&self, key: VertexKey, cells: &Box3) -> bool {
+        let (first, spans) = self.keys.extent(key);
+        (0..3).any(|a| !spans[a] && (first[a] == cells.lo[a] || first[a] == cells.hi[a]))
     }
 
     fn to_world(&self, position: [f64; 3]) -> [f32; 3] {

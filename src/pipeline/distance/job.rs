@@ -84,6 +84,55 @@ pub fn distance<P: Precision>(
     settings: &DistanceSettings,
     store: Option<&StoreWriter>,
 ) -> Result<DistanceFound> {
+    solve_sets::<P, _>(engine, geometry, sets, settings, |mut solved, set| {
+        if settings.signed {
+            let values = Arc::new(Signed::new(&solved, geometry, WindingTree::new(&sets.mesh), &sets.mesh));
+            solved = Solved { values, ..solved };
+        }
+        let found = measure(engine, geometry, sets, settings, &solved, set)?;
+        if let Some(store) = store {
+            write_fields(engine, geometry, sets, settings, &solved, found.max, store)?;
+        }
+        Ok(found)
+    })
+}
+
+/// Looks at all voxels of a solved distance, for the report.
+///
+/// # Errors
+/// When the run is interrupted.
+pub fn measure<P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    settings: &DistanceSettings,
+    solved: &Solved<'_, P>,
+    set: &Arc<BrickSet>,
+) -> Result<DistanceFound> {
+    let stage = engine.stage("measure", set.len() as u64);
+    stage.voxels(geometry.domain().volume());
+    let (measured, label_voxels) = solved.measure(&stage, set, settings.labels.then_some(sets))?;
+    stage.finish();
+    Ok(DistanceFound {
+        max: measured.max,
+        fixed_voxels: solved.fixed_voxels,
+        unlabelled_voxels: measured.unlabelled_voxels,
+        triangle_distances: (!sets.mesh.is_empty()).then_some(solved.triangle_distances),
+        label_voxels,
+    })
+}
+
+/// Computes the distance to `sets` on a grid, stored as `P`, and hands it on, with the bricks it was solved on.
+///
+/// # Errors
+/// When no source touches the grid, scratch runs out or the run is interrupted, or by what it is handed to.
+pub fn solve_sets<P: Precision, R>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    settings: &DistanceSettings,
+    then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
+) -> Result<R> {
     let grid = BrickGrid::new(geometry.shape, settings.brick);
     let set = Arc::new(BrickSet::dense(grid));
     let stage = engine.stage("sort sources", 0);
@@ -106,32 +155,14 @@ pub fn distance<P: Precision>(
         neighbours: settings.neighbours,
         sources: settings.keeps_sources(),
     };
-    let mut solved = solve::<P>(&stage, &sources, &set, settings.method, settings.schedule, options)?;
+    let solved = solve::<P>(&stage, &sources, &set, settings.method, settings.schedule, options)?;
     stage.finish();
     if solved.fixed_voxels == 0 {
         return Err(Error::input(
             "no source lies in the grid; check --origin, --shape and --spacing against the coordinates of the files",
         ));
     }
-    if settings.signed {
-        let values = Arc::new(Signed::new(&solved, geometry, WindingTree::new(&sets.mesh), &sets.mesh));
-        solved = Solved { values, ..solved };
-    }
-    let stage = engine.stage("measure", set.len() as u64);
-    stage.voxels(geometry.domain().volume());
-    let labels = settings.labels.then_some(sets);
-    let (measured, label_voxels) = solved.measure(&stage, &set, labels)?;
-    stage.finish();
-    if let Some(store) = store {
-        write_fields(engine, geometry, sets, settings, &solved, measured.max, store)?;
-    }
-    Ok(DistanceFound {
-        max: measured.max,
-        fixed_voxels: solved.fixed_voxels,
-        unlabelled_voxels: measured.unlabelled_voxels,
-        triangle_distances: triangles.is_some().then_some(solved.triangle_distances),
-        label_voxels,
-    })
+    then(solved, &set)
 }
 
 /// The voxels that the points of each data set fix.

@@ -24,8 +24,9 @@ mod trace;
 use std::sync::Arc;
 
 pub use field::{Measured, Solved};
-pub use job::{DistanceFound, DistanceSettings, Init, distance};
+pub use job::{DistanceFound, DistanceSettings, Init, distance, measure, solve_sets};
 pub use needs::Needs;
+pub use output::{NearestLabels, write_fields, write_label_field};
 pub use ranks::solve;
 pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};
 pub use sources::Sources;

@@ -14,7 +14,10 @@ use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::store::{BoxSource, Element, ElementType};
 
 /// Writes all fields that the settings ask for.
-pub(super) fn write_fields<P: Precision>(
+///
+/// # Errors
+/// When the output cannot be written or the run is interrupted.
+pub fn write_fields<P: Precision>(
     engine: &Engine,
     geometry: &Geometry,
     sets: &DataSets,
@@ -30,11 +33,8 @@ pub(super) fn write_fields<P: Precision>(
     write_levels::<P>(&stage, engine, image.levels(), &*solved.values, Reduce::Mean)?;
     stage.finish();
     if settings.labels {
-        match sets.count() {
-            0..=0xff => write_labels::<u8, P>(engine, geometry, sets, solved, store)?,
-            0x100..=0xffff => write_labels::<u16, P>(engine, geometry, sets, solved, store)?,
-            _ => write_labels::<u32, P>(engine, geometry, sets, solved, store)?,
-        }
+        let nearest = NearestLabels { sources: &*solved.sources, sets };
+        write_label_field(engine, geometry, sets, "nearest", &nearest, store)?;
     }
     if settings.closest_point {
         let triangles: Vec<_> = (0..sets.mesh.len()).map(|n| Triangle::new(sets.mesh.corners(n))).collect();
@@ -51,11 +51,34 @@ pub(super) fn write_fields<P: Precision>(
     Ok(())
 }
 
-fn write_labels<T: Element, P: Precision>(
+/// Writes a label volume of that name, in the smallest type that holds all labels.
+///
+/// # Errors
+/// When the output cannot be written or the run is interrupted.
+pub fn write_label_field<L>(
     engine: &Engine,
     geometry: &Geometry,
     sets: &DataSets,
-    solved: &Solved<'_, P>,
+    name: &str,
+    labels: &L,
+    store: &StoreWriter,
+) -> Result<()>
+where
+    L: BoxSource<u8> + BoxSource<u16> + BoxSource<u32>,
+{
+    match sets.count() {
+        0..=0xff => write_labels::<u8>(engine, geometry, sets, name, labels, store),
+        0x100..=0xffff => write_labels::<u16>(engine, geometry, sets, name, labels, store),
+        _ => write_labels::<u32>(engine, geometry, sets, name, labels, store),
+    }
+}
+
+fn write_labels<T: Element>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    name: &str,
+    labels: &dyn BoxSource<T>,
     store: &StoreWriter,
 ) -> Result<()> {
     let color = |label: u32| {
@@ -63,28 +86,30 @@ fn write_labels<T: Element, P: Precision>(
         LabelColor { label, rgba: [red, green, blue, 255] }
     };
     let colors: Vec<LabelColor> = (1..=sets.count() as u32).map(color).collect();
-    let image = store.labels(&LabelSpec { name: "nearest", geometry, element: T::TYPE, colors: &colors })?;
-    let stage = engine.stage("write labels", 0);
+    let image = store.labels(&LabelSpec { name, geometry, element: T::TYPE, colors: &colors })?;
+    let stage = engine.stage(&format!("write {name}"), 0);
     stage.voxels(geometry.domain().volume());
-    write_levels::<T>(&stage, engine, image.levels(), &Labels { solved, sets }, Reduce::Mode)?;
+    write_levels::<T>(&stage, engine, image.levels(), labels, Reduce::Mode)?;
     stage.finish();
     Ok(())
 }
 
 /// The label of each voxel's nearest data set; 0 where no source is known.
-struct Labels<'a, 'b, P> {
-    solved: &'a Solved<'b, P>,
-    sets: &'a DataSets,
+pub struct NearestLabels<'a> {
+    /// The nearest source of each voxel.
+    pub sources: &'a dyn BoxSource<u32>,
+    /// What the sources belong to.
+    pub sets: &'a DataSets,
 }
 
-impl<T: Element, P: Precision> BoxSource<T> for Labels<'_, '_, P> {
+impl<T: Element> BoxSource<T> for NearestLabels<'_> {
     fn shape(&self) -> [i64; 3] {
-        self.solved.sources.shape()
+        self.sources.shape()
     }
 
     fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
         let mut sources = vec![NO_SOURCE; part.len()];
-        self.solved.sources.read_box(part, &mut sources)?;
+        self.sources.read_box(part, &mut sources)?;
         let label = |&source: &u32| T::from_f64(f64::from(self.sets.label(source)));
         out.iter_mut().zip(&sources).for_each(|(out, source)| *out = label(source));
         Ok(())

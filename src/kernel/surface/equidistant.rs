@@ -1,0 +1,308 @@
+//! Where the surface between labels passes between neighbouring voxels: the place that is equally far from the nearest
+//! sources of each label (algorithms: section 4, "Beyond the papers").
+//!
+//! Near the place are the sources that the voxels of a label track, one voxel around; with them the place is found, the
+//! nearest source of each label is looked up there, and it is found again if one of these is new.
+//! On an edge the difference of two exact distances is brought to zero (regula falsi, Illinois); in a triangle of three
+//! labels and a tetrahedron of four all of them are made equal by Newton's method.
+
+use crate::grid::{Box3, Geometry};
+use crate::kernel::distance::labelled_shapes::LabelledShapes;
+use crate::kernel::distance::source_trees::SourceTrees;
+use crate::kernel::vector::{dot, sub};
+
+/// How close to a voxel centre a vertex may come, in parts of the edge: triangles keep an area.
+const MARGIN: f64 = 1.0 / 1024.0;
+/// The same within triangles and tetrahedra, as the least weight of a corner.
+const LEAST_WEIGHT: f64 = 1.0 / 64.0;
+/// Steps of the search along an edge at most; three or four are usual.
+const STEPS: usize = 12;
+/// Sources of a label that are kept.
+const KEPT: usize = 4;
+/// How often a place is found, with what was looked up at the last.
+const LOOKUPS: usize = 2;
+/// A step, in weights, over which slopes are told.
+const SMALL_STEP: f64 = 1e-4;
+/// A difference of distances that counts as none, in parts of the edge.
+const RESOLUTION: f64 = 1e-7;
+
+/// A place between labels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Between {
+    /// Voxel units of the domain, `[x, y, z]`.
+    pub position: [f64; 3],
+    /// Distance to the nearest sources of each label there, physical.
+    pub distance: f64,
+    /// The direction across the surface, of unit length, on an edge; else 0. Physical.
+    pub normal: [f64; 3],
+}
+
+/// Voxels with the sources they track, over a box.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// Where the voxels lie.
+    pub geometry: &'a Geometry,
+    /// What the sources are.
+    pub shapes: &'a LabelledShapes<'a>,
+    /// The nearest source of each label.
+    pub trees: &'a SourceTrees,
+    /// The box.
+    pub part: Box3,
+    /// Source of each voxel, dense `[z][y][x]` over the box.
+    pub sources: &'a [u32],
+    /// Label of each voxel, that of its source.
+    pub labels: &'a [u32],
+}
+
+/// Work buffers: the sources of each label around.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Candidates {
+    of_label: [Vec<u32>; 4],
+}
+
+impl Candidates {
+    /// The place between two neighbouring voxels of different labels, and the distance there.
+    pub(super) fn on_edge(&mut self, known: &Known<'_>, voxels: [[i64; 3]; 2]) -> Between {
+        let labels = voxels.map(|voxel| known.label(voxel));
+        self.gather(known, &voxels, &labels);
+        let place = |t: f64| -> [f64; 3] {
+            std::array::from_fn(|a| voxels[0][a] as f64 + t * (voxels[1][a] - voxels[0][a]) as f64)
+        };
+        let ends = voxels.map(|voxel| known.geometry.position(voxel));
+        let length = (0..3).map(|a| (ends[0][a] - ends[1][a]).powi(2)).sum::<f64>().sqrt();
+        let mut t = 0.5;
+        for n in 0..LOOKUPS {
+            let difference = |t: f64| {
+                let here = known.world(place(t));
+                self.distance(known, 0, here) - self.distance(known, 1, here)
+            };
+            t = root(difference, RESOLUTION * length).clamp(MARGIN, 1.0 - MARGIN);
+            if n + 1 == LOOKUPS || !self.look_up(known, &labels, known.world(place(t))) {
+                break;
+            }
+        }
+        let here = known.world(place(t));
+        let distance = self.distance(known, 0, here).min(self.distance(known, 1, here));
+        Between { position: place(t), distance, normal: self.normal(known, here) }
+    }
+
+    /// The place within three or four neighbouring voxels, all of different labels.
+    pub(super) fn within<const N: usize>(&mut self, known: &Known<'_>, voxels: [[i64; 3]; N]) -> Between {
+        let labels = voxels.map(|voxel| known.label(voxel));
+        self.gather(known, &voxels, &labels);
+        let place = |weights: [f64; N]| -> [f64; 3] {
+            std::array::from_fn(|a| (0..N).map(|n| weights[n] * voxels[n][a] as f64).sum::<f64>())
+        };
+        let mut weights = [1.0 / N as f64; N];
+        for n in 0..LOOKUPS {
+            let at = |weights: [f64; N]| -> [f64; N] {
+                let here = known.world(place(weights));
+                std::array::from_fn(|n| self.distance(known, n, here))
+            };
+            weights = balance(at);
+            if n + 1 == LOOKUPS || !self.look_up(known, &labels, known.world(place(weights))) {
+                break;
+            }
+        }
+        let here = known.world(place(weights));
+        let distance = (0..N).map(|n| self.distance(known, n, here)).fold(f64::INFINITY, f64::min);
+        Between { position: place(weights), distance, normal: [0.0; 3] }
+    }
+
+    /// A place within neighbouring voxels that was found otherwise.
+    pub(super) fn at(&mut self, known: &Known<'_>, voxels: &[[i64; 3]], position: [f64; 3]) -> Between {
+        let labels: Vec<u32> = voxels.iter().map(|&voxel| known.label(voxel)).collect();
+        self.gather(known, voxels, &labels);
+        let here = known.world(position);
+        self.look_up(known, &labels, here);
+        let distance = (0..labels.len()).map(|n| self.distance(known, n, here)).fold(f64::INFINITY, f64::min);
+        Between { position, distance, normal: [0.0; 3] }
+    }
+
+    /// The direction in which the difference of the distances to the first two labels grows fastest.
+    fn normal(&self, known: &Known<'_>, here: [f64; 3]) -> [f64; 3] {
+        let away = [0, 1].map(|n| {
+            let nearer =
+                |a: &&u32, b: &&u32| known.shapes.distance(here, **a).total_cmp(&known.shapes.distance(here, **b));
+            let source = self.of_label[n].iter().min_by(nearer);
+            unit(source.map_or([0.0; 3], |&source| sub(here, known.shapes.closest(here, source))))
+        });
+        unit(sub(away[0], away[1]))
+    }
+
+    /// Collects the sources of each label one voxel around, those nearest to the middle of the voxels.
+    fn gather(&mut self, known: &Known<'_>, voxels: &[[i64; 3]], labels: &[u32]) {
+        let first = voxels[0];
+        let lo = std::array::from_fn(|a| voxels.iter().fold(first[a], |lo, voxel| lo.min(voxel[a])) - 1);
+        let hi = std::array::from_fn(|a| voxels.iter().fold(first[a], |hi, voxel| hi.max(voxel[a])) + 2);
+        let around = Box3::new(lo, hi).intersect(&known.part);
+        let sum = |a: usize| voxels.iter().map(|voxel| voxel[a] as f64).sum::<f64>();
+        let middle = known.world(std::array::from_fn(|a| sum(a) / voxels.len() as f64));
+        for (sources, &label) in self.of_label.iter_mut().zip(labels) {
+            sources.clear();
+            for (y, z) in around.rows() {
+                let row = known.part.offset_of([around.lo[0], y, z])..;
+                let width = around.shape()[0] as usize;
+                for (&own, &source) in known.labels[row.clone()][..width].iter().zip(&known.sources[row][..width]) {
+                    if own == label && !sources.contains(&source) {
+                        sources.push(source);
+                    }
+                }
+            }
+            sources.sort_by_cached_key(|&source| known.shapes.distance(middle, source).to_bits());
+            sources.truncate(KEPT);
+        }
+    }
+
+    /// Collects the nearest source of each label at a place; returns whether any was new.
+    fn look_up(&mut self, known: &Known<'_>, labels: &[u32], here: [f64; 3]) -> bool {
+        let mut is_new = false;
+        for (sources, &label) in self.of_label.iter_mut().zip(labels).filter(|(_, label)| **label > 0) {
+            let nearest = known.trees.nearest(label, here);
+            if !sources.contains(&nearest) {
+                sources.push(nearest);
+                is_new = true;
+            }
+        }
+        is_new
+    }
+
+    /// The distance to the nearest collected source of the n-th label.
+    fn distance(&self, known: &Known<'_>, n: usize, here: [f64; 3]) -> f64 {
+        self.of_label[n].iter().map(|&source| known.shapes.distance(here, source)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// A vector of the same direction with length 1; 0 where it has no length.
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = dot(v, v).sqrt();
+    if length > 0.0 { v.map(|x| x / length) } else { [0.0; 3] }
+}
+
+impl Known<'_> {
+    pub(super) fn label(&self, voxel: [i64; 3]) -> u32 {
+        self.labels[self.part.offset_of(voxel)]
+    }
+
+    pub(super) fn world(&self, place: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| self.geometry.origin[a] + place[a] * self.geometry.spacing[a])
+    }
+}
+
+/// The zero of a function between 0, where it is negative, and 1, where it is positive; the end that is wrong otherwise.
+fn root(f: impl Fn(f64) -> f64, resolution: f64) -> f64 {
+    let (mut lo, mut hi) = ((0.0, f(0.0)), (1.0, f(1.0)));
+    if !(lo.1.is_finite() && hi.1.is_finite()) {
+        return 0.5;
+    }
+    if lo.1 >= 0.0 {
+        return 0.0;
+    }
+    if hi.1 <= 0.0 {
+        return 1.0;
+    }
+    let mut last = 0;
+    let mut t = 0.5;
+    for _ in 0..STEPS {
+        t = lo.0 - lo.1 * (hi.0 - lo.0) / (hi.1 - lo.1);
+        let value = f(t);
+        if value.abs() <= resolution {
+            break;
+        }
+        // An end that stays twice counts half.
+        if value < 0.0 {
+            lo = (t, value);
+            hi.1 *= if last == -1 { 0.5 } else { 1.0 };
+            last = -1;
+        } else {
+            hi = (t, value);
+            lo.1 *= if last == 1 { 0.5 } else { 1.0 };
+            last = 1;
+        }
+    }
+    t
+}
+
+/// Weights of the corners of a simplex at which all distances are equal, by Newton's method from the middle, held within
+/// the simplex a little off its sides.
+fn balance<const N: usize>(distances: impl Fn([f64; N]) -> [f64; N]) -> [f64; N] {
+    let mut weights = [1.0 / N as f64; N];
+    for _ in 0..STEPS {
+        let now = distances(weights);
+        // What a distance changes by on the way to each corner, the first one's weight being what is left.
+        let towards: [[f64; N]; N] = std::array::from_fn(|n| {
+            let mut moved = weights;
+            moved[n] += SMALL_STEP;
+            moved[0] -= SMALL_STEP;
+            distances(moved)
+        });
+        // Row n: the n-th distance less the first becomes 0. One column more is the right side.
+        let rows = (1..N).map(|row| {
+            let slope = |n: usize| (towards[n][row] - now[row] - towards[n][0] + now[0]) / SMALL_STEP;
+            (1..N).map(slope).chain([now[0] - now[row]]).collect()
+        });
+        let Some(step) = solved(rows.collect()) else { break };
+        let mut next = weights;
+        for (n, by) in step.iter().enumerate() {
+            next[n + 1] += by;
+            next[0] -= by;
+        }
+        let next = inward(next);
+        let moved = (0..N).map(|n| (next[n] - weights[n]).abs()).fold(0.0, f64::max);
+        weights = next;
+        if moved < RESOLUTION {
+            break;
+        }
+    }
+    weights
+}
+
+/// The solution of a few linear equations, each a row with its right side at the end; none where they have no single one.
+fn solved(mut rows: Vec<Vec<f64>>) -> Option<Vec<f64>> {
+    let count = rows.len();
+    let largest = rows.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+    for column in 0..count {
+        let pivot = (column..count).max_by(|&a, &b| rows[a][column].abs().total_cmp(&rows[b][column].abs()))?;
+        let size = rows[pivot][column].abs();
+        if !(size.is_finite() && size > 1e-9 * largest) {
+            return None;
+        }
+        rows.swap(column, pivot);
+        let leading = rows[column].clone();
+        for (_, row) in rows.iter_mut().enumerate().filter(|(n, _)| *n != column) {
+            let factor = row[column] / leading[column];
+            row.iter_mut().zip(&leading).for_each(|(value, lead)| *value -= factor * lead);
+        }
+    }
+    Some((0..count).map(|n| rows[n][count] / rows[n][n]).collect())
+}
+
+/// Weights that lie within the simplex, and a little off its sides.
+fn inward<const N: usize>(weights: [f64; N]) -> [f64; N] {
+    let kept = weights.map(|w| w.max(LEAST_WEIGHT));
+    let sum: f64 = kept.iter().sum();
+    kept.map(|w| w / sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roots_are_found_and_ends_kept() {
+        let cubic = |t: f64| (t - 0.3) * (1.0 + t * t);
+        assert!((root(cubic, 1e-9) - 0.3).abs() < 1e-8);
+        assert_eq!((root(|_| 1.0, 1e-9), root(|_| -1.0, 1e-9), root(|t| t / 0.0, 1e-9)), (0.0, 1.0, 0.5));
+    }
+
+    #[test]
+    fn distances_are_balanced() {
+        // At the weights 0.5, 0.3, 0.2 all three distances are the same.
+        let corners = [[0.2, 0.6, 0.7], [0.9, 0.3, 0.5], [0.65, 0.55, 0.0]];
+        let linear = |w: [f64; 3]| std::array::from_fn(|n| (0..3).map(|v| w[v] * corners[v][n]).sum::<f64>());
+        let found = linear(balance(linear));
+        assert!((found[0] - found[1]).abs() < 1e-6 && (found[1] - found[2]).abs() < 1e-6, "{found:?}");
+        assert_eq!(balance(|_: [f64; 3]| [1.0; 3]), [1.0 / 3.0; 3]);
+        assert_eq!(inward([2.0, -1.0, 0.0]).iter().sum::<f64>(), 1.0);
+    }
+}

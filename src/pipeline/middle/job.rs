@@ -1,0 +1,135 @@
+//! The whole job of `middle`: solve with source tracking, make labels exact where that was asked for, draw the surfaces
+//! between them, measure and write.
+
+use super::border::Border;
+use super::exact::exact_sources;
+use super::surface::{Labelled, draw, held};
+use super::table::csv;
+use crate::error::{Error, Result};
+use crate::exec::Engine;
+use crate::grid::{DataSets, Geometry};
+use crate::io::mesh_ply::PlyWriter;
+use crate::io::ome_zarr::StoreWriter;
+use crate::kernel::distance::labelled_shapes::LabelledShapes;
+use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::source_trees::SourceTrees;
+use crate::kernel::surface::{Measures, Pair};
+use crate::pipeline::distance::{
+    DistanceFound, DistanceSettings, NearestLabels, Needs, Solved, measure, solve_sets, write_fields, write_label_field,
+};
+use crate::store::NoMesh;
+
+/// Which surface is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SurfaceKind {
+    /// Between the voxels, where both distances are equal.
+    Exact,
+    /// The isosurface 0.5 of the labels of two sets, as the papers draw it.
+    Labels,
+}
+
+/// How labels are told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LabelMode {
+    /// By the sources that the method tracks.
+    Tracked,
+    /// By the nearest source, looked up wherever the tracked one may belong to the wrong set; of equal distances the
+    /// lower label wins.
+    Exact,
+}
+
+/// What is computed and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MiddleSettings {
+    /// The distance; with labels.
+    pub distance: DistanceSettings,
+    /// The surface.
+    pub surface: SurfaceKind,
+    /// The labels.
+    pub labels: LabelMode,
+}
+
+/// Bytes of a point, and of a triangle, in a tree.
+const TREE_BYTES: [u64; 2] = [48, 240];
+
+impl MiddleSettings {
+    /// What these settings take on a grid, on so many threads that so many ranks share.
+    #[must_use]
+    pub fn needs<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize, ranks: usize) -> Needs {
+        let distance = DistanceSettings { labels: true, ..self.distance };
+        let needs = distance.needs::<P>(geometry, sets, threads, ranks);
+        let trees = TREE_BYTES[0] * sets.positions.len() as u64 + TREE_BYTES[1] * sets.mesh.len() as u64;
+        Needs { held: needs.held + trees + held(geometry), ..needs }
+    }
+}
+
+/// What a job found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MiddleFound {
+    /// Of the distance.
+    pub distance: DistanceFound,
+    /// The measures of all surfaces as one mesh; its volume is that around label 2, where it is closed.
+    pub measures: Measures,
+    /// What lies between each two labels that meet.
+    pub pairs: Vec<Pair>,
+}
+
+/// Computes the middle surfaces of `sets` on a grid, distances stored as `P`; `store` gets the fields, the mesh and the
+/// measures, none when it is absent.
+///
+/// # Errors
+/// When there are fewer than two sets, no source touches the grid, the output cannot be written, scratch runs out, or the
+/// run is interrupted.
+pub fn middle<P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    settings: &MiddleSettings,
+    store: Option<&StoreWriter>,
+) -> Result<MiddleFound> {
+    refuse(sets, settings.surface)?;
+    let distance = DistanceSettings { labels: true, ..settings.distance };
+    solve_sets::<P, _>(engine, geometry, sets, &distance, |mut solved, set| {
+        let (shapes, trees) = (LabelledShapes::new(sets), SourceTrees::new(sets));
+        if settings.labels == LabelMode::Exact {
+            let stage = engine.stage("exact labels", 0);
+            stage.voxels(geometry.domain().volume());
+            let sources = exact_sources(&stage, geometry, sets, &trees, set.grid(), solved.sources.clone())?;
+            stage.finish();
+            solved = Solved { sources, ..solved };
+        }
+        let found = measure(engine, geometry, sets, &distance, &solved, set)?;
+        let stage = engine.stage("surface", 0);
+        stage.voxels(geometry.domain().volume());
+        let labelled = Labelled { geometry, shapes: &shapes, trees: &trees, sources: &*solved.sources };
+        let (measures, pairs) = match store {
+            Some(store) => {
+                let mut mesh = PlyWriter::create_tagged(&store.file("meshes/surface.ply")?, geometry.unit.as_deref())?;
+                let drawn = draw(&stage, &labelled, settings.surface, &mut mesh)?;
+                mesh.finish()?;
+                drawn
+            }
+            None => draw(&stage, &labelled, settings.surface, &mut NoMesh)?,
+        };
+        stage.finish();
+        if let Some(store) = store {
+            write_fields(engine, geometry, sets, &distance, &solved, found.max, store)?;
+            let border = Border { labels: NearestLabels { sources: &*solved.sources, sets } };
+            write_label_field(engine, geometry, sets, "border", &border, store)?;
+            let path = store.file("meshes/pairs.csv")?;
+            std::fs::write(&path, csv(&pairs)).map_err(|e| Error::from_io("cannot write the table", &e).at(&path))?;
+        }
+        Ok(MiddleFound { distance: found, measures, pairs })
+    })
+}
+
+fn refuse(sets: &DataSets, surface: SurfaceKind) -> Result<()> {
+    match (sets.count(), surface) {
+        (0 | 1, _) => Err(Error::usage("a middle surface lies between data sets; give two files or more")),
+        (2, _) | (_, SurfaceKind::Exact) => Ok(()),
+        (count, SurfaceKind::Labels) => Err(Error::usage(format!(
+            "--surface labels draws the border of two data sets, but {count} were given; leave it out for the borders of \
+             all of them"
+        ))),
+    }
+}

@@ -1,0 +1,123 @@
+//! Draws the surfaces between labels brick by brick, welded in grid order, and measures them.
+
+use super::job::SurfaceKind;
+use crate::error::Result;
+use crate::exec::{Stage, Workers};
+use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
+use crate::kernel::distance::labelled_shapes::LabelledShapes;
+use crate::kernel::distance::source_trees::SourceTrees;
+use crate::kernel::surface::{
+    Interfaces, Known, MarchingCubes, Measures, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder, cells_of_brick,
+};
+use crate::store::{BoxSource, MeshSink};
+
+/// Boxes whose patches are made in parallel before they are welded in order.
+const BATCH: usize = 64;
+/// Edge of the boxes that the surface is drawn in, whatever the bricks are: so these do not tell the order of vertices.
+const EDGE: i64 = 32;
+/// Bytes of a patch for each voxel of one side of its box: vertices, triangles and their tables.
+const PATCH_BYTES: u64 = 600;
+
+/// Memory that drawing holds: patches, and what is remembered of the layer that is drawn. Surfaces that are larger than a
+/// few planes through the grid take more.
+pub(super) fn held(geometry: &Geometry) -> u64 {
+    let plane = (geometry.domain().volume() as f64).powf(2.0 / 3.0) as u64;
+    BATCH as u64 * (EDGE * EDGE) as u64 * PATCH_BYTES + 64 * plane
+}
+
+/// The voxels' nearest sources and what they are.
+pub(super) struct Labelled<'a> {
+    pub(super) geometry: &'a Geometry,
+    pub(super) shapes: &'a LabelledShapes<'a>,
+    pub(super) trees: &'a SourceTrees,
+    pub(super) sources: &'a dyn BoxSource<u32>,
+}
+
+/// Work buffers for one brick.
+struct Worker {
+    interfaces: Interfaces,
+    cubes: MarchingCubes,
+    sources: Vec<u32>,
+    labels: Vec<u32>,
+}
+
+/// Sends the surfaces between labels to `sink`; measures all of them, and each pair.
+pub(super) fn draw(
+    stage: &Stage<'_>,
+    labelled: &Labelled<'_>,
+    kind: SurfaceKind,
+    sink: &mut dyn MeshSink,
+) -> Result<(Measures, Vec<Pair>)> {
+    let geometry = labelled.geometry;
+    let (lo, hi) = (geometry.origin, geometry.position(geometry.shape));
+    let mut measure = SurfaceMeasure::new(std::array::from_fn(|a| 0.5 * (lo[a] + hi[a])));
+    let (mut welder, mut pairs) = (Welder::new(geometry), Pairs::default());
+    let shape = geometry.shape;
+    let grid = BrickGrid::new(shape, EDGE);
+    let make = move || Worker {
+        interfaces: Interfaces::new(shape),
+        cubes: MarchingCubes::new(shape, 0.5),
+        sources: Vec::new(),
+        labels: Vec::new(),
+    };
+    let workers = Workers::new(make);
+    let bricks: Vec<BrickId> = (0..grid.len()).collect();
+    for batch in bricks.chunks(BATCH) {
+        let patches = stage.run(batch, &workers, |worker, &id| worker.patch(labelled, &grid.brick_box(id), kind))?;
+        for patch in patches.iter().filter(|patch| !patch.patch.triangles.is_empty()) {
+            welder.add(&patch.patch, sink)?;
+            for (n, (corners, positions)) in welder.triangles_of(&patch.patch).enumerate() {
+                measure.add(corners, positions);
+                let distances = patch.patch.triangles[n].map(|vertex| patch.distances[vertex as usize]);
+                pairs.add(patch.patch.pairs[n], positions, distances);
+            }
+        }
+    }
+    Ok((measure.measures(), pairs.finish()))
+}
+
+impl Worker {
+    fn patch(&mut self, labelled: &Labelled<'_>, brick: &Box3, kind: SurfaceKind) -> Result<TaggedPatch> {
+        let mut patch = TaggedPatch::default();
+        let Labelled { geometry, shapes, trees, .. } = *labelled;
+        let cells = cells_of_brick(brick, geometry.shape, false);
+        if cells.is_empty() {
+            return Ok(patch);
+        }
+        let part = Box3::new(cells.lo, cells.hi.map(|v| v + 1)).grow(1).intersect(&geometry.domain());
+        self.sources.resize(part.len(), 0);
+        labelled.sources.read_box(&part, &mut self.sources)?;
+        self.labels.clear();
+        // Neighbours mostly have one source, so labels are looked up once for all of a run.
+        for run in self.sources.chunk_by(|a, b| a == b) {
+            self.labels.resize(self.labels.len() + run.len(), shapes.label(run[0]));
+        }
+        if self.labels.iter().all(|&label| label == self.labels[0]) {
+            return Ok(patch);
+        }
+        match kind {
+            SurfaceKind::Exact => {
+                let known = Known { geometry, shapes, trees, part, sources: &self.sources, labels: &self.labels };
+                self.interfaces.extract(&known, &cells, &mut patch);
+            }
+            SurfaceKind::Labels => {
+                let inside: Vec<f32> = self.labels.iter().map(|&label| f32::from(u8::from(label == 2))).collect();
+                self.cubes.extract(&inside, &part, &cells, &mut patch.patch);
+                patch.patch.pairs = vec![[1, 2]; patch.patch.triangles.len()];
+                patch.distances = self.distances_of(labelled, &part, &patch);
+            }
+        }
+        Ok(patch)
+    }
+
+    /// The distance of each vertex of a staircase: that of the nearest voxel's source.
+    fn distances_of(&self, labelled: &Labelled<'_>, part: &Box3, patch: &TaggedPatch) -> Vec<f64> {
+        let distance = |position: &[f64; 3]| {
+            let geometry = labelled.geometry;
+            let world = std::array::from_fn(|a| geometry.origin[a] + position[a] * geometry.spacing[a]);
+            let source = self.sources[part.offset_of(position.map(|v| v.round() as i64))];
+            labelled.shapes.distance(world, source)
+        };
+        patch.patch.positions.iter().map(distance).collect()
+    }
+}

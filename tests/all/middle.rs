@@ -1,0 +1,297 @@
+//! Middle surfaces between labelled data sets: against true surfaces, exact labels and the papers' figures.
+
+#![allow(clippy::unwrap_used)]
+
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::fs;
+
+use strandline::grid::{DataSets, Geometry, TriangleMesh};
+use strandline::io::ome_zarr::StoreWriter;
+use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule};
+use strandline::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle};
+
+use crate::common::ball::Bench;
+use crate::common::clouds::{random_cloud, sphere};
+use crate::common::lab::{Lab, PlainGrid};
+use crate::common::meshes::{self, Form};
+use crate::common::stores::volume;
+use crate::common::textbook::{position, squared};
+
+/// A cube of voxels from `lo` to `hi` along every axis.
+fn cube_grid(lo: f64, hi: f64, h: f64) -> Geometry {
+    let count = ((hi - lo) / h).round() as i64 + 1;
+    Geometry { shape: [count; 3], spacing: [h; 3], origin: [lo; 3], unit: None }
+}
+
+fn settings(method: Method, surface: SurfaceKind, labels: LabelMode, brick: i64) -> MiddleSettings {
+    let distance = DistanceSettings {
+        method,
+        schedule: Schedule::Front,
+        neighbours: strandline::kernel::distance::Neighbours::Faces,
+        init: if method == Method::FSM { Init::Contiguous } else { Init::Cell },
+        farthest: None,
+        signed: false,
+        labels: true,
+        closest_point: false,
+        brick,
+    };
+    MiddleSettings { distance, surface, labels }
+}
+
+/// By VDT, the surface where both distances are equal.
+fn exact(geometry: &Geometry, sets: &DataSets) -> MiddleFound {
+    let settings = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Tracked, 32);
+    middle::<f32>(&Lab::new(2).engine, geometry, sets, &settings, None).unwrap()
+}
+
+fn cube_and_sphere(steps: u32) -> DataSets {
+    let mut sets = DataSets::default();
+    sets.add_mesh(&meshes::cuboid([0.0; 3], [1.0; 3]));
+    sets.add_mesh(&meshes::sphere([0.5; 3], 0.25, steps, PI));
+    sets
+}
+
+/// The true surface's volume and area by quadrature: algorithms, section 10.
+#[test]
+fn between_cube_and_sphere_is_the_true_surface() {
+    let sets = cube_and_sphere(80);
+    for (h, limits) in [(0.05, [3e-3, 1e-3]), (0.025, [1e-3, 5e-4])] {
+        let found = exact(&cube_grid(-0.4, 1.4, h), &sets);
+        let errors = [found.measures.volume.abs() / 0.293_088_39 - 1.0, found.measures.area / 2.232_466_83 - 1.0];
+        println!("h {h}: {errors:?}");
+        assert!(found.measures.is_closed() && found.measures.components == 1);
+        assert!((0..2).all(|n| errors[n].abs() < limits[n]), "h {h}: {errors:?}");
+    }
+}
+
+#[test]
+fn between_concentric_spheres_is_a_sphere() {
+    let mut sets = DataSets::default();
+    for radius in [0.25, 1.0] {
+        sets.add_mesh(&meshes::sphere([0.0; 3], radius, 120, PI));
+    }
+    let found = exact(&cube_grid(-1.2, 1.2, 0.05), &sets);
+    let (volume, area) = (4.0 / 3.0 * PI * 0.625_f64.powi(3), 4.0 * PI * 0.625 * 0.625);
+    let errors = [found.measures.volume / volume - 1.0, found.measures.area / area - 1.0];
+    println!("{errors:?}, {:?}", found.pairs);
+    assert!(found.measures.is_closed() && found.measures.components == 1);
+    assert!(errors[0].abs() < 2.5e-3 && errors[1].abs() < 1.5e-3, "{errors:?}");
+    let [pair] = found.pairs.as_slice() else { panic!("one pair") };
+    assert!(pair.labels == [1, 2] && (pair.area - found.measures.area).abs() < 1e-9);
+    assert!(pair.distance.iter().all(|d| (d - 0.375).abs() < 0.02 * 0.375), "{pair:?}");
+    assert!(pair.extent[0].iter().all(|x| (x + 0.625).abs() < 0.01), "{pair:?}");
+}
+
+/// The papers' way to draw it: closed, no voxel without a label, and by all methods within a voxel of the true surface.
+#[test]
+fn every_method_gives_labels_to_all_voxels() {
+    let sets = cube_and_sphere(40);
+    let h = 0.05;
+    for method in Method::all() {
+        let settings = settings(method, SurfaceKind::Labels, LabelMode::Tracked, 32);
+        let found = middle::<f32>(&Lab::new(2).engine, &cube_grid(-0.4, 1.4, h), &sets, &settings, None).unwrap();
+        println!("{}: {:?}", method.name(), found.measures);
+        assert_eq!(found.distance.unlabelled_voxels, 0, "{}", method.name());
+        assert!(found.measures.is_closed() && found.measures.components == 1, "{}", method.name());
+        let shell = 2.232_466_83 * h;
+        assert!((found.measures.volume - 0.293_088_39).abs() < shell, "{}: {:?}", method.name(), found.measures);
+    }
+}
+
+/// Three clouds and two meshes, in no order.
+fn mixed(geometry: &Geometry) -> DataSets {
+    let mut sets = DataSets::default();
+    sets.add_cloud(&sphere([0.3, 0.4, 0.5], 0.2, 300, |_| true));
+    sets.add_mesh(&meshes::sphere([1.2, 0.3, 0.6], 0.25, 12, PI));
+    sets.add_cloud(&random_cloud(geometry, 12, 5));
+    sets.add_mesh(&meshes::cuboid([0.2, 1.0, 0.1], [0.5, 1.4, 0.4]));
+    sets.add_cloud(&sphere([1.1, 1.2, 0.3], 0.3, 500, |_| true));
+    sets
+}
+
+fn mesh_of(
+    geometry: &Geometry,
+    sets: &DataSets,
+    settings: &MiddleSettings,
+    threads: usize,
+) -> (TriangleMesh, Vec<[u32; 2]>) {
+    let folder = tempfile::tempdir().unwrap();
+    let store = StoreWriter::create(&folder.path().join("out.zarr"), false).unwrap();
+    middle::<f32>(&Lab::new(threads).engine, geometry, sets, settings, Some(&store)).unwrap();
+    let bytes = fs::read(store.file("meshes/surface.ply").unwrap()).unwrap();
+    tagged(&bytes)
+}
+
+/// A mesh whose triangles have two labels, read without the program's own reader.
+fn tagged(bytes: &[u8]) -> (TriangleMesh, Vec<[u32; 2]>) {
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let header = std::str::from_utf8(&bytes[..end]).unwrap();
+    assert!(header.contains("property uint label_low\nproperty uint label_high\n"), "{header}");
+    let count = |what: &str| -> usize {
+        let line = header.lines().find_map(|line| line.strip_prefix(&format!("element {what} "))).unwrap();
+        line.parse().unwrap()
+    };
+    let word = |at: usize| <[u8; 4]>::try_from(&bytes[at..at + 4]).unwrap();
+    let (vertices, triangles) = (count("vertex"), count("face"));
+    let faces = end + 12 * vertices;
+    let place = |n: usize| std::array::from_fn(|a| f64::from(f32::from_le_bytes(word(end + 12 * n + 4 * a))));
+    let mesh = TriangleMesh {
+        vertices: (0..vertices).map(place).collect(),
+        triangles: (0..triangles)
+            .map(|n| std::array::from_fn(|a| u32::from_le_bytes(word(faces + 21 * n + 1 + 4 * a))))
+            .collect(),
+    };
+    let pair = |n: usize| std::array::from_fn(|a| u32::from_le_bytes(word(faces + 21 * n + 13 + 4 * a)));
+    assert_eq!(bytes.len(), faces + 21 * triangles);
+    (mesh, (0..triangles).map(pair).collect())
+}
+
+/// Every edge has two facets of one pair, or three where three labels meet; only at the domain's end it may have fewer.
+#[test]
+fn many_labels_meet_without_gaps() {
+    let geometry = Geometry { shape: [50, 54, 40], spacing: [0.03, 0.03, 0.025], origin: [0.0; 3], unit: None };
+    let sets = mixed(&geometry);
+    let (mesh, pairs) = mesh_of(&geometry, &sets, &settings(Method::VDT, SurfaceKind::Exact, LabelMode::Exact, 32), 2);
+    let mut edges: HashMap<[u32; 2], Vec<[u32; 2]>> = HashMap::new();
+    for (triangle, pair) in mesh.triangles.iter().zip(&pairs) {
+        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+            let (a, b) = (triangle[a], triangle[b]);
+            edges.entry([a.min(b), a.max(b)]).or_default().push(*pair);
+        }
+    }
+    let end = geometry.position(geometry.shape.map(|n| n - 1));
+    let on_end = |vertex: u32| -> [bool; 6] {
+        let p = mesh.vertices[vertex as usize];
+        std::array::from_fn(|n| (p[n % 3] - if n < 3 { geometry.origin[n] } else { end[n - 3] }).abs() < 1e-6)
+    };
+    let mut lines = 0;
+    for (edge, mut around) in edges {
+        let [a, b] = edge.map(on_end);
+        if (0..6).any(|n| a[n] && b[n]) {
+            continue;
+        }
+        around.sort_unstable();
+        match around.as_slice() {
+            [one, other] => assert_eq!(one, other),
+            [[a, b], [c, d], [e, f]] => {
+                lines += 1;
+                assert!(a == c && b == e && d == f && b != d, "{around:?}");
+            }
+            other => panic!("{edge:?}: {other:?}"),
+        }
+    }
+    assert!(lines > 100, "{lines}");
+}
+
+/// Where the labels are exact, vertices of a pair are as far from one set as from the other; those along lines, where
+/// labels thinner than a voxel end, are left out.
+#[test]
+fn facets_are_equally_far_from_both_sets() {
+    let geometry = cube_grid(-1.0, 1.0, 0.05);
+    let clouds = [sphere([-0.5, 0.0, 0.1], 0.3, 2000, |_| true), sphere([0.55, 0.1, 0.0], 0.25, 1500, |_| true)];
+    let mut sets = DataSets::default();
+    for cloud in &clouds {
+        sets.add_cloud(cloud);
+    }
+    let (mesh, _) = mesh_of(&geometry, &sets, &settings(Method::VDT, SurfaceKind::Exact, LabelMode::Tracked, 32), 2);
+    let nearest = |p: [f64; 3], n: usize| clouds[n].iter().map(|q| squared(p, *q)).fold(f64::MAX, f64::min).sqrt();
+    let off = mesh.vertices.iter().map(|&p| (nearest(p, 0) - nearest(p, 1)).abs() / 0.05);
+    let (sum, most) = off.fold((0.0, 0.0_f64), |(sum, most), off| (sum + off, most.max(off)));
+    let mean = sum / mesh.vertices.len() as f64;
+    println!("{} vertices, off by {mean} h in the mean, {most} h at most", mesh.vertices.len());
+    assert!(mean < 0.002 && most < 0.1, "{mean}, {most}");
+}
+
+/// No label is wrong, ties go to the lower one, and neither bricks nor threads change the mesh.
+#[test]
+fn exact_labels_have_no_error() {
+    let geometry = Geometry { shape: [33, 40, 25], spacing: [0.05, 0.04, 0.06], origin: [-0.1; 3], unit: None };
+    let mut sets = DataSets::default();
+    let clouds: Vec<Vec<[f64; 3]>> = (0..4).map(|n| random_cloud(&geometry, 30, 40 + n)).collect();
+    for cloud in &clouds {
+        sets.add_cloud(cloud);
+    }
+    let settings = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Exact, 16);
+    let folder = tempfile::tempdir().unwrap();
+    let store = StoreWriter::create(&folder.path().join("out.zarr"), false).unwrap();
+    middle::<f32>(&Lab::new(2).engine, &geometry, &sets, &settings, Some(&store)).unwrap();
+    store.finish().unwrap();
+    let labels = volume(&folder.path().join("out.zarr/labels/nearest"));
+    let border = volume(&folder.path().join("out.zarr/labels/border"));
+    let nearest = |voxel: [i64; 3]| {
+        let here = position(&geometry, voxel);
+        let off: Vec<f64> =
+            clouds.iter().map(|cloud| cloud.iter().map(|p| squared(here, *p)).fold(f64::MAX, f64::min)).collect();
+        (1..off.len()).fold(0, |best, n| if off[n] < off[best] { n } else { best }) as f64 + 1.0
+    };
+    let plain = PlainGrid { shape: geometry.shape };
+    let wanted: Vec<f64> = plain.voxels().map(nearest).collect();
+    assert_eq!(labels, wanted);
+    let domain = geometry.domain();
+    for (n, voxel) in plain.voxels().enumerate() {
+        let beside = (0..6).filter_map(|side| {
+            let mut next = voxel;
+            next[side / 2] += if side % 2 == 0 { 1 } else { -1 };
+            domain.contains(next).then(|| wanted[domain.offset_of(next)])
+        });
+        let differs = beside.into_iter().any(|label| label != wanted[n]);
+        assert_eq!(border[n], if differs { wanted[n] } else { 0.0 });
+    }
+    let first = mesh_of(&geometry, &sets, &settings, 1);
+    let distance = DistanceSettings { brick: 32, ..settings.distance };
+    assert_eq!(first.0, mesh_of(&geometry, &sets, &MiddleSettings { distance, ..settings }, 3).0);
+}
+
+/// Points as far from the plane between them as each other: the lower label wins all of it.
+#[test]
+fn ties_go_to_the_lower_label() {
+    let geometry = cube_grid(-1.0, 1.0, 0.1);
+    for order in [[0, 1], [1, 0]] {
+        let points = [[[-0.5, 0.0, 0.0]], [[0.5, 0.0, 0.0]]];
+        let mut sets = DataSets::default();
+        for n in order {
+            sets.add_cloud(&points[n]);
+        }
+        let settings = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Exact, 16);
+        let found = middle::<f64>(&Lab::new(2).engine, &geometry, &sets, &settings, None).unwrap();
+        // 21 planes, the middle one at the same distance.
+        assert_eq!(found.distance.label_voxels.into_iter().collect::<Vec<_>>(), [(1, 11 * 441), (2, 10 * 441)]);
+        assert!((found.measures.area - 4.0).abs() < 0.02, "{:?}", found.measures);
+    }
+}
+
+#[test]
+fn a_run_is_told_and_written() {
+    let bench = Bench::bare();
+    fs::write(bench.path("cube.off"), Form::Off.write(&meshes::cuboid([0.0; 3], [1.0; 3]))).unwrap();
+    fs::write(bench.path("ball.off"), Form::Off.write(&meshes::sphere([0.5; 3], 0.25, 20, PI))).unwrap();
+    bench.write("point.xyz", "0.5 0.5 2.5\n0.6 0.5 2.5\n");
+    let printed =
+        bench.succeed("middle cube.off ball.off --spacing 0.05 -o out/x.zarr --mesh out/x.stl --labels exact");
+    assert!(
+        printed.contains("labels 1 and 2: area 2.2") && printed.contains("surface: closed, volume 0.29"),
+        "{printed}"
+    );
+    assert_eq!(bench.entries("out"), ["x.stl", "x.zarr"]);
+    assert_eq!(bench.entries("out/x.zarr/labels"), ["border", "nearest", "zarr.json"]);
+    assert_eq!(bench.entries("out/x.zarr/meshes"), ["pairs.csv", "surface.ply"]);
+    let report = bench.json("out/x.zarr/report.json");
+    assert_eq!((&report["command"], &report["settings"]["surface"]), (&"middle".into(), &"exact".into()));
+    let pair = &report["result"]["pairs"][0];
+    assert_eq!(pair["labels"], serde_json::json!([1, 2]));
+    assert_eq!(pair["thickness"]["min"].as_f64(), pair["distance"]["min"].as_f64().map(|d| 2.0 * d));
+    let table = fs::read_to_string(bench.path("out/x.zarr/meshes/pairs.csv")).unwrap();
+    let row: Vec<&str> = table.lines().nth(1).unwrap().split(',').collect();
+    assert_eq!((row.len(), row[2].parse::<f64>().ok()), (12, pair["area"].as_f64()));
+    bench.succeed("measure out/x.stl");
+    bench.succeed("middle cube.off ball.off point.xyz --spacing 0.1 -o none");
+    for (arguments, complaint) in [
+        ("middle cube.off -o none", "give two files or more"),
+        ("middle cube.off ball.off point.xyz --surface labels --spacing 0.1 -o none", "but 3 were given"),
+        ("middle cube.off none.off -o none", "none.off"),
+    ] {
+        let text = bench.fail(arguments, 2);
+        assert!(text.contains(complaint), "{arguments}: {text}");
+    }
+}
