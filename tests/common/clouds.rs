@@ -41,13 +41,18 @@ pub(crate) fn grid_around(cloud: &[[f64; 3]], h: f64) -> Geometry {
     }
 }
 
-/// The papers' pair (algorithms: section 10): the Sponge, and a sphere of radius 1/2 with the same parametrisation two
-/// to its negative x side.
-pub(crate) fn sponge_and_sphere() -> [Vec<[f64; 3]>; 2] {
+/// A sphere with the Sponge's parametrisation: 231 points, duplicates kept.
+pub(crate) fn sphere_by_angles(centre: [f64; 3], r: f64) -> Vec<[f64; 3]> {
     let step = PI / 10.0;
-    let point = |p: f64, t: f64| [0.5 * p.cos() * t.sin() - 2.0, 0.5 * p.cos() * t.cos(), 0.5 * p.sin()];
-    let angles = (0..=20).flat_map(|p| (0..=10).map(move |t| (f64::from(p) * step, f64::from(t) * step)));
-    [sponge(), angles.map(|(p, t)| point(p, t)).collect()]
+    let point = |p: f64, t: f64| {
+        [centre[0] + r * p.cos() * t.sin(), centre[1] + r * p.cos() * t.cos(), centre[2] + r * p.sin()]
+    };
+    (0..=20).flat_map(|p| (0..=10).map(move |t| point(f64::from(p) * step, f64::from(t) * step))).collect()
+}
+
+/// The papers' pair (algorithms: section 10): the Sponge, and a sphere of radius 1/2 two to its negative x side.
+pub(crate) fn sponge_and_sphere() -> [Vec<[f64; 3]>; 2] {
+    [sponge(), sphere_by_angles([-2.0, 0.0, 0.0], 0.5)]
 }
 
 /// Random points: anywhere in the domain or up to two voxels outside, some on grid points, some given twice.

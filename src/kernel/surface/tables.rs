@@ -5,10 +5,12 @@
 //! signs of the face alone (on a face with two opposite inside corners it separates them), and the cell behind
 //! the face walks it the other way round: so the two cells draw the same segments in opposite directions, and
 //! no crack can open. An edge that crosses the surface enters a run on one of its two faces and leaves one on the
-//! other; the segments therefore chain into closed loops, which are cut into triangle fans.
+//! other; the segments therefore chain into closed loops, which are cut into triangles.
 //!
-//! A fan's diagonal must not lie in a face of the cell: the cell behind that face might draw it too, and four
-//! triangles would meet there. Every loop of every case has an apex whose diagonals all run through the inside.
+//! A diagonal must not lie in a face of the cell: the cell behind that face might draw it too, and four triangles would
+//! meet there. Of the cuts that are left, a case takes the one that encloses, with vertices half way, most nearly an
+//! eighth of the cell for each inside corner: the surface of labels then has the volume of their voxels. On loops
+//! without an ambiguous face these are the classic table's cuts.
 //!
 //! Corner c of a cell lies at bits (x, y, z) = (c & 1, c >> 1 & 1, c >> 2). Edge e lies along axis e / 4; the two low
 //! bits of e place it along the next two axes in the cycle x, y, z.
@@ -89,17 +91,64 @@ fn loops(case: u8) -> Vec<Vec<u8>> {
     all
 }
 
-/// Cuts a loop into a fan around the first corner whose diagonals all run through the inside of the cell.
-fn fan(chain: &[u8]) -> Vec<[u8; 3]> {
-    let n = chain.len();
-    let is_inner = |apex: usize| (2..n - 1).all(|step| !share_face(chain[apex], chain[(apex + step) % n]));
-    let apex = (0..n).find(|&apex| is_inner(apex)).expect("every loop has an apex with inner diagonals");
-    let at = |step: usize| chain[(apex + step) % n];
-    (1..n - 1).map(|step| [at(0), at(step), at(step + 1)]).collect()
+/// All ways to cut a loop into triangles with diagonals that run through the inside of the cell.
+fn cuts(chain: &[u8]) -> Vec<Case> {
+    let (first, last) = (chain[0], chain[chain.len() - 1]);
+    let mut found = if chain.len() < 3 { vec![Case::new()] } else { Vec::new() };
+    for apex in 1..chain.len() - 1 {
+        let is_side = |a: usize, b: usize| b == a + 1;
+        let crosses_face = |a: usize, b: usize| !is_side(a, b) && share_face(chain[a], chain[b]);
+        if crosses_face(0, apex) || crosses_face(apex, chain.len() - 1) {
+            continue;
+        }
+        for before in cuts(&chain[..=apex]) {
+            for after in cuts(&chain[apex..]) {
+                found.push([before.as_slice(), &after, &[[first, chain[apex], last]]].concat());
+            }
+        }
+    }
+    found
 }
 
+/// The middle of an edge as seen from the cell's centre, in halves of the cell.
+fn middle(edge: u8) -> [i32; 3] {
+    let corner = lower_corner(edge);
+    std::array::from_fn(|a| if a == axis_of(edge) { 0 } else { 2 * i32::from(corner >> a & 1) - 1 })
+}
+
+/// How far the volume enclosed by triangles is from an eighth of the cell for each inside corner, in parts of 1/48.
+fn off_volume(case: u8, triangles: &[[u8; 3]]) -> i32 {
+    // Pyramids from the centre: those over the faces' inside parts, in eighths of a face, and those over the triangles.
+    let inside = |corner: u8| i32::from(case >> corner & 1);
+    let part = |face: [u8; 4]| -> i32 {
+        let count: i32 = face.iter().map(|&corner| inside(corner)).sum();
+        let is_separated = count == 2 && inside(face[0]) == inside(face[2]);
+        if is_separated { 2 } else { [0, 1, 4, 7, 8][count as usize] }
+    };
+    let over_faces: i32 = faces().into_iter().map(part).sum();
+    let over_triangle = |corners: &[u8; 3]| {
+        let [a, b, c] = corners.map(middle);
+        let minor = |m: usize, n: usize| b[m] * c[n] - b[n] * c[m];
+        a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1)
+    };
+    let over_triangles: i32 = triangles.iter().map(over_triangle).sum();
+    (over_faces + over_triangles - 6 * case.count_ones() as i32).abs()
+}
+
+/// The squared lengths of all sides of the triangles.
+fn sides(triangles: &[[u8; 3]]) -> i32 {
+    let side = |a: u8, b: u8| (0..3).map(|n| (middle(a)[n] - middle(b)[n]).pow(2)).sum::<i32>();
+    triangles.iter().map(|&[a, b, c]| side(a, b) + side(b, c) + side(c, a)).sum()
+}
+
+/// The best cut of a case; of equal ones that with the shortest diagonals.
 fn triangles(case: u8) -> Case {
-    loops(case).iter().flat_map(|chain| fan(chain)).collect()
+    let mut all = vec![Case::new()];
+    for chain in loops(case) {
+        let cuts = cuts(&chain);
+        all = all.iter().flat_map(|one| cuts.iter().map(move |cut| [one.as_slice(), cut].concat())).collect();
+    }
+    all.into_iter().min_by_key(|one| (off_volume(case, one), sides(one))).unwrap_or_default()
 }
 
 #[cfg(test)]
