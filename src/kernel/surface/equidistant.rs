@@ -19,8 +19,11 @@ const LEAST_WEIGHT: f64 = 1.0 / 64.0;
 const STEPS: usize = 12;
 /// Sources of a label that are kept.
 const KEPT: usize = 4;
-/// How often a place is found, with what was looked up at the last.
-const LOOKUPS: usize = 2;
+/// How often a place is found at most, with what was looked up at the last.
+const LOOKUPS: usize = 6;
+/// A place that moves by less, in parts of the edge, has the sources that were looked up where it was before: they are
+/// off by the square of that.
+const SETTLED: f64 = 0.02;
 /// A step, in weights, over which slopes are told.
 const SMALL_STEP: f64 = 1e-4;
 /// A difference of distances that counts as none, in parts of the edge.
@@ -33,7 +36,8 @@ pub struct Between {
     pub position: [f64; 3],
     /// Distance to the nearest sources of each label there, physical.
     pub distance: f64,
-    /// The direction across the surface, of unit length, on an edge; else 0. Physical.
+    /// The direction across the surface, towards the side of the larger label, of unit length, on an edge; else 0.
+    /// Physical.
     pub normal: [f64; 3],
 }
 
@@ -70,20 +74,23 @@ impl Candidates {
         };
         let ends = voxels.map(|voxel| known.geometry.position(voxel));
         let length = (0..3).map(|a| (ends[0][a] - ends[1][a]).powi(2)).sum::<f64>().sqrt();
-        let mut t = 0.5;
-        for n in 0..LOOKUPS {
+        let (mut t, mut last) = (0.5, f64::INFINITY);
+        for n in 1..=LOOKUPS {
             let difference = |t: f64| {
                 let here = known.world(place(t));
                 self.distance(known, 0, here) - self.distance(known, 1, here)
             };
             t = root(difference, RESOLUTION * length).clamp(MARGIN, 1.0 - MARGIN);
-            if n + 1 == LOOKUPS || !self.look_up(known, &labels, known.world(place(t))) {
+            if n == LOOKUPS || (t - last).abs() < SETTLED || !self.look_up(known, &labels, known.world(place(t))) {
                 break;
             }
+            last = t;
         }
         let here = known.world(place(t));
         let distance = self.distance(known, 0, here).min(self.distance(known, 1, here));
-        Between { position: place(t), distance, normal: self.normal(known, here) }
+        // Towards the larger label, whichever way the edge runs.
+        let normal = self.normal(known, here).map(|n| if labels[0] < labels[1] { n } else { -n });
+        Between { position: place(t), distance, normal }
     }
 
     /// The place within three or four neighbouring voxels, all of different labels.
@@ -93,16 +100,18 @@ impl Candidates {
         let place = |weights: [f64; N]| -> [f64; 3] {
             std::array::from_fn(|a| (0..N).map(|n| weights[n] * voxels[n][a] as f64).sum::<f64>())
         };
-        let mut weights = [1.0 / N as f64; N];
-        for n in 0..LOOKUPS {
+        let (mut weights, mut last) = ([1.0 / N as f64; N], [f64::INFINITY; N]);
+        for n in 1..=LOOKUPS {
             let at = |weights: [f64; N]| -> [f64; N] {
                 let here = known.world(place(weights));
                 std::array::from_fn(|n| self.distance(known, n, here))
             };
             weights = balance(at);
-            if n + 1 == LOOKUPS || !self.look_up(known, &labels, known.world(place(weights))) {
+            let is_settled = (0..N).all(|n| (weights[n] - last[n]).abs() < SETTLED);
+            if n == LOOKUPS || is_settled || !self.look_up(known, &labels, known.world(place(weights))) {
                 break;
             }
+            last = weights;
         }
         let here = known.world(place(weights));
         let distance = (0..N).map(|n| self.distance(known, n, here)).fold(f64::INFINITY, f64::min);
