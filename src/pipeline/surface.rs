@@ -67,8 +67,7 @@ pub fn extract(
     let centre = std::array::from_fn(|a| 0.5 * (lo[a] + hi[a]));
     let mut welder = Welder::new(geometry);
     let mut measure = SurfaceMeasure::new(centre);
-    let shape = geometry.shape;
-    let workers = Workers::new(move || (MarchingCubes::new(shape, 0.5), Vec::new()));
+    let workers = Workers::new(|| (MarchingCubes::new(0.5), Vec::new()));
     // A surface may pass between a brick that is not stored and the one above it, so the bricks below stored ones
     // count.
     let bricks: Vec<BrickId> = (0..grid.len()).filter(|&id| holds_surface(u, id)).collect();
@@ -134,7 +133,7 @@ pub fn distances_to(
         by_brick.entry(grid.brick_of(inside).unwrap_or(0)).or_default().push(n);
     }
     let groups: Vec<(BrickId, Vec<usize>)> = by_brick.into_iter().collect();
-    let workers = Workers::new(move || Shells::new(shape));
+    let workers = Workers::new(Shells::new);
     let found = stage.run(&groups, &workers, |shells, (brick, members)| {
         let targets: Vec<[f64; 3]> = members.iter().map(|&n| points[n]).collect();
         shells.nearest(u, geometry, *brick, &targets)
@@ -154,8 +153,8 @@ struct Shells {
 }
 
 impl Shells {
-    fn new(shape: [i64; 3]) -> Self {
-        Self { cubes: MarchingCubes::new(shape, 0.5), values: Vec::new(), patch: Patch::default() }
+    fn new() -> Self {
+        Self { cubes: MarchingCubes::new(0.5), values: Vec::new(), patch: Patch::default() }
     }
 
     fn nearest(

@@ -24,7 +24,7 @@ fn surface(geometry: &Geometry, u: &[f32]) -> (MeshBuffer, Measures) {
     let cells = cells_of_brick(&part, geometry.shape, false);
     let (mut patch, mut welder, mut mesh) = (Patch::default(), Welder::new(geometry), MeshBuffer::default());
     let mut measure = SurfaceMeasure::new(geometry.position(geometry.shape.map(|n| n / 2)));
-    MarchingCubes::new(geometry.shape, 0.5).extract(u, &part, &cells, &mut patch);
+    MarchingCubes::new(0.5).extract(u, &part, &cells, &mut patch);
     welder.add(&patch, &mut mesh).expect("memory takes any mesh");
     welder.triangles_of(&patch).for_each(|(corners, positions)| measure.add(corners, positions));
     (mesh, measure.measures())

@@ -52,35 +52,42 @@ fn cube_and_sphere(steps: u32) -> DataSets {
     sets
 }
 
-/// The true surface's volume and area by quadrature: algorithms, section 10.
+/// The true surface's volume and area by quadrature: algorithms, section 10. On a grid that no crease has a plane of
+/// voxels in common with.
 #[test]
 fn between_cube_and_sphere_is_the_true_surface() {
-    let sets = cube_and_sphere(80);
-    for (h, limits) in [(0.05, [3e-3, 1e-3]), (0.025, [1e-3, 5e-4])] {
-        let found = exact(&cube_grid(-0.4, 1.4, h), &sets);
-        let errors = [found.measures.volume.abs() / 0.293_088_39 - 1.0, found.measures.area / 2.232_466_83 - 1.0];
-        println!("h {h}: {errors:?}");
+    let sets = cube_and_sphere(200);
+    let errors = [0.05, 0.025].map(|h| {
+        let geometry = Geometry { origin: [-0.413, -0.407, -0.391], ..cube_grid(-0.4, 1.4, h) };
+        let found = exact(&geometry, &sets);
         assert!(found.measures.is_closed() && found.measures.components == 1);
-        assert!((0..2).all(|n| errors[n].abs() < limits[n]), "h {h}: {errors:?}");
-    }
+        [found.measures.volume.abs() / 0.293_088_39 - 1.0, found.measures.area / 2.232_466_83 - 1.0].map(f64::abs)
+    });
+    println!("{errors:?}");
+    assert!(errors[1][0] < 7e-4 && errors[1][1] < 4e-4, "{errors:?}");
+    assert!(errors[0][0] > 3.0 * errors[1][0] && errors[0][1] > 1.8 * errors[1][1], "{errors:?}");
 }
 
+/// A sphere between spheres, both errors of the second order.
 #[test]
 fn between_concentric_spheres_is_a_sphere() {
     let mut sets = DataSets::default();
     for radius in [0.25, 1.0] {
-        sets.add_mesh(&meshes::sphere([0.0; 3], radius, 120, PI));
+        sets.add_mesh(&meshes::sphere([0.0; 3], radius, 500, PI));
     }
-    let found = exact(&cube_grid(-1.2, 1.2, 0.05), &sets);
     let (volume, area) = (4.0 / 3.0 * PI * 0.625_f64.powi(3), 4.0 * PI * 0.625 * 0.625);
-    let errors = [found.measures.volume / volume - 1.0, found.measures.area / area - 1.0];
-    println!("{errors:?}, {:?}", found.pairs);
-    assert!(found.measures.is_closed() && found.measures.components == 1);
-    assert!(errors[0].abs() < 2.5e-3 && errors[1].abs() < 1.5e-3, "{errors:?}");
-    let [pair] = found.pairs.as_slice() else { panic!("one pair") };
-    assert!(pair.labels == [1, 2] && (pair.area - found.measures.area).abs() < 1e-9);
-    assert!(pair.distance.iter().all(|d| (d - 0.375).abs() < 0.02 * 0.375), "{pair:?}");
-    assert!(pair.extent[0].iter().all(|x| (x + 0.625).abs() < 0.01), "{pair:?}");
+    let errors = [0.1, 0.05].map(|h| {
+        let found = exact(&cube_grid(-1.2, 1.2, h), &sets);
+        assert!(found.measures.is_closed() && found.measures.components == 1);
+        let [pair] = found.pairs.as_slice() else { panic!("one pair") };
+        assert!(pair.labels == [1, 2] && (pair.area - found.measures.area).abs() < 1e-9);
+        assert!(pair.distance.iter().all(|d| (d - 0.375).abs() < 1e-4), "{pair:?}");
+        assert!(pair.extent[0].iter().all(|x| (x + 0.625).abs() < 1e-3), "{pair:?}");
+        [found.measures.volume / volume - 1.0, found.measures.area / area - 1.0].map(f64::abs)
+    });
+    println!("{errors:?}");
+    assert!(errors[1][0] < 2e-3 && errors[1][1] < 1e-3, "{errors:?}");
+    assert!((0..2).all(|n| errors[0][n] > 3.5 * errors[1][n]), "{errors:?}");
 }
 
 /// Six digits are printed.
@@ -219,21 +226,34 @@ fn many_labels_meet_without_gaps() {
     assert!(lines > 100, "{lines}");
 }
 
-/// Where the labels are exact, vertices of a pair are as far from one set as from the other; those along lines, where
-/// labels thinner than a voxel end, are left out.
+/// The vertices of every facet are as far from one of its sets as from the other, and no other set is nearer: along the
+/// line too where three labels meet.
 #[test]
 fn facets_are_equally_far_from_both_sets() {
-    let geometry = cube_grid(-1.0, 1.0, 0.05);
-    let clouds = [sphere([-0.5, 0.0, 0.1], 0.3, 2000, |_| true), sphere([0.55, 0.1, 0.0], 0.25, 1500, |_| true)];
+    let (geometry, h) = (cube_grid(-1.0, 1.0, 0.05), 0.05);
+    let clouds = [
+        sphere([-0.5, -0.3, 0.1], 0.3, 2000, |_| true),
+        sphere([0.55, -0.2, 0.0], 0.25, 1500, |_| true),
+        sphere([0.03, 0.6, -0.05], 0.2, 1500, |_| true),
+    ];
     let mut sets = DataSets::default();
     for cloud in &clouds {
         sets.add_cloud(cloud);
     }
-    let (mesh, _) = mesh_of(&geometry, &sets, &settings(Method::VDT, SurfaceKind::Exact, LabelMode::Tracked, 32), 2);
-    let nearest = |p: [f64; 3], n: usize| clouds[n].iter().map(|q| squared(p, *q)).fold(f64::MAX, f64::min).sqrt();
-    let off = mesh.vertices.iter().map(|&p| (nearest(p, 0) - nearest(p, 1)).abs() / 0.05);
-    let (sum, most) = off.fold((0.0, 0.0_f64), |(sum, most), off| (sum + off, most.max(off)));
-    let mean = sum / mesh.vertices.len() as f64;
+    let (mesh, pairs) =
+        mesh_of(&geometry, &sets, &settings(Method::VDT, SurfaceKind::Exact, LabelMode::Tracked, 32), 2);
+    let to = |p: [f64; 3], cloud: &[[f64; 3]]| cloud.iter().map(|q| squared(p, *q)).fold(f64::MAX, f64::min).sqrt();
+    let distances: Vec<[f64; 3]> = mesh.vertices.iter().map(|&p| std::array::from_fn(|n| to(p, &clouds[n]))).collect();
+    let (mut sum, mut most, mut count) = (0.0, 0.0_f64, 0);
+    for (triangle, pair) in mesh.triangles.iter().zip(&pairs) {
+        for own in triangle.map(|n| distances[n as usize]) {
+            let nearest = own.iter().copied().fold(f64::MAX, f64::min);
+            let off = pair.map(|label| (own[label as usize - 1] - nearest) / h);
+            let off = off[0].max(off[1]);
+            (sum, most, count) = (sum + off, most.max(off), count + 1);
+        }
+    }
+    let mean = sum / f64::from(count);
     println!("{} vertices, off by {mean} h in the mean, {most} h at most", mesh.vertices.len());
     assert!(mean < 0.002 && most < 0.1, "{mean}, {most}");
 }

@@ -25,7 +25,7 @@ fn surface(
     field: &dyn Fn([i64; 3]) -> f32,
 ) -> (MeshBuffer, Measures) {
     let grid = BrickGrid::new(geometry.shape, edge);
-    let mut cubes = MarchingCubes::new(geometry.shape, level);
+    let mut cubes = MarchingCubes::new(level);
     let (mut patch, mut welder, mut mesh) = (Patch::default(), Welder::new(geometry), MeshBuffer::default());
     let mut measure = SurfaceMeasure::new(geometry.position(geometry.shape.map(|n| n / 2)));
     for id in 0..grid.len() {

@@ -39,7 +39,7 @@ impl PlainSurface {
         let part = geometry.domain();
         let (mut patch, mut welder, mut mesh) = (Patch::default(), Welder::new(geometry), MeshBuffer::default());
         let cells = cells_of_brick(&part, geometry.shape, false);
-        MarchingCubes::new(geometry.shape, 0.5).extract(&u, &part, &cells, &mut patch);
+        MarchingCubes::new(0.5).extract(&u, &part, &cells, &mut patch);
         welder.add(&patch, &mut mesh).expect("memory takes any mesh");
         mesh
     }

@@ -2,12 +2,14 @@
 //! on the straight line between the edges that they cross (after Kobbelt et al. 2001, Feature sensitive surface
 //! extraction).
 
-use crate::kernel::vector::{cross, dot, sub};
+use crate::kernel::vector::{cross, dot, solved, sub};
 
 /// Two directions whose cosine is less are of different sides of a crease: 26 degrees.
 const SHARP: f64 = 0.9;
 /// So far inside the triangle a corner lies at least, in weights of its corners.
 const INSIDE: f64 = 1.0 / 64.0;
+/// How much a peak is drawn to the middle of what meets in it, beside sides of weight 1: sides may be nearly parallel.
+const TOWARDS_AROUND: f64 = 1e-3;
 
 /// A point of the surface, and the direction across it, of unit length.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +43,42 @@ pub(super) fn corner(triangle: [[f64; 3]; 3], [one, other]: [Crossing; 2]) -> Op
     weights.iter().all(|&weight| weight >= INSIDE).then_some(weights)
 }
 
+/// Where three or more sides meet: the place nearest to all of them, and a little to `around`, in the sense of least
+/// squares; `around` itself where that is not within the tetrahedron.
+pub(super) fn peak(tetrahedron: [[f64; 3]; 4], sides: &[Crossing], around: [f64; 3]) -> [f64; 3] {
+    let rows = (0..3).map(|row| {
+        let column = |n: usize| {
+            let pull = if n == row { TOWARDS_AROUND } else { 0.0 };
+            sides.iter().map(|side| side.normal[row] * side.normal[n]).sum::<f64>() + pull
+        };
+        let right = sides.iter().map(|side| side.normal[row] * dot(side.normal, sub(side.place, around))).sum();
+        (0..3).map(column).chain([right]).collect()
+    });
+    let Some(step) = solved(rows.collect()) else { return around };
+    let found: [f64; 3] = std::array::from_fn(|a| around[a] + step[a]);
+    let from = tetrahedron[0];
+    let edges = [1, 2, 3].map(|n| sub(tetrahedron[n], from));
+    let rows = (0..3).map(|a| edges.iter().map(|edge| edge[a]).chain([found[a] - from[a]]).collect());
+    let is_inside = solved(rows.collect())
+        .is_some_and(|weights| weights.iter().all(|w| *w > INSIDE) && weights.iter().sum::<f64>() < 1.0 - INSIDE);
+    if is_inside { found } else { around }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn three_sides_meet_in_a_peak() {
+        let tetrahedron = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
+        let side = |axis: usize, at: f64| {
+            let along = |value| std::array::from_fn(|a| if a == axis { value } else { 0.0 });
+            Crossing { place: along(at), normal: along(1.0) }
+        };
+        let found = peak(tetrahedron, &[side(0, 0.3), side(1, 0.4), side(2, 0.5)], [0.5; 3]);
+        assert!((0..3).all(|a| (found[a] - [0.3, 0.4, 0.5][a]).abs() < 1e-3), "{found:?}");
+        assert_eq!(peak(tetrahedron, &[side(0, 1.5), side(1, 1.0), side(2, 0.5)], [0.5; 3]), [0.5; 3], "outside");
+    }
 
     const TRIANGLE: [[f64; 3]; 3] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 

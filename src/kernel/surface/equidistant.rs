@@ -1,4 +1,4 @@
-//! Where the surface between labels passes between neighbouring voxels: the place that is equally far from the nearest
+//! Where the surface between labels passes between neighbouring corners: the place that is equally far from the nearest
 //! sources of each label (algorithms: section 4, "Beyond the papers").
 //!
 //! Near the place are the sources that the voxels of a label track, one voxel around; with them the place is found, the
@@ -6,17 +6,20 @@
 //! On an edge the difference of two exact distances is brought to zero (regula falsi, Illinois); in a triangle of three
 //! labels and a tetrahedron of four all of them are made equal by Newton's method.
 
+use super::corner::Corner;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::distance::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::source_trees::SourceTrees;
-use crate::kernel::vector::{dot, sub};
+use crate::kernel::vector::{solved, sub, unit};
 
 /// How close to a voxel centre a vertex may come, in parts of the edge: triangles keep an area.
 const MARGIN: f64 = 1.0 / 1024.0;
 /// The same within triangles and tetrahedra, as the least weight of a corner.
-const LEAST_WEIGHT: f64 = 1.0 / 64.0;
+const LEAST_WEIGHT: f64 = 1.0 / 256.0;
 /// Steps of the search along an edge at most; three or four are usual.
 const STEPS: usize = 12;
+/// Halvings of a step that leads away from the place.
+const HALVINGS: i32 = 5;
 /// Sources of a label that are kept.
 const KEPT: usize = 4;
 /// How often a place is found at most, with what was looked up at the last.
@@ -65,14 +68,13 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// The place between two neighbouring voxels of different labels, and the distance there.
-    pub(super) fn on_edge(&mut self, known: &Known<'_>, voxels: [[i64; 3]; 2]) -> Between {
-        let labels = voxels.map(|voxel| known.label(voxel));
-        self.gather(known, &voxels, &labels);
-        let place = |t: f64| -> [f64; 3] {
-            std::array::from_fn(|a| voxels[0][a] as f64 + t * (voxels[1][a] - voxels[0][a]) as f64)
-        };
-        let ends = voxels.map(|voxel| known.geometry.position(voxel));
+    /// The place between two corners of different labels, and the distance there.
+    pub(super) fn on_edge(&mut self, known: &Known<'_>, corners: [Corner; 2]) -> Between {
+        self.gather(known, &corners);
+        let labels = corners.map(|corner| corner.label);
+        let [from, to] = corners.map(|corner| corner.place);
+        let place = |t: f64| -> [f64; 3] { std::array::from_fn(|a| from[a] + t * (to[a] - from[a])) };
+        let ends = [from, to].map(|place| known.world(place));
         let length = (0..3).map(|a| (ends[0][a] - ends[1][a]).powi(2)).sum::<f64>().sqrt();
         let (mut t, mut last) = (0.5, f64::INFINITY);
         for n in 1..=LOOKUPS {
@@ -93,12 +95,12 @@ impl Candidates {
         Between { position: place(t), distance, normal }
     }
 
-    /// The place within three or four neighbouring voxels, all of different labels.
-    pub(super) fn within<const N: usize>(&mut self, known: &Known<'_>, voxels: [[i64; 3]; N]) -> Between {
-        let labels = voxels.map(|voxel| known.label(voxel));
-        self.gather(known, &voxels, &labels);
+    /// The place within three or four corners, all of different labels.
+    pub(super) fn within<const N: usize>(&mut self, known: &Known<'_>, corners: [Corner; N]) -> Between {
+        self.gather(known, &corners);
+        let labels = corners.map(|corner| corner.label);
         let place = |weights: [f64; N]| -> [f64; 3] {
-            std::array::from_fn(|a| (0..N).map(|n| weights[n] * voxels[n][a] as f64).sum::<f64>())
+            std::array::from_fn(|a| (0..N).map(|n| weights[n] * corners[n].place[a]).sum::<f64>())
         };
         let (mut weights, mut last) = ([1.0 / N as f64; N], [f64::INFINITY; N]);
         for n in 1..=LOOKUPS {
@@ -118,10 +120,10 @@ impl Candidates {
         Between { position: place(weights), distance, normal: [0.0; 3] }
     }
 
-    /// A place within neighbouring voxels that was found otherwise.
-    pub(super) fn at(&mut self, known: &Known<'_>, voxels: &[[i64; 3]], position: [f64; 3]) -> Between {
-        let labels: Vec<u32> = voxels.iter().map(|&voxel| known.label(voxel)).collect();
-        self.gather(known, voxels, &labels);
+    /// A place within corners that was found otherwise.
+    pub(super) fn at(&mut self, known: &Known<'_>, corners: &[Corner], position: [f64; 3]) -> Between {
+        self.gather(known, corners);
+        let labels: Vec<u32> = corners.iter().map(|corner| corner.label).collect();
         let here = known.world(position);
         self.look_up(known, &labels, here);
         let distance = (0..labels.len()).map(|n| self.distance(known, n, here)).fold(f64::INFINITY, f64::min);
@@ -139,15 +141,17 @@ impl Candidates {
         unit(sub(away[0], away[1]))
     }
 
-    /// Collects the sources of each label one voxel around, those nearest to the middle of the voxels.
-    fn gather(&mut self, known: &Known<'_>, voxels: &[[i64; 3]], labels: &[u32]) {
-        let first = voxels[0];
-        let lo = std::array::from_fn(|a| voxels.iter().fold(first[a], |lo, voxel| lo.min(voxel[a])) - 1);
-        let hi = std::array::from_fn(|a| voxels.iter().fold(first[a], |hi, voxel| hi.max(voxel[a])) + 2);
+    /// Collects the sources of each corner's label one voxel around, those nearest to the middle of the corners.
+    fn gather(&mut self, known: &Known<'_>, corners: &[Corner]) {
+        let first = corners[0].halves;
+        let lowest = |a: usize| corners.iter().fold(first[a], |lo, corner| lo.min(corner.halves[a]));
+        let highest = |a: usize| corners.iter().fold(first[a], |hi, corner| hi.max(corner.halves[a]));
+        let lo = std::array::from_fn(|a| lowest(a).div_euclid(2) - 1);
+        let hi = std::array::from_fn(|a| (highest(a) + 1).div_euclid(2) + 2);
         let around = Box3::new(lo, hi).intersect(&known.part);
-        let sum = |a: usize| voxels.iter().map(|voxel| voxel[a] as f64).sum::<f64>();
-        let middle = known.world(std::array::from_fn(|a| sum(a) / voxels.len() as f64));
-        for (sources, &label) in self.of_label.iter_mut().zip(labels) {
+        let sum = |a: usize| corners.iter().map(|corner| corner.place[a]).sum::<f64>();
+        let middle = known.world(std::array::from_fn(|a| sum(a) / corners.len() as f64));
+        for (sources, label) in self.of_label.iter_mut().zip(corners.iter().map(|corner| corner.label)) {
             sources.clear();
             for (y, z) in around.rows() {
                 let row = known.part.offset_of([around.lo[0], y, z])..;
@@ -160,6 +164,10 @@ impl Candidates {
             }
             sources.sort_by_cached_key(|&source| known.shapes.distance(middle, source).to_bits());
             sources.truncate(KEPT);
+            // A label thinner than a voxel may have none of its own around.
+            if sources.is_empty() && label > 0 {
+                sources.push(known.trees.nearest(label, middle));
+            }
         }
     }
 
@@ -180,12 +188,6 @@ impl Candidates {
     fn distance(&self, known: &Known<'_>, n: usize, here: [f64; 3]) -> f64 {
         self.of_label[n].iter().map(|&source| known.shapes.distance(here, source)).fold(f64::INFINITY, f64::min)
     }
-}
-
-/// A vector of the same direction with length 1; 0 where it has no length.
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = dot(v, v).sqrt();
-    if length > 0.0 { v.map(|x| x / length) } else { [0.0; 3] }
 }
 
 impl Known<'_> {
@@ -251,12 +253,18 @@ fn balance<const N: usize>(distances: impl Fn([f64; N]) -> [f64; N]) -> [f64; N]
             (1..N).map(slope).chain([now[0] - now[row]]).collect()
         });
         let Some(step) = solved(rows.collect()) else { break };
-        let mut next = weights;
-        for (n, by) in step.iter().enumerate() {
-            next[n + 1] += by;
-            next[0] -= by;
-        }
-        let next = inward(next);
+        let moved_by = |part: f64| {
+            let mut next = weights;
+            for (n, by) in step.iter().enumerate() {
+                next[n + 1] += part * by;
+                next[0] -= part * by;
+            }
+            inward(next)
+        };
+        // Where other sources become the nearest on the way, a whole step may lead farther off.
+        let is_nearer = |next: &[f64; N]| spread(distances(*next)) < spread(now);
+        let parts = (0..HALVINGS).map(|n| 0.5_f64.powi(n));
+        let Some(next) = parts.map(moved_by).find(is_nearer) else { break };
         let moved = (0..N).map(|n| (next[n] - weights[n]).abs()).fold(0.0, f64::max);
         weights = next;
         if moved < RESOLUTION {
@@ -266,24 +274,10 @@ fn balance<const N: usize>(distances: impl Fn([f64; N]) -> [f64; N]) -> [f64; N]
     weights
 }
 
-/// The solution of a few linear equations, each a row with its right side at the end; none where they have no single one.
-fn solved(mut rows: Vec<Vec<f64>>) -> Option<Vec<f64>> {
-    let count = rows.len();
-    let largest = rows.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
-    for column in 0..count {
-        let pivot = (column..count).max_by(|&a, &b| rows[a][column].abs().total_cmp(&rows[b][column].abs()))?;
-        let size = rows[pivot][column].abs();
-        if !(size.is_finite() && size > 1e-9 * largest) {
-            return None;
-        }
-        rows.swap(column, pivot);
-        let leading = rows[column].clone();
-        for (_, row) in rows.iter_mut().enumerate().filter(|(n, _)| *n != column) {
-            let factor = row[column] / leading[column];
-            row.iter_mut().zip(&leading).for_each(|(value, lead)| *value -= factor * lead);
-        }
-    }
-    Some((0..count).map(|n| rows[n][count] / rows[n][n]).collect())
+/// How far the largest is from the smallest.
+fn spread<const N: usize>(values: [f64; N]) -> f64 {
+    let (lo, hi) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+    hi - lo
 }
 
 /// Weights that lie within the simplex, and a little off its sides.

@@ -8,10 +8,13 @@
 
 use std::collections::HashMap;
 
+use super::corner::Corner;
 use super::creases::{self, Crossing};
 use super::equidistant::{Between, Candidates, Known};
 use super::marching_cubes::Patch;
-use super::vertex_key::{VertexKey, VertexKeys};
+use super::polygon::{self, Point};
+use super::splits::Splits;
+use super::vertex_key::VertexKey;
 use crate::grid::Box3;
 use crate::kernel::vector::{cross, dot, sub};
 
@@ -26,36 +29,29 @@ pub struct TaggedPatch {
 
 /// Orders in which a way along a cell's edges can take the axes; each is a tetrahedron.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+/// The edges of a tetrahedron.
+const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// Finds the surfaces brick by brick; keeps its working memory between bricks.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Interfaces {
-    keys: VertexKeys,
+    splits: Splits,
     vertices: HashMap<VertexKey, u32>,
     candidates: Candidates,
     /// The direction across the surface at each vertex of the patch.
     normals: Vec<[f64; 3]>,
 }
 
-/// A tetrahedron: its corners as bits of the cell's corners, x in the lowest, and their labels.
+/// A tetrahedron of a cell.
+#[derive(Clone, Copy)]
 struct Tetrahedron {
-    cell: [i64; 3],
-    corners: [u8; 4],
-    labels: [u32; 4],
+    corners: [Corner; 4],
 }
 
-impl Interfaces {
-    /// For a domain of `shape` voxels, `[x, y, z]`.
-    #[must_use]
-    pub fn new(shape: [i64; 3]) -> Self {
-        Self {
-            keys: VertexKeys::new(shape),
-            vertices: HashMap::new(),
-            candidates: Candidates::default(),
-            normals: Vec::new(),
-        }
-    }
+/// What splits the edges of a cell, by the middle of the edge in halves of voxels of the cell, x fastest.
+type CellSplits = [Option<Corner>; 27];
 
+impl Interfaces {
     /// Fills `patch` with the surfaces in `cells`, given by their lowest corners. What is known reaches one voxel
     /// around the corners of all cells, but for the domain's end. Voxels without a source have no surface.
     ///
@@ -67,32 +63,77 @@ impl Interfaces {
         self.vertices.clear();
         self.normals.clear();
         assert_eq!([known.sources.len(), known.labels.len()], [known.part.len(); 2], "fields are dense over their box");
+        self.splits.enter(known);
         for (y, z) in cells.rows() {
             for x in cells.lo[0]..cells.hi[0] {
-                self.cut_cell(known, [x, y, z], patch);
+                if self.splits.is_near(known, [x, y, z]) {
+                    self.cut_cell(known, [x, y, z], patch);
+                }
             }
         }
     }
 
     fn cut_cell(&mut self, known: &Known<'_>, cell: [i64; 3], patch: &mut TaggedPatch) {
-        let labels: [u32; 8] = std::array::from_fn(|corner| known.label(corner_of(cell, corner as u8)));
-        if labels.iter().all(|&label| label == labels[0]) {
+        let voxels: [Corner; 8] = std::array::from_fn(|n| Corner::of_voxel(known, corner_of(cell, n as u8)));
+        let splits = self.splits_of(known, cell);
+        if voxels.iter().all(|corner| corner.label == voxels[0].label) && splits.iter().all(Option::is_none) {
             return;
         }
         for order in ORDERS {
             let second = 1 << order[0];
-            let corners = [0, second, second | 1 << order[1], 7];
-            let labels = corners.map(|corner: u8| labels[corner as usize]);
-            if labels.iter().any(|&label| label != labels[0]) {
-                self.cut(known, &Tetrahedron { cell, corners, labels }, patch);
+            let corners = [0, second, second | 1 << order[1], 7].map(|n: usize| voxels[n]);
+            self.cut_splits(known, cell, &splits, Tetrahedron { corners }, patch);
+        }
+    }
+
+    fn splits_of(&mut self, known: &Known<'_>, cell: [i64; 3]) -> CellSplits {
+        let mut found = [None; 27];
+        for step in 1..8_u8 {
+            for corner in (0..8_u8).filter(|corner| corner & step == 0) {
+                let at = (0..3).rev().fold(0, |at, a| 3 * at + usize::from(2 * (corner >> a & 1) + (step >> a & 1)));
+                found[at] = self.splits.of_edge(known, corner_of(cell, corner), step);
             }
+        }
+        found
+    }
+
+    /// Cuts a tetrahedron in two at the first of its edges that is split, and these on; what is left along its labels.
+    /// Of several edges always that with the lowest middle goes first, so that neighbours cut their common side alike.
+    fn cut_splits(
+        &mut self,
+        known: &Known<'_>,
+        cell: [i64; 3],
+        splits: &CellSplits,
+        tetrahedron: Tetrahedron,
+        patch: &mut TaggedPatch,
+    ) {
+        let corners = tetrahedron.corners;
+        let split = |ends: &[usize; 2]| {
+            let [from, to] = ends.map(|n| corners[n].halves);
+            // A corner that is no voxel has an odd coordinate.
+            if from.iter().chain(&to).any(|v| v % 2 != 0) {
+                return None;
+            }
+            let at = (0..3).rev().fold(0, |at, a| 3 * at + (i64::midpoint(from[a], to[a]) - 2 * cell[a]) as usize);
+            splits[at].map(|corner| (corner, *ends))
+        };
+        let Some((corner, ends)) = EDGES.iter().filter_map(split).min_by_key(|(corner, _)| corner.order()) else {
+            if corners.iter().any(|corner| corner.label != corners[0].label) {
+                self.cut(known, &tetrahedron, patch);
+            }
+            return;
+        };
+        for end in ends {
+            let mut half = tetrahedron;
+            half.corners[end] = corner;
+            self.cut_splits(known, cell, splits, half, patch);
         }
     }
 
     /// The pieces of a tetrahedron: each is a polygon of vertices, named by the corners that they lie between, that
     /// separates two of its corners.
     fn cut(&mut self, known: &Known<'_>, tetrahedron: &Tetrahedron, patch: &mut TaggedPatch) {
-        let labels = tetrahedron.labels;
+        let labels = tetrahedron.corners.map(|corner| corner.label);
         let like = |n: usize| (0..4).filter(|&m| labels[m] == labels[n]).fold(0_u8, |set, m| set | 1 << m);
         let mut kinds: Vec<u8> = (0..4).map(like).collect();
         kinds.sort_unstable_by_key(|set| (std::cmp::Reverse(set.count_ones()), *set));
@@ -136,7 +177,7 @@ impl Interfaces {
     ) {
         let place = |set: u8| set.trailing_zeros() as usize;
         let [from, to] = corners.map(place);
-        let pair = [tetrahedron.labels[from], tetrahedron.labels[to]];
+        let pair = [from, to].map(|n| tetrahedron.corners[n].label);
         if pair.contains(&0) {
             return;
         }
@@ -145,7 +186,7 @@ impl Interfaces {
         let normal = cross(sub(middles[1], middles[0]), sub(middles[2], middles[0]));
         let along = sub(tetrahedron.middle(1 << to), tetrahedron.middle(1 << from));
         let is_upward = (dot(normal, along) > 0.0) == (pair[0] < pair[1]);
-        for triangle in self.triangles(known, tetrahedron, polygon, patch) {
+        for triangle in self.triangles(known, tetrahedron, polygon, is_upward, patch) {
             patch.patch.triangles.push(if is_upward { triangle } else { [triangle[0], triangle[2], triangle[1]] });
             patch.patch.pairs.push([pair[0].min(pair[1]), pair[0].max(pair[1])]);
         }
@@ -157,36 +198,38 @@ impl Interfaces {
         known: &Known<'_>,
         tetrahedron: &Tetrahedron,
         polygon: &[u8],
+        is_upward: bool,
         patch: &mut TaggedPatch,
     ) -> Vec<[u32; 3]> {
-        let points: Vec<u32> = polygon.iter().map(|&set| self.vertex(known, tetrahedron, set, patch)).collect();
-        let (mut ring, mut corners) = (Vec::with_capacity(2 * points.len()), Vec::new());
-        for (n, &point) in points.iter().enumerate() {
-            ring.push(point);
-            let next = (n + 1) % points.len();
-            let ends = [(polygon[n], point), (polygon[next], points[next])];
+        let vertices: Vec<u32> = polygon.iter().map(|&set| self.vertex(known, tetrahedron, set, patch)).collect();
+        let (mut ring, mut creased) = (Vec::with_capacity(2 * vertices.len()), Vec::new());
+        for (n, &vertex) in vertices.iter().enumerate() {
+            ring.push((polygon[n], vertex));
+            let next = (n + 1) % vertices.len();
+            let ends = [(polygon[n], vertex), (polygon[next], vertices[next])];
             if let Some(corner) = self.corner(known, tetrahedron, ends, patch) {
-                corners.push(ring.len());
-                ring.push(corner);
+                creased.push(corner);
+                ring.push((polygon[n] | polygon[next], corner));
             }
         }
-        match *corners.as_slice() {
-            [] => fan(&ring),
-            [only] => {
-                ring.rotate_left(only);
-                fan(&ring)
-            }
-            [a, b] => {
-                let around: Vec<u32> = ring[b..].iter().chain(&ring[..=a]).copied().collect();
-                [fan(&ring[a..=b]), fan(&around)].concat()
+        let number = |triangle: [usize; 3]| triangle.map(|n| ring[n].1);
+        match creased.len() {
+            0 => polygon::fan(ring.len()).into_iter().map(number).collect(),
+            1 | 2 => {
+                let sign = if is_upward { 1.0 } else { -1.0 };
+                let point = |&(within, vertex): &(u8, u32)| Point {
+                    within,
+                    place: physical(known, patch.patch.positions[vertex as usize]),
+                    normal: self.normals[vertex as usize].map(|n| sign * n),
+                };
+                polygon::cut(&ring.iter().map(point).collect::<Vec<_>>()).into_iter().map(number).collect()
             }
             _ => {
                 // Creases meet here. So many run through no polygon but that of two labels, of which each tetrahedron has
-                // one: no two ask for its middle.
-                let meeting: Vec<u32> = corners.iter().map(|&n| ring[n]).collect();
-                let middle = self.middle_of(known, tetrahedron, &meeting, patch);
+                // one: no two ask for its peak.
+                let peak = self.peak(known, tetrahedron, [&vertices, &creased], patch);
                 let next = ring.iter().cycle().skip(1);
-                ring.iter().zip(next).map(|(&a, &b)| [middle, a, b]).collect()
+                ring.iter().zip(next).map(|(a, b)| [peak, a.1, b.1]).collect()
             }
         }
     }
@@ -204,53 +247,44 @@ impl Interfaces {
         if ends.iter().any(|(set, _)| set.count_ones() != 2) || set.count_ones() != 3 {
             return None;
         }
-        let spacing = known.geometry.spacing;
-        let physical = |position: [f64; 3]| -> [f64; 3] { std::array::from_fn(|a| position[a] * spacing[a]) };
-        let (voxels, _, key) = self.chain(tetrahedron, set);
-        let triangle = [0, 1, 2].map(|n| physical(voxels[n].map(|v| v as f64)));
+        let (corners, _, key) = tetrahedron.sorted(set);
+        let triangle = [0, 1, 2].map(|n| physical(known, corners[n].place));
         let crossings = ends.map(|(_, vertex)| Crossing {
-            place: physical(patch.patch.positions[vertex as usize]),
+            place: physical(known, patch.patch.positions[vertex as usize]),
             normal: self.normals[vertex as usize],
         });
         let weights = creases::corner(triangle, crossings)?;
-        let position = std::array::from_fn(|a| (0..3).map(|n| weights[n] * voxels[n][a] as f64).sum());
-        Some(self.enter(key, patch, |candidates| candidates.at(known, &voxels[..3], position)))
+        let position = std::array::from_fn(|a| (0..3).map(|n| weights[n] * corners[n].place[a]).sum());
+        Some(self.enter(key, patch, |candidates| candidates.at(known, &corners[..3], position)))
     }
 
-    /// The vertex in the middle of others, within the tetrahedron.
-    fn middle_of(
+    /// The vertex where sides meet: that of the surface at some vertices, in the middle of others.
+    fn peak(
         &mut self,
         known: &Known<'_>,
         tetrahedron: &Tetrahedron,
-        others: &[u32],
+        [sides, meeting]: [&[u32]; 2],
         patch: &mut TaggedPatch,
     ) -> u32 {
-        let sum = |a: usize| others.iter().map(|&n| patch.patch.positions[n as usize][a]).sum::<f64>();
-        let position = std::array::from_fn(|a| sum(a) / others.len() as f64);
-        let (voxels, _, key) = self.chain(tetrahedron, 0b1111);
-        self.enter(key, patch, |candidates| candidates.at(known, &voxels, position))
+        let place = |vertex: u32| physical(known, patch.patch.positions[vertex as usize]);
+        let sum = |a: usize| meeting.iter().map(|&n| place(n)[a]).sum::<f64>();
+        let around = std::array::from_fn(|a| sum(a) / meeting.len() as f64);
+        let sides: Vec<Crossing> =
+            sides.iter().map(|&n| Crossing { place: place(n), normal: self.normals[n as usize] }).collect();
+        let found = creases::peak(tetrahedron.corners.map(|corner| physical(known, corner.place)), &sides, around);
+        let position = std::array::from_fn(|a| found[a] / known.geometry.spacing[a]);
+        let (corners, _, key) = tetrahedron.sorted(0b1111);
+        self.enter(key, patch, |candidates| candidates.at(known, &corners, position))
     }
 
     /// The vertex within a set of the tetrahedron's corners, made when its first facet asks for it.
     fn vertex(&mut self, known: &Known<'_>, tetrahedron: &Tetrahedron, set: u8, patch: &mut TaggedPatch) -> u32 {
-        let ([a, b, c, d], len, key) = self.chain(tetrahedron, set);
+        let ([a, b, c, d], len, key) = tetrahedron.sorted(set);
         self.enter(key, patch, |candidates| match len {
             2 => candidates.on_edge(known, [a, b]),
             3 => candidates.within(known, [a, b, c]),
             _ => candidates.within(known, [a, b, c, d]),
         })
-    }
-
-    /// The voxels of a set of corners in order, how many they are, and the key of the vertex within them.
-    fn chain(&self, tetrahedron: &Tetrahedron, set: u8) -> ([[i64; 3]; 4], usize, VertexKey) {
-        let (mut corners, mut len) = ([0_u8; 4], 0);
-        for corner in (0..4).filter(|n| set >> n & 1 == 1).map(|n| tetrahedron.corners[n]) {
-            corners[len] = corner;
-            len += 1;
-        }
-        let steps = std::array::from_fn(|n| if n + 1 < len { corners[n] ^ corners[n + 1] } else { 0 });
-        let voxels = corners.map(|corner| corner_of(tetrahedron.cell, corner));
-        (voxels, len, self.keys.within(voxels[0], steps))
     }
 
     /// The number of a vertex in the patch; its place is looked for when it is new.
@@ -272,18 +306,30 @@ impl Interfaces {
     }
 }
 
-/// The triangles of a polygon from its first vertex on.
-fn fan(polygon: &[u32]) -> Vec<[u32; 3]> {
-    (1..polygon.len() - 1).map(|n| [polygon[0], polygon[n], polygon[n + 1]]).collect()
+/// A place in physical units, from the centre of the domain's first voxel.
+fn physical(known: &Known<'_>, place: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|a| place[a] * known.geometry.spacing[a])
 }
 
 impl Tetrahedron {
-    /// The middle of some of its corners, in voxels of the cell.
+    /// The middle of some of its corners, voxel units.
     fn middle(&self, set: u8) -> [f64; 3] {
-        let corners = || (0..4).filter(|n| set >> n & 1 == 1).map(|n| self.corners[n]);
-        std::array::from_fn(|a| {
-            corners().map(|corner| f64::from(corner >> a & 1)).sum::<f64>() / f64::from(set.count_ones())
-        })
+        let corners =
+            || self.corners.iter().enumerate().filter(move |(n, _)| set >> n & 1 == 1).map(|(_, corner)| corner);
+        std::array::from_fn(|a| corners().map(|corner| corner.place[a]).sum::<f64>() / f64::from(set.count_ones()))
+    }
+
+    /// Some of its corners in the order of all cells, how many they are, and the key of the vertex within them.
+    fn sorted(&self, set: u8) -> ([Corner; 4], usize, VertexKey) {
+        let mut corners = self.corners;
+        let mut len = 0;
+        for n in (0..4).filter(|n| set >> n & 1 == 1) {
+            corners[len] = self.corners[n];
+            len += 1;
+        }
+        corners[..len].sort_unstable_by_key(Corner::order);
+        let halves = corners.map(|corner| corner.halves);
+        (corners, len, VertexKey::within(&halves[..len]))
     }
 }
 

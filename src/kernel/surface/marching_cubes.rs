@@ -4,7 +4,7 @@
 //! A voxel is inside when `u >= level`. Triangles point outward, from inside to outside (counter-clockwise).
 
 use super::tables::{CASES, axis_of, lower_corner};
-use super::vertex_key::{VertexKey, VertexKeys};
+use super::vertex_key::VertexKey;
 use crate::grid::Box3;
 
 /// How close to a voxel centre a vertex may come, in voxels. Where a voxel has exactly the level, the vertices
@@ -58,16 +58,15 @@ pub fn cells_of_brick(brick: &Box3, shape: [i64; 3], closed_at_border: bool) -> 
 #[derive(Clone, Debug)]
 pub struct MarchingCubes {
     level: f32,
-    keys: VertexKeys,
     /// The vertex on each edge of the tile, by `3 * (place of the lower voxel) + axis`.
     vertex_on: Vec<u32>,
 }
 
 impl MarchingCubes {
-    /// For a domain of `shape` voxels, `[x, y, z]`, and the surface `u = level`.
+    /// For the surface `u = level`.
     #[must_use]
-    pub fn new(shape: [i64; 3], level: f32) -> Self {
-        Self { level, keys: VertexKeys::new(shape), vertex_on: Vec::new() }
+    pub fn new(level: f32) -> Self {
+        Self { level, vertex_on: Vec::new() }
     }
 
     /// Fills `patch` with the surface in `cells`, given by their lowest corners.
@@ -130,7 +129,7 @@ impl MarchingCubes {
             let mut position = lower.map(|v| v as f64);
             position[axis] += fraction(tile.values[place], tile.values[tile.part.offset_of(upper)], self.level);
             *vertex = patch.keys.len() as u32;
-            patch.keys.push(self.keys.on_edge(lower, axis));
+            patch.keys.push(VertexKey::on_edge(lower, axis));
             patch.positions.push(position);
         }
         *vertex
@@ -188,7 +187,7 @@ mod tests {
         let part = Box3::new([-1, 4, 7], [3, 7, 10]);
         let values: Vec<f32> = part.rows().flat_map(|_| (-1..3).map(|x| 0.7 - 0.4 * x as f32)).collect();
         let mut patch = Patch::default();
-        MarchingCubes::new([9; 3], 0.5).extract(&values, &part, &Box3::new([-1, 4, 7], [2, 6, 9]), &mut patch);
+        MarchingCubes::new(0.5).extract(&values, &part, &Box3::new([-1, 4, 7], [2, 6, 9]), &mut patch);
         assert_eq!((patch.positions.len(), patch.triangles.len()), (9, 8));
         assert!(patch.positions.iter().all(|p| (p[0] - 0.5).abs() < 1e-6));
         for [a, b, c] in patch.triangles.iter().map(|t| t.map(|v| patch.positions[v as usize])) {

@@ -4,6 +4,7 @@
 //! [`SurfaceMeasure`] sums volume and area as the triangles pass, [`PatchIndex`] answers how far points lie from them.
 
 mod components;
+mod corner;
 mod creases;
 mod edge_tally;
 mod equidistant;
@@ -12,6 +13,8 @@ mod marching_cubes;
 mod measure;
 mod nearest;
 mod pairs;
+mod polygon;
+mod splits;
 mod tables;
 mod vertex_key;
 mod weld;
@@ -24,7 +27,7 @@ pub use marching_cubes::{MarchingCubes, Patch, cells_of_brick};
 pub use measure::{Measures, SurfaceMeasure};
 pub use nearest::{Hausdorff, Nearest, PatchIndex};
 pub use pairs::{Pair, Pairs};
-pub use vertex_key::{VertexKey, VertexKeys};
+pub use vertex_key::VertexKey;
 pub use weld::Welder;
 
 pub use crate::kernel::triangle::Triangle;

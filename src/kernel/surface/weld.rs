@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::marching_cubes::Patch;
-use super::vertex_key::{VertexKey, VertexKeys};
+use super::vertex_key::VertexKey;
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry};
 use crate::store::MeshSink;
@@ -17,7 +17,6 @@ const VERTEX_LIMIT: u64 = u32::MAX as u64;
 #[derive(Clone, Debug)]
 pub struct Welder {
     geometry: Geometry,
-    keys: VertexKeys,
     /// Numbers of the vertices that a later patch may share.
     shared: HashMap<VertexKey, u32>,
     /// The z index at which the current layer of cells starts.
@@ -35,7 +34,6 @@ impl Welder {
     pub fn new(geometry: &Geometry) -> Self {
         Self {
             geometry: geometry.clone(),
-            keys: VertexKeys::new(geometry.shape),
             shared: HashMap::new(),
             layer: i64::MIN,
             vertices: 0,
@@ -91,15 +89,14 @@ impl Welder {
     fn enter_layer(&mut self, layer: i64) {
         debug_assert!(layer >= self.layer, "patches must come in the order of their bricks");
         if layer != self.layer {
-            let keys = self.keys;
-            self.shared.retain(|&key, _| keys.plane(key) >= layer);
+            self.shared.retain(|key, _| key.layer() >= layer);
             self.layer = layer;
         }
     }
 
     /// The number of a vertex: the one a former patch gave it, or the next one.
     fn number(&mut self, key: VertexKey, cells: &Box3, world: [f32; 3], sink: &mut dyn MeshSink) -> Result<u32> {
-        let is_shared = self.touches_border(key, cells);
+        let is_shared = touches_border(key, cells);
         if is_shared && let Some(&number) = self.shared.get(&key) {
             return Ok(number);
         }
@@ -117,15 +114,14 @@ impl Welder {
         Ok(number)
     }
 
-    /// True when the vertex lies in a face of the box of cells, so that a cell of another brick has it too.
-    fn touches_border(&self, key: VertexKey, cells: &Box3) -> bool {
-        let (first, spans) = self.keys.extent(key);
-        (0..3).any(|a| !spans[a] && (first[a] == cells.lo[a] || first[a] == cells.hi[a]))
-    }
-
     fn to_world(&self, position: [f64; 3]) -> [f32; 3] {
         std::array::from_fn(|a| (self.geometry.origin[a] + position[a] * self.geometry.spacing[a]) as f32)
     }
+}
+
+/// True when the vertex lies in a face of the box of cells, so that a cell of another brick has it too.
+fn touches_border(key: VertexKey, cells: &Box3) -> bool {
+    (0..3).any(|a| key.lies_in(a, cells.lo[a]) || key.lies_in(a, cells.hi[a]))
 }
 
 #[cfg(test)]
@@ -139,7 +135,7 @@ mod tests {
         let cells = Box3::new(cell, cell.map(|v| v + 1));
         let mut patch = Patch::default();
         let part = Box3::new(cell, cell.map(|v| v + 2));
-        MarchingCubes::new([9; 3], 0.5).extract(&values, &part, &cells, &mut patch);
+        MarchingCubes::new(0.5).extract(&values, &part, &cells, &mut patch);
         patch
     }
 

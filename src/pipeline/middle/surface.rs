@@ -52,11 +52,10 @@ pub(super) fn draw(
     let (lo, hi) = (geometry.origin, geometry.position(geometry.shape));
     let mut measure = SurfaceMeasure::new(std::array::from_fn(|a| 0.5 * (lo[a] + hi[a])));
     let (mut welder, mut pairs) = (Welder::new(geometry), Pairs::default());
-    let shape = geometry.shape;
-    let grid = BrickGrid::new(shape, EDGE);
-    let make = move || Worker {
-        interfaces: Interfaces::new(shape),
-        cubes: MarchingCubes::new(shape, 0.5),
+    let grid = BrickGrid::new(geometry.shape, EDGE);
+    let make = || Worker {
+        interfaces: Interfaces::default(),
+        cubes: MarchingCubes::new(0.5),
         sources: Vec::new(),
         labels: Vec::new(),
     };
