@@ -10,6 +10,7 @@ use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::distance_args::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
 use super::distance_report::{Found, Settings, describe_found};
+use super::distance_sources::{Read, read_sets};
 use super::files::{export_mesh, mesh_format};
 use super::grid::grid;
 use super::report::{Ran, Report};
@@ -19,7 +20,6 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
 use crate::io::ome_zarr::StoreWriter;
-use crate::io::sources::{Source, read_source};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::precision::Precision;
 use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, Textbook, distance};
@@ -67,10 +67,13 @@ impl Job {
         config::check_outputs(&args.output.output, &[&args.output.report, mesh], args.output.overwrite)?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
-        let sets = read_sets(&args, &console)?;
+        let Read { sets, volume } = read_sets(&args, &console, &cancel)?;
         let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
         let mut notes = Vec::new();
-        let geometry = grid(&args.grid, bounds, &mut notes)?;
+        let geometry = match volume {
+            Some(geometry) if !args.grid.is_asked_for() => geometry,
+            _ => grid(&args.grid, bounds, &mut notes)?,
+        };
         for note in &notes {
             console.note(note);
         }
@@ -283,39 +286,6 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
         closest_point: args.choice.closest_point,
         brick: config::brick(args.resources.brick.unwrap_or(row.brick))?,
     })
-}
-
-/// Reads all sources; the n-th file is data set n.
-fn read_sets(args: &DistanceJobArgs, console: &Console) -> Result<DataSets> {
-    let mut sets = DataSets::default();
-    for path in &args.sources {
-        match read_source(path)? {
-            Source::Cloud(_) if args.choice.signed => {
-                let what = "holds points, which have no inside; --signed needs triangle meshes";
-                return Err(Error::input(what).at(path));
-            }
-            Source::Cloud(cloud) => sets.add_cloud(&cloud.positions),
-            Source::Mesh(mesh) => {
-                let edges = mesh.boundary_edges();
-                let name = path.display();
-                if args.choice.signed && !edges.is_closed() {
-                    console.note(&format!(
-                        "{name} is open: {} boundary edges; inside is where it winds around more than half",
-                        grouped(edges.open)
-                    ));
-                }
-                if args.choice.signed && !edges.is_oriented() {
-                    console.note(&format!(
-                        "{name} has {} edges whose triangles disagree on what is outside; signs there may be wrong",
-                        grouped(edges.flipped)
-                    ));
-                }
-                sets.add_mesh(&mesh);
-            }
-        }
-        crate::grid::refuse_too_many("sources", sets.len() as u64).map_err(|error| error.at(path))?;
-    }
-    Ok(sets)
 }
 
 /// Refuses distances that the type cannot hold.

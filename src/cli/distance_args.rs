@@ -48,9 +48,12 @@ pub(super) struct GridArgs {
     #[arg(long, value_name = "NX,NY,NZ", value_parser = parse_whole_triple, allow_hyphen_values = true,
           requires_all = ["origin", "spacing"])]
     pub(super) shape: Option<[i64; 3]>,
-    /// The grid of this image: TIFF stack or folder of slices
+    /// The grid of this image: TIFF stack or folder of slices; that of a label volume is taken without being asked for
     #[arg(long, value_name = "IMAGE", conflicts_with_all = ["spacing", "origin", "shape"])]
     pub(super) like: Option<PathBuf>,
+    /// Distance between voxel centres of label volumes and of --like, in place of what the file says
+    #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
+    pub(super) image_spacing: Option<[f64; 3]>,
 }
 
 /// How distance is computed.
@@ -155,5 +158,8 @@ pub(super) enum PrecisionArg {
 /// The line of the help that lists the formats.
 pub(super) fn sources_help() -> String {
     let list: Vec<&str> = crate::io::sources::FORMATS.iter().map(|format| format.name).collect();
-    format!("Point clouds and triangle meshes ({}), told apart by content", list.join(", "))
+    format!(
+        "Point clouds and triangle meshes ({}), and label volumes (TIFF, OME-Zarr), told apart by content",
+        list.join(", ")
+    )
 }

@@ -15,7 +15,7 @@ const DEFAULT_PADDING: f64 = 1.0 / 6.0;
 /// The grid that was asked for; `bounds` is the box of all sources. Adds what the user should know to `notes`.
 pub(super) fn grid(args: &GridArgs, (low, high): ([f64; 3], [f64; 3]), notes: &mut Vec<String>) -> Result<Geometry> {
     if let Some(image) = &args.like {
-        let stack = open_stack(image, Select { channel: 0, time: 0 }, None)?;
+        let stack = open_stack(image, Select { channel: 0, time: 0 }, args.image_spacing)?;
         notes.extend(stack.notes);
         return Ok(stack.geometry);
     }
@@ -61,6 +61,13 @@ fn exact(shape: [i64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Geometr
     Ok(Geometry { shape, spacing, origin, unit: None })
 }
 
+impl GridArgs {
+    /// Whether anything was said of where the grid lies.
+    pub(super) fn is_asked_for(&self) -> bool {
+        self.spacing.is_some() || self.padding.is_some() || self.origin.is_some() || self.like.is_some()
+    }
+}
+
 /// Refuses what no index could count.
 pub(super) fn check_counts(counts: [f64; 3]) -> Result<()> {
     let voxels: f64 = counts.iter().product();
@@ -77,7 +84,8 @@ pub(super) fn check_counts(counts: [f64; 3]) -> Result<()> {
 mod tests {
     use super::*;
 
-    const NOTHING: GridArgs = GridArgs { spacing: None, padding: None, origin: None, shape: None, like: None };
+    const NOTHING: GridArgs =
+        GridArgs { spacing: None, padding: None, origin: None, shape: None, like: None, image_spacing: None };
 
     fn around(args: &GridArgs, low: [f64; 3], high: [f64; 3]) -> Result<Geometry> {
         grid(args, (low, high), &mut Vec::new())

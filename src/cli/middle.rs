@@ -4,12 +4,13 @@ use super::distance::{MiddleChoice, run_middle};
 use super::distance_args::{ChoiceArgs, DistanceJobArgs};
 use super::middle_args::{LabelsArg, MiddleArgs, SurfaceArg};
 use crate::error::{Error, Result};
+use crate::io::label_volume::is_label_volume;
 use crate::pipeline::middle::{LabelMode, SurfaceKind};
 
 /// Runs the command.
 pub(super) fn run(args: &MiddleArgs, typed: &[String]) -> Result<()> {
-    if args.sources.len() < 2 {
-        return Err(Error::usage("a middle surface lies between data sets; give two files or more"));
+    if args.sources.len() < 2 && !args.sources.iter().any(|path| is_label_volume(path)) {
+        return Err(Error::usage("a middle surface lies between data sets; give two files or more, or a label volume"));
     }
     let MiddleArgs { sources, grid, field, surface, resources, ranks, output } = args.clone();
     let choice = MiddleChoice {

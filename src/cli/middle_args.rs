@@ -63,5 +63,5 @@ pub(super) enum LabelsArg {
 
 /// The line of the help that lists the formats.
 fn labelled_help() -> String {
-    format!("{}; the n-th has label n", sources_help())
+    format!("{}; the n-th has label n, the labels of a volume are its own", sources_help())
 }

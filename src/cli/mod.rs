@@ -10,6 +10,7 @@ mod demo;
 mod distance;
 mod distance_args;
 mod distance_report;
+mod distance_sources;
 mod files;
 mod grid;
 mod info;

@@ -39,8 +39,8 @@ impl PointCloud {
     }
 }
 
-/// The sources of a run, points and triangles, numbered through: first all points, then all triangles. The n-th data
-/// set that was added has label n, counted from 1.
+/// The sources of a run, points and triangles, numbered through: first all points, then all triangles. Each data set has
+/// a label, larger than those before it: the next number, where none was asked for, so that the n-th has label n.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DataSets {
     /// World positions of all points.
@@ -49,11 +49,35 @@ pub struct DataSets {
     pub mesh: TriangleMesh,
     /// The places of each data set's points, and of its triangles; one of the two is empty.
     sets: Vec<[Range<u32>; 2]>,
+    /// Their labels, ascending.
+    labels: Vec<u32>,
 }
 
 impl DataSets {
+    /// The label of the last data set; 0 where there is none.
+    #[must_use]
+    pub fn last_label(&self) -> u32 {
+        self.labels.last().copied().unwrap_or(0)
+    }
+
+    /// The labels of the data sets, ascending.
+    #[must_use]
+    pub fn labels(&self) -> &[u32] {
+        &self.labels
+    }
+
     /// Adds a cloud.
     pub fn add_cloud(&mut self, positions: &[[f64; 3]]) {
+        self.add_labelled(self.last_label() + 1, positions);
+    }
+
+    /// Adds a cloud with a label.
+    ///
+    /// # Panics
+    /// When the label is not larger than those before it.
+    pub fn add_labelled(&mut self, label: u32, positions: &[[f64; 3]]) {
+        assert!(label > self.last_label(), "labels are added in order");
+        self.labels.push(label);
         let (points, triangles) = (self.positions.len() as u32, self.mesh.triangles.len() as u32);
         self.positions.extend_from_slice(positions);
         self.sets.push([points..self.positions.len() as u32, triangles..triangles]);
@@ -63,6 +87,7 @@ impl DataSets {
     pub fn add_mesh(&mut self, mesh: &TriangleMesh) {
         let (points, triangles) = (self.positions.len() as u32, self.mesh.triangles.len() as u32);
         let before = self.mesh.vertices.len() as u32;
+        self.labels.push(self.last_label() + 1);
         self.mesh.vertices.extend_from_slice(&mesh.vertices);
         self.mesh.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + before)));
         self.sets.push([points..points, triangles..self.mesh.triangles.len() as u32]);
@@ -103,7 +128,7 @@ impl DataSets {
         let (kind, at) = if source < points { (0, source) } else { (1, source - points) };
         // Sets are added in order, so that the first one that ends beyond a source holds it.
         let set = self.sets.partition_point(|set| set[kind].end <= at);
-        if set < self.sets.len() { set as u32 + 1 } else { 0 }
+        self.labels.get(set).copied().unwrap_or(0)
     }
 
     /// The smallest box that holds all sources, `(lowest, highest)`.
@@ -127,10 +152,11 @@ mod tests {
         let mut sets = DataSets::default();
         sets.add_cloud(&[[0.0; 3], [2.0; 3]]);
         sets.add_mesh(&triangle);
-        sets.add_cloud(&[[-1.0; 3]]);
+        sets.add_labelled(7, &[[-1.0; 3]]);
         sets.add_mesh(&triangle);
         let labels: Vec<u32> = (0..8).map(|source| sets.label(source)).collect();
-        assert_eq!(labels, [1, 1, 3, 2, 2, 4, 4, 0]);
+        assert_eq!(labels, [1, 1, 7, 2, 2, 8, 8, 0]);
+        assert_eq!(sets.labels(), [1, 2, 7, 8]);
         assert_eq!(sets.mesh.triangles[2], [3, 4, 5]);
         assert_eq!(sets.bounds(), Some(([-1.0; 3], [5.0, 2.0, 2.0])));
     }

@@ -1,6 +1,7 @@
 //! Which bytes mean what: one file format a file.
 
 mod input;
+pub mod label_volume;
 mod mesh;
 pub mod mesh_export;
 pub mod mesh_ply;

@@ -7,28 +7,7 @@ use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet};
 use crate::kernel::image::grey_range::GreyRange;
 use crate::kernel::image::histogram::Histogram;
-use crate::store::{BoxSink, BrickArray, Element, PlaneSource, SamplesMut};
-
-/// An element type that stacks hand out: says how its buffers are passed to a reader.
-pub trait Sample: Element {
-    /// The buffer as the reader wants it.
-    fn buffer(out: &mut [Self]) -> SamplesMut<'_>;
-}
-
-macro_rules! sample {
-    ($type:ty, $variant:ident) => {
-        impl Sample for $type {
-            fn buffer(out: &mut [Self]) -> SamplesMut<'_> {
-                SamplesMut::$variant(out)
-            }
-        }
-    };
-}
-sample!(u8, U8);
-sample!(u16, U16);
-sample!(u32, U32);
-sample!(f32, F32);
-sample!(f64, F64);
+use crate::store::{BoxSink, BrickArray, Element, PlaneSource, Sample};
 
 /// An image in bricks, with what its histogram tells.
 pub struct Image<T: Element> {

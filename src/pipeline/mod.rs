@@ -10,6 +10,7 @@ mod far_regions;
 pub mod image_terms;
 pub mod ingest;
 pub mod intensity;
+pub mod label_borders;
 pub mod marks;
 pub mod middle;
 pub mod motion;

@@ -117,6 +117,27 @@ pub enum SamplesMut<'a> {
     F64(&'a mut [f64]),
 }
 
+/// An element type that stacks hand out: says how its buffers are passed to a reader.
+pub trait Sample: Element {
+    /// The buffer as the reader wants it.
+    fn buffer(out: &mut [Self]) -> SamplesMut<'_>;
+}
+
+macro_rules! sample {
+    ($type:ty, $variant:ident) => {
+        impl Sample for $type {
+            fn buffer(out: &mut [Self]) -> SamplesMut<'_> {
+                SamplesMut::$variant(out)
+            }
+        }
+    };
+}
+sample!(u8, U8);
+sample!(u16, U16);
+sample!(u32, U32);
+sample!(f32, F32);
+sample!(f64, F64);
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,7 +9,7 @@ mod stream;
 mod window;
 
 pub use brick_array::{BrickArray, Scratch};
-pub use element::{Element, ElementType, SamplesMut};
+pub use element::{Element, ElementType, Sample, SamplesMut};
 pub use free_space::free_space;
 pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, NoMesh, PlaneSource};
 pub use window::{Traffic, Window};

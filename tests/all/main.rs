@@ -18,6 +18,7 @@ mod maximum_principle;
 mod mesh_ply;
 mod mesh_sources;
 mod middle;
+mod middle_labels;
 mod points;
 mod ranks;
 mod reconstruct;

@@ -10,6 +10,8 @@ use crate::kernel::triangle::Triangle;
 #[derive(Debug)]
 pub struct SourceTrees {
     trees: Vec<Tree>,
+    /// The labels of the trees, ascending.
+    labels: Vec<u32>,
 }
 
 /// The sources of one data set, with their numbers.
@@ -57,13 +59,14 @@ impl SourceTrees {
             };
             Tree::Triangles(RTree::bulk_load(mesh.map(placed).collect()))
         };
-        Self { trees: sets.places().map(tree).collect() }
+        Self { trees: sets.places().map(tree).collect(), labels: sets.labels().to_vec() }
     }
 
     /// The number of a label's source that is nearest to a world position; `u32::MAX` where the label has none.
     #[must_use]
     pub fn nearest(&self, label: u32, here: [f64; 3]) -> u32 {
-        self.look(label as usize - 1, here).map_or(u32::MAX, |(source, _)| source)
+        let tree = self.labels.binary_search(&label).ok();
+        tree.and_then(|tree| self.look(tree, here)).map_or(u32::MAX, |(source, _)| source)
     }
 
     /// The voxels of a box whose sources, dense over it, have a label that is not the nearest; each with its nearest
@@ -97,7 +100,7 @@ impl SourceTrees {
         self.settle_among(geometry, part, &all, tell);
     }
 
-    /// The same among the labels that can be nearest there, counted from 0.
+    /// The same among the trees that can be nearest there.
     fn settle_among(
         &self,
         geometry: &Geometry,
@@ -109,7 +112,7 @@ impl SourceTrees {
             return;
         }
         if let [only] = among {
-            return tell(part, *only as u32 + 1, None);
+            return tell(part, self.labels[*only], None);
         }
         let (lo, hi) = (geometry.position(part.lo), geometry.position(part.hi.map(|v| v - 1)));
         let middle = std::array::from_fn(|a| 0.5 * (lo[a] + hi[a]));
@@ -120,21 +123,21 @@ impl SourceTrees {
             return;
         };
         if part.len() == 1 {
-            return tell(part, best.0 as u32 + 1, Some(best.1));
+            return tell(part, self.labels[best.0], Some(best.1));
         }
         // A little more, for the roots are rounded.
         let limit = best.2.sqrt() * (1.0 + 1e-12) + 2.0 * reach * (1.0 + 1e-9);
         let left: Vec<usize> = found.iter().filter(|(_, _, squared)| squared.sqrt() <= limit).map(|f| f.0).collect();
         if left.len() == 1 {
-            return tell(part, left[0] as u32 + 1, None);
+            return tell(part, self.labels[left[0]], None);
         }
         for half in halves(part) {
             self.settle_among(geometry, &half, &left, tell);
         }
     }
 
-    fn look(&self, label: usize, here: [f64; 3]) -> Option<(u32, f64)> {
-        match &self.trees[label] {
+    fn look(&self, tree: usize, here: [f64; 3]) -> Option<(u32, f64)> {
+        match &self.trees[tree] {
             Tree::Points(tree) => tree.nearest_neighbor(here).map(|p| (p.data, p.distance_2(&here))),
             Tree::Triangles(tree) => tree.nearest_neighbor(here).map(|t| (t.data, t.distance_2(&here))),
         }

@@ -66,7 +66,7 @@ pub fn write_label_field<L>(
 where
     L: BoxSource<u8> + BoxSource<u16> + BoxSource<u32>,
 {
-    match sets.count() {
+    match sets.last_label() {
         0..=0xff => write_labels::<u8>(engine, geometry, sets, name, labels, store),
         0x100..=0xffff => write_labels::<u16>(engine, geometry, sets, name, labels, store),
         _ => write_labels::<u32>(engine, geometry, sets, name, labels, store),
@@ -85,7 +85,7 @@ fn write_labels<T: Element>(
         let [red, green, blue] = label_color(label);
         LabelColor { label, rgba: [red, green, blue, 255] }
     };
-    let colors: Vec<LabelColor> = (1..=sets.count() as u32).map(color).collect();
+    let colors: Vec<LabelColor> = sets.labels().iter().copied().map(color).collect();
     let image = store.labels(&LabelSpec { name, geometry, element: T::TYPE, colors: &colors })?;
     let stage = engine.stage(&format!("write {name}"), 0);
     stage.voxels(geometry.domain().volume());

@@ -68,7 +68,7 @@ impl MiddleSettings {
 pub struct MiddleFound {
     /// Of the distance.
     pub distance: DistanceFound,
-    /// The measures of all surfaces as one mesh; its volume is that around label 2, where it is closed.
+    /// The measures of all surfaces as one mesh; its volume is that around the second label, where it is closed.
     pub measures: Measures,
     /// What lies between each two labels that meet.
     pub pairs: Vec<Pair>,
@@ -101,7 +101,8 @@ pub fn middle<P: Precision>(
         let found = measure(engine, geometry, sets, &distance, &solved, set)?;
         let stage = engine.stage("surface", 0);
         stage.voxels(geometry.domain().volume());
-        let labelled = Labelled { geometry, shapes: &shapes, trees: &trees, sources: &*solved.sources };
+        let first_labels = std::array::from_fn(|n| sets.labels().get(n).copied().unwrap_or(0));
+        let labelled = Labelled { geometry, shapes: &shapes, trees: &trees, sources: &*solved.sources, first_labels };
         let (measures, pairs) = match store {
             Some(store) => {
                 let mut mesh = PlyWriter::create_tagged(&store.file("meshes/surface.ply")?, geometry.unit.as_deref())?;
@@ -125,7 +126,10 @@ pub fn middle<P: Precision>(
 
 fn refuse(sets: &DataSets, surface: SurfaceKind) -> Result<()> {
     match (sets.count(), surface) {
-        (0 | 1, _) => Err(Error::usage("a middle surface lies between data sets; give two files or more")),
+        (0 | 1, _) => Err(Error::usage(
+            "a middle surface lies between data sets, but the files hold one; give two files or more, or a label volume \
+             with two labels or more",
+        )),
         (2, _) | (_, SurfaceKind::Exact) => Ok(()),
         (count, SurfaceKind::Labels) => Err(Error::usage(format!(
             "--surface labels draws the border of two data sets, but {count} were given; leave it out for the borders of \

@@ -31,6 +31,8 @@ pub(super) struct Labelled<'a> {
     pub(super) shapes: &'a LabelledShapes<'a>,
     pub(super) trees: &'a SourceTrees,
     pub(super) sources: &'a dyn BoxSource<u32>,
+    /// The first two labels.
+    pub(super) first_labels: [u32; 2],
 }
 
 /// Work buffers for one brick.
@@ -100,9 +102,10 @@ impl Worker {
                 self.interfaces.extract(&known, &cells, &mut patch);
             }
             SurfaceKind::Labels => {
-                let inside: Vec<f32> = self.labels.iter().map(|&label| f32::from(u8::from(label == 2))).collect();
+                let [low, high] = labelled.first_labels;
+                let inside: Vec<f32> = self.labels.iter().map(|&label| f32::from(u8::from(label == high))).collect();
                 self.cubes.extract(&inside, &part, &cells, &mut patch.patch);
-                patch.patch.pairs = vec![[1, 2]; patch.patch.triangles.len()];
+                patch.patch.pairs = vec![[low, high]; patch.patch.triangles.len()];
                 patch.distances = self.distances_of(labelled, &part, &patch);
             }
         }

@@ -11,11 +11,11 @@ use crate::grid::{Box3, BrickGrid, Geometry};
 use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
 use crate::kernel::image::labels;
 use crate::kernel::image::palette::label_color;
-use crate::pipeline::ingest::{Image, Sample, ingest};
+use crate::pipeline::ingest::{Image, ingest};
 use crate::pipeline::marks::{ObjectMarks, split_and_seed};
 use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
-use crate::store::{BoxSource, Element, ElementType, PlaneSource};
+use crate::store::{BoxSource, Element, ElementType, PlaneSource, Sample};
 
 /// What a segmentation found.
 #[derive(Clone, Debug)]
