@@ -38,9 +38,9 @@ fn nearest(geometry: &Geometry, labels: &[u16]) -> Vec<f64> {
         grid.voxels().filter(is_border).map(|voxel| (position(geometry, voxel), at(voxel))).collect();
     let of = |voxel| {
         let here = position(geometry, voxel);
-        let key = |(place, label): &([f64; 3], u16)| (squared(here, *place), *label);
-        let closest = border.iter().map(key).min_by(|a, b| a.partial_cmp(b).unwrap());
-        f64::from(closest.unwrap().1)
+        let far = (f64::INFINITY, u16::MAX);
+        let closest = border.iter().map(|(place, label)| (squared(here, *place), *label));
+        f64::from(closest.fold(far, |best, next| if next < best { next } else { best }).1)
     };
     grid.voxels().map(of).collect()
 }
