@@ -19,12 +19,23 @@ pub struct Solved<'a, P> {
     pub values: Arc<dyn BoxSource<P> + Send + 'a>,
     /// For each voxel the index of its nearest known source, or [`NO_SOURCE`].
     pub sources: Arc<dyn BoxSource<u32> + Send + 'a>,
+    /// Both at once, where they are made of the same and that is cheaper.
+    pub together: Option<Arc<dyn Together<P> + Send + 'a>>,
     /// 1 where a source fixed the voxel, else 0.
     pub fixed: Arc<dyn BoxSource<u8> + Send + 'a>,
     /// Voxels that sources fixed.
     pub fixed_voxels: u64,
     /// Distances from a voxel to a triangle that were computed to fix them.
     pub triangle_distances: u64,
+}
+
+/// Distances and sources that are made of the same state.
+pub trait Together<P>: Sync {
+    /// Reads both for a box, dense `[z][y][x]`.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()>;
 }
 
 /// What a field holds, for the report.
@@ -52,16 +63,15 @@ impl<P: Precision> Solved<'_, P> {
         let parts = stage.run(&one_wave(set), &workers, |(values, sources), &slot| {
             let part = set.grid().brick_box(set.id(slot));
             let values = &mut values[..part.len()];
-            self.values.read_box(&part, values)?;
-            let (max, unlabelled_voxels) = extent(values);
-            let mut counts = BTreeMap::<u32, u64>::new();
+            let mut counts = BTreeMap::new();
             if let Some(sets) = labels {
                 sources.resize(part.len(), NO_SOURCE);
-                self.sources.read_box(&part, sources)?;
-                for same in sources.chunk_by(|a, b| a == b) {
-                    *counts.entry(sets.label(same[0])).or_default() += same.len() as u64;
-                }
+                self.read_both(&part, values, sources)?;
+                counts = voxels_of_labels(sets, sources);
+            } else {
+                self.values.read_box(&part, values)?;
             }
+            let (max, unlabelled_voxels) = extent(values);
             Ok((Measured { max, unlabelled_voxels }, counts))
         })?;
         let mut all = (Measured::default(), BTreeMap::<u32, u64>::new());
@@ -75,6 +85,31 @@ impl<P: Precision> Solved<'_, P> {
         all.1.remove(&0);
         Ok(all)
     }
+
+    /// Reads distances and sources of a box.
+    fn read_both(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
+        if let Some(together) = &self.together {
+            return together.read_together(part, values, sources);
+        }
+        self.values.read_box(part, values)?;
+        self.sources.read_box(part, sources)
+    }
+}
+
+/// How many voxels each label has, 0 where they have no source.
+fn voxels_of_labels(sets: &DataSets, sources: &[u32]) -> BTreeMap<u32, u64> {
+    let mut counts = BTreeMap::<u32, u64>::new();
+    let mut run = (0, 0);
+    for same in sources.chunk_by(|a, b| a == b) {
+        let label = sets.label(same[0]);
+        if label != run.0 {
+            *counts.entry(run.0).or_default() += run.1;
+            run = (label, 0);
+        }
+        run.1 += same.len() as u64;
+    }
+    *counts.entry(run.0).or_default() += run.1;
+    counts
 }
 
 /// A method's state, read as distances or sources.

@@ -87,7 +87,7 @@ pub fn distance<P: Precision>(
     solve_sets::<P, _>(engine, geometry, sets, settings, |mut solved, set| {
         if settings.signed {
             let values = Arc::new(Signed::new(&solved, geometry, WindingTree::new(&sets.mesh), &sets.mesh));
-            solved = Solved { values, ..solved };
+            solved = Solved { values, together: None, ..solved };
         }
         let found = measure(engine, geometry, sets, settings, &solved, set)?;
         if let Some(store) = store {

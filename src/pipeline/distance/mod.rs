@@ -23,7 +23,7 @@ mod trace;
 
 use std::sync::Arc;
 
-pub use field::{Measured, Solved};
+pub use field::{Measured, Solved, Together};
 pub use job::{DistanceFound, DistanceSettings, Init, distance, measure, solve_sets};
 pub use needs::Needs;
 pub use output::{NearestLabels, write_fields, write_label_field};

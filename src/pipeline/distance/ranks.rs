@@ -55,6 +55,7 @@ pub(super) fn solve_once<'a, P: Precision>(
     Ok(Solved {
         values: joined.join(parts.iter().map(|part| part.values.clone()).collect()),
         sources: joined.join(parts.iter().map(|part| part.sources.clone()).collect()),
+        together: None,
         fixed: joined.join(parts.iter().map(|part| part.fixed.clone()).collect()),
         fixed_voxels: sum(|part| part.fixed_voxels),
         triangle_distances: sum(|part| part.triangle_distances),

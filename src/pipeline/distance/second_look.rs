@@ -5,6 +5,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::field::Together;
 use super::{Options, Solved, Sources};
 use crate::error::Result;
 use crate::exec::Workers;
@@ -41,7 +42,7 @@ fn join<'a, P: Precision, S: TrackedSource + 'a>(
 ) -> Solved<'a, P> {
     let buffers = Workers::new(Default::default);
     let seen = Arc::new(SecondLook { method, geometry, found: solved.sources, farthest: options.farthest, buffers });
-    Solved { values: seen.clone(), sources: seen, ..solved }
+    Solved { values: seen.clone(), together: Some(seen.clone()), sources: seen, ..solved }
 }
 
 /// Sources as a method left them, and what tells how far they are.
@@ -69,6 +70,14 @@ impl<S: TrackedSource> SecondLook<'_, S> {
             }
             Ok(())
         })
+    }
+}
+
+impl<S> SecondLook<'_, S> {
+    fn distances<P: Precision>(&self, squared: &[f64], out: &mut [P]) {
+        for (out, squared) in out.iter_mut().zip(squared) {
+            *out = P::from_f64(squared.sqrt().min(self.farthest));
+        }
     }
 }
 
@@ -105,17 +114,25 @@ impl<S: TrackedSource> BoxSource<u32> for SecondLook<'_, S> {
     }
 }
 
+impl<S: TrackedSource, P: Precision> Together<P> for SecondLook<'_, S> {
+    fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
+        self.see(part, |piece, seen| {
+            each_row(part, piece, |to, from| {
+                sources[to.clone()].copy_from_slice(&seen.sources[from.clone()]);
+                self.distances(&seen.squared[from], &mut values[to]);
+            });
+        })
+    }
+}
+
 impl<S: TrackedSource, P: Precision> BoxSource<P> for SecondLook<'_, S> {
     fn shape(&self) -> [i64; 3] {
         self.geometry.shape
     }
 
     fn read_box(&self, part: &Box3, out: &mut [P]) -> Result<()> {
-        let distance = |squared: f64| P::from_f64(squared.sqrt().min(self.farthest));
         self.see(part, |piece, seen| {
-            each_row(part, piece, |to, from| {
-                out[to].iter_mut().zip(&seen.squared[from]).for_each(|(out, &squared)| *out = distance(squared));
-            });
+            each_row(part, piece, |to, from| self.distances(&seen.squared[from], &mut out[to]));
         })
     }
 }

@@ -364,7 +364,14 @@ impl<'a> Job<'_, 'a> {
         let buffers = Workers::new(Vec::new);
         let values = Arc::new(Values { method, state, farthest: self.options.farthest, buffers });
         let Seeded { fixed_voxels, triangle_distances, .. } = *seeded;
-        Solved { sources: values.clone(), fixed: values.clone(), values, fixed_voxels, triangle_distances }
+        Solved {
+            sources: values.clone(),
+            together: None,
+            fixed: values.clone(),
+            values,
+            fixed_voxels,
+            triangle_distances,
+        }
     }
 }
 

@@ -96,7 +96,7 @@ pub fn middle<P: Precision>(
             stage.voxels(geometry.domain().volume());
             let sources = exact_sources(&stage, geometry, sets, &trees, set.grid(), solved.sources.clone())?;
             stage.finish();
-            solved = Solved { sources, ..solved };
+            solved = Solved { sources, together: None, ..solved };
         }
         let found = measure(engine, geometry, sets, &distance, &solved, set)?;
         let stage = engine.stage("surface", 0);
