@@ -11,19 +11,26 @@ from pathlib import Path
 from common import page
 from common.program import METHODS, Program
 
-from . import cube, sponge, surface, teddy
+from . import cube, middle, sponge, surface, teddy
 from .setting import Setting
 
-SECTIONS = {"cube": cube.section, "teddy": teddy.section, "sponge": sponge.section, "surface": surface.section}
+SECTIONS = {
+    "cube": cube.section,
+    "teddy": teddy.section,
+    "sponge": sponge.section,
+    "middle": middle.section,
+    "surface": surface.section,
+}
 TITLE = """# Reproduction
 
 B. Kósa, K. Mikula: *Direct simple computation of middle surface between 3D point clouds and/or discrete surfaces by
-tracking sources in distance function calculation algorithms*, 2023: the tables of its distance experiments; B. Kósa,
-K. Mikula, 2015, and B. Kósa's PhD thesis: surfaces from point clouds; and what this program gives. Tables are numbered
-as printed. `scripts/reproduce` runs the experiments and writes this page.
+tracking sources in distance function calculation algorithms*, 2023: the tables of its experiments; B. Kósa, K. Mikula,
+2015, and B. Kósa's PhD thesis: surfaces from point clouds; and what this program gives. Tables are numbered as printed.
+`scripts/reproduce` runs the experiments and writes this page, part by part.
 
     scripts/reproduce --data FOLDER            # all grids, up to 893 x 1279 x 482
     scripts/reproduce --finest 340             # those of at most 340 points along an axis
+    scripts/reproduce --only middle            # one part
 """
 
 
@@ -53,20 +60,20 @@ def main():
     absent = [method for method in METHODS if method not in methods]
     if absent:
         print(f"not in this version: {', '.join(absent)}", flush=True)
-    started = time.monotonic()
-    with tempfile.TemporaryDirectory(dir=settings.scratch) as scratch:
-        setting = Setting(program, methods, settings.finest, Path(scratch), settings.data)
-        parts = []
-        for name in settings.only or SECTIONS:
-            print(name, flush=True)
-            parts.append(SECTIONS[name](setting))
-    minutes = (time.monotonic() - started) / 60
-    head = f"{page.circumstances(program.version())} The whole took {minutes:.0f} minutes."
     if not settings.out.exists():
         settings.out.parent.mkdir(exist_ok=True)
         settings.out.write_text(TITLE + "\n", encoding="utf-8")
-    page.write_part(settings.out, "scripts/reproduce", "\n\n".join([head, *parts]))
-    print(f"{settings.out} in {minutes:.1f} minutes")
+    whole = time.monotonic()
+    with tempfile.TemporaryDirectory(dir=settings.scratch) as scratch:
+        setting = Setting(program, methods, settings.finest, Path(scratch), settings.data)
+        for name in settings.only or SECTIONS:
+            print(name, flush=True)
+            started = time.monotonic()
+            text = SECTIONS[name](setting)
+            minutes = (time.monotonic() - started) / 60
+            head = f"{page.circumstances(program.version())} This part took {minutes:.0f} minutes."
+            page.write_part(settings.out, f"scripts/reproduce --only {name}", f"{text}\n\n{head}")
+    print(f"{settings.out} in {(time.monotonic() - whole) / 60:.1f} minutes")
 
 
 if __name__ == "__main__":

@@ -21,8 +21,29 @@ def read_ply(path):
         if words[0] == "element"
     }
     vertices = np.frombuffer(body, "<f4", 3 * counts["vertex"]).reshape(-1, 3)
-    face = np.dtype([("n", "u1"), ("v", "<u4", 3)])
+    tagged = b"property uint label_low" in head
+    face = np.dtype([("n", "u1"), ("v", "<u4", 3), *([("labels", "<u4", 2)] if tagged else [])])
     return vertices.astype(float), np.frombuffer(body, face, counts["face"], offset=12 * counts["vertex"])["v"]
+
+
+def read_tagged(path):
+    """Vertices, triangles and the two labels of each, of a PLY that `middle` writes."""
+    data = Path(path).read_bytes()
+    head, _, body = data.partition(b"end_header\n")
+    counts = dict(line.split()[1:] for line in head.decode().splitlines() if line.startswith("element"))
+    vertices, faces = int(counts["vertex"]), int(counts["face"])
+    face = np.dtype([("n", "u1"), ("v", "<u4", 3), ("labels", "<u4", 2)])
+    table = np.frombuffer(body, face, faces, offset=12 * vertices)
+    return np.frombuffer(body, "<f4", 3 * vertices).reshape(-1, 3).astype(float), table["v"], table["labels"]
+
+
+def plane(distance, bright, dark, path):
+    """A plane of a distance, grey, with some voxels bright and some dark."""
+    grey = 90 + 100 * (distance / distance.max())
+    grey[bright] = 255
+    grey[dark] = 0
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(png(grey[::-1].astype(np.uint8)))
 
 
 def draw(mesh, path):
@@ -38,6 +59,8 @@ def draw(mesh, path):
     corners = seen[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    # What is seen faces the eye, whichever side is called outward.
+    normal[normal[:, 2] < 0] *= -1
     shade = 40 + 200 * np.clip(normal @ np.array([0.3, 0.4, 0.866]), 0, 1)
     # Triangles are smaller than pixels or not much larger: each is drawn as the points of a small lattice on it.
     n = LATTICE
