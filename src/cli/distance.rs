@@ -64,20 +64,20 @@ impl Job {
         let cancel = signals::cancel_on_signals()?;
         let mut settings = settings(&args)?;
         let mesh = middle.as_ref().map_or(&None, |choice| &choice.mesh);
-        config::check_outputs(&args.output.output, &[&args.output.report, mesh], args.output.overwrite)?;
-        let resources = config::resources(&args.resources, args.output.output.path())?;
-        let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
+        config::check_outputs(&args.job.output.output, &[&args.job.output.report, mesh], args.job.output.overwrite)?;
+        let resources = config::resources(&args.job.resources, args.job.output.output.path())?;
+        let console = Arc::new(Console::new(Voice::of(args.job.output.quiet, args.job.output.verbose)));
         let Read { sets, volume } = read_sets(&args, &console, &cancel)?;
         let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
         let mut notes = Vec::new();
         let geometry = match volume {
-            Some(geometry) if !args.grid.is_asked_for() => geometry,
-            _ => grid(&args.grid, bounds, &mut notes)?,
+            Some(geometry) if !args.job.grid.is_asked_for() => geometry,
+            _ => grid(&args.job.grid, bounds, &mut notes)?,
         };
         for note in &notes {
             console.note(note);
         }
-        if args.resources.brick.is_none() {
+        if args.job.resources.brick.is_none() {
             settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
         }
         let typed = typed.to_vec();
@@ -85,7 +85,7 @@ impl Job {
     }
 
     fn run_precise(&self) -> Result<()> {
-        match self.args.field.precision {
+        match self.args.job.field.precision {
             PrecisionArg::F16 => self.run::<f16>(),
             PrecisionArg::F32 => self.run::<f32>(),
             PrecisionArg::F64 => self.run::<f64>(),
@@ -94,33 +94,33 @@ impl Job {
 
     fn run<P: Precision>(&self) -> Result<()> {
         check_range::<P>(&self.geometry)?;
-        let (threads, ranks) = (self.resources.threads, self.args.ranks);
+        let (threads, ranks) = (self.resources.threads, self.args.job.ranks);
         let needs = match self.middle_settings() {
             Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks),
             None => self.settings.needs::<P>(&self.geometry, &self.sets, threads, ranks),
         };
         let plan = self.plan(&needs);
-        if self.args.output.dry_run {
+        if self.args.job.output.dry_run {
             print(&format!("{plan}\n"));
         }
         let window = self.fits(&needs)?;
-        if self.args.output.dry_run {
+        if self.args.job.output.dry_run {
             return Ok(());
         }
         self.console.say(&plan);
         let engine = self.resources.engine(window, &self.cancel, &self.console)?;
-        let engine = engine.with_ranks(self.args.ranks);
+        let engine = engine.with_ranks(self.args.job.ranks);
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
         let found = result?;
-        if !self.args.output.quiet {
+        if !self.args.job.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)));
         }
         Ok(())
     }
 
     fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {
-        let output = &self.args.output;
+        let output = &self.args.job.output;
         let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
         // A mesh comes out of a store, if only for a while.
         let passing = tempfile::tempdir_in(&self.resources.scratch)
@@ -252,7 +252,7 @@ impl Job {
 
 /// The settings that the flags mean.
 fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
-    let field = &args.field;
+    let field = &args.job.field;
     let row = field.method.solver::<f32>();
     let sweeps = field.schedule == ScheduleArg::Sweep;
     if field.neighbours == Neighbours::All && !row.takes_all_neighbours {
@@ -264,7 +264,7 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     if sweeps && field.max_distance.is_some() {
         return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
     }
-    config::check_ranks(args.ranks)?;
+    config::check_ranks(args.job.ranks)?;
     if field.iterations == 0 {
         return Err(Error::usage("--iterations is 0; give 1 or more"));
     }
@@ -284,7 +284,7 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
         signed: args.choice.signed,
         labels: args.choice.labels,
         closest_point: args.choice.closest_point,
-        brick: config::brick(args.resources.brick.unwrap_or(row.brick))?,
+        brick: config::brick(args.job.resources.brick.unwrap_or(row.brick))?,
     })
 }
 

@@ -17,11 +17,18 @@ pub(super) struct DistanceJobArgs {
     #[arg(required = true, value_name = "SOURCE", help = sources_help())]
     pub(super) sources: Vec<PathBuf>,
     #[command(flatten)]
+    pub(super) job: FieldJobArgs,
+    #[command(flatten)]
+    pub(super) choice: ChoiceArgs,
+}
+
+/// What is common to all that is made of a distance.
+#[derive(Clone, Debug, Args)]
+pub(super) struct FieldJobArgs {
+    #[command(flatten)]
     pub(super) grid: GridArgs,
     #[command(flatten)]
     pub(super) field: FieldArgs,
-    #[command(flatten)]
-    pub(super) choice: ChoiceArgs,
     #[command(flatten)]
     pub(super) resources: ResourceArgs,
     /// Ranks that share the bricks, each a thread with files of its own; results do not depend on it

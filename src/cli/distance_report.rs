@@ -84,7 +84,7 @@ impl Settings {
         };
         Self {
             sources: args.sources.iter().map(|path| path.display().to_string()).collect(),
-            output: args.output.output.path().map(|path| path.display().to_string()),
+            output: args.job.output.output.path().map(|path| path.display().to_string()),
             method: settings.method.name(),
             schedule,
             neighbours: match settings.neighbours {
@@ -97,7 +97,7 @@ impl Settings {
                 Init::Contiguous => "contiguous",
                 Init::Grid => "grid",
             },
-            precision: match args.field.precision {
+            precision: match args.job.field.precision {
                 PrecisionArg::F16 => "f16",
                 PrecisionArg::F32 => "f32",
                 PrecisionArg::F64 => "f64",

@@ -24,7 +24,7 @@ pub(super) struct Read {
 
 /// Reads all sources; a cloud or mesh is one data set with the next label, a label volume as many as it has labels.
 pub(super) fn read_sets(args: &DistanceJobArgs, console: &Console, cancel: &Cancel) -> Result<Read> {
-    if let Some([x, y, z]) = args.grid.image_spacing.filter(|h| h.iter().any(|h| !(h.is_finite() && *h > 0.0))) {
+    if let Some([x, y, z]) = args.job.grid.image_spacing.filter(|h| h.iter().any(|h| !(h.is_finite() && *h > 0.0))) {
         return Err(Error::usage(format!(
             "--image-spacing is {x},{y},{z}; give one length or three, each more than 0"
         )));
@@ -33,7 +33,7 @@ pub(super) fn read_sets(args: &DistanceJobArgs, console: &Console, cancel: &Canc
     for path in &args.sources {
         let is_volume = is_label_volume(path);
         if is_volume && !args.choice.signed {
-            let volume = open_volume(path, args.grid.image_spacing, console)?;
+            let volume = open_volume(path, args.job.grid.image_spacing, console)?;
             add_labels(&mut read.sets, path, &volume, console, cancel)?;
             read.volume.get_or_insert_with(|| volume.geometry().clone());
         } else if is_volume {

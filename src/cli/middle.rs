@@ -12,7 +12,7 @@ pub(super) fn run(args: &MiddleArgs, typed: &[String]) -> Result<()> {
     if args.sources.len() < 2 && !args.sources.iter().any(|path| is_label_volume(path)) {
         return Err(Error::usage("a middle surface lies between data sets; give two files or more, or a label volume"));
     }
-    let MiddleArgs { sources, grid, field, surface, resources, ranks, output } = args.clone();
+    let MiddleArgs { sources, job, surface } = args.clone();
     let choice = MiddleChoice {
         surface: match surface.surface {
             SurfaceArg::Exact => SurfaceKind::Exact,
@@ -25,6 +25,5 @@ pub(super) fn run(args: &MiddleArgs, typed: &[String]) -> Result<()> {
         mesh: surface.mesh,
     };
     let fields = ChoiceArgs { labels: true, ..ChoiceArgs::default() };
-    let args = DistanceJobArgs { sources, grid, field, choice: fields, resources, ranks, output };
-    run_middle(args, choice, typed)
+    run_middle(DistanceJobArgs { sources, job, choice: fields }, choice, typed)
 }

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::args::ResourceArgs;
-use super::distance_args::{FieldArgs, FieldOutputArgs, GridArgs, sources_help};
+use super::distance_args::{FieldJobArgs, sources_help};
 
 /// Compute the surface equally far from labelled point clouds and triangle meshes.
 #[derive(Clone, Debug, Args)]
@@ -13,18 +12,9 @@ pub(super) struct MiddleArgs {
     #[arg(required = true, num_args = 1.., value_name = "SOURCE", help = labelled_help())]
     pub(super) sources: Vec<PathBuf>,
     #[command(flatten)]
-    pub(super) grid: GridArgs,
-    #[command(flatten)]
-    pub(super) field: FieldArgs,
+    pub(super) job: FieldJobArgs,
     #[command(flatten)]
     pub(super) surface: SurfaceArgs,
-    #[command(flatten)]
-    pub(super) resources: ResourceArgs,
-    /// Ranks that share the bricks, each a thread with files of its own; results do not depend on it
-    #[arg(long, value_name = "N", default_value_t = 1, hide = true)]
-    pub(super) ranks: usize,
-    #[command(flatten)]
-    pub(super) output: FieldOutputArgs,
 }
 
 /// Which surface.

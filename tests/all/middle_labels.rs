@@ -62,6 +62,10 @@ fn labels_of_a_volume_share_its_voxels() {
     // What is nearest to a body's border within its share is that border: a volume of shares shares itself the same way.
     bench.succeed("middle out.zarr/labels/nearest --labels exact -o again.zarr");
     assert_eq!(volume(&bench.path("again.zarr/labels/nearest")), wanted);
+    // Ranks change nothing.
+    bench.succeed("middle cells.tif --labels exact -o ranks.zarr --ranks 3 --mesh ranks.stl");
+    assert_eq!(std::fs::read(bench.path("ranks.stl")).unwrap(), std::fs::read(bench.path("out.stl")).unwrap());
+    assert_eq!(volume(&bench.path("ranks.zarr/labels/nearest")), wanted);
     // Behind a cloud, labels are numbered on; the distance takes volumes too.
     bench.write("point.xyz", "6 4.5 5\n");
     bench.succeed("distance point.xyz cells.tif --labels -o mixed.zarr");
