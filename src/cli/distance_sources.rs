@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::console::Console;
 use super::distance_args::DistanceJobArgs;
+use super::grid::check_spacing;
 use super::input::open_stack;
 use super::text::grouped;
 use crate::error::{Error, Result};
@@ -24,11 +25,7 @@ pub(super) struct Read {
 
 /// Reads all sources; a cloud or mesh is one data set with the next label, a label volume as many as it has labels.
 pub(super) fn read_sets(args: &DistanceJobArgs, console: &Console, cancel: &Cancel) -> Result<Read> {
-    if let Some([x, y, z]) = args.job.grid.image_spacing.filter(|h| h.iter().any(|h| !(h.is_finite() && *h > 0.0))) {
-        return Err(Error::usage(format!(
-            "--image-spacing is {x},{y},{z}; give one length or three, each more than 0"
-        )));
-    }
+    check_spacing("--image-spacing", args.job.grid.image_spacing)?;
     let mut read = Read { sets: DataSets::default(), volume: None };
     for path in &args.sources {
         let is_volume = is_label_volume(path);

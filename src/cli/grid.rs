@@ -19,9 +19,7 @@ pub(super) fn grid(args: &GridArgs, (low, high): ([f64; 3], [f64; 3]), notes: &m
         notes.extend(stack.notes);
         return Ok(stack.geometry);
     }
-    if let Some([x, y, z]) = args.spacing.filter(|h| h.iter().any(|h| !(h.is_finite() && *h > 0.0))) {
-        return Err(Error::usage(format!("--spacing is {x},{y},{z}; give one length or three, each more than 0")));
-    }
+    check_spacing("--spacing", args.spacing)?;
     if let (Some(shape), Some(origin), Some(spacing)) = (args.shape, args.origin, args.spacing) {
         return exact(shape, origin, spacing);
     }
@@ -65,6 +63,16 @@ impl GridArgs {
     /// Whether anything was said of where the grid lies.
     pub(super) fn is_asked_for(&self) -> bool {
         self.spacing.is_some() || self.padding.is_some() || self.origin.is_some() || self.like.is_some()
+    }
+}
+
+/// Refuses a spacing that is none.
+pub(super) fn check_spacing(flag: &str, spacing: Option<[f64; 3]>) -> Result<()> {
+    match spacing.filter(|h| h.iter().any(|h| !(h.is_finite() && *h > 0.0))) {
+        Some([x, y, z]) => {
+            Err(Error::usage(format!("{flag} is {x},{y},{z}; give one length or three, each more than 0")))
+        }
+        None => Ok(()),
     }
 }
 

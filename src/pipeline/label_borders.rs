@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::exec::Cancel;
 use crate::grid::{Box3, refuse_too_many};
 use crate::io::label_volume::LabelVolume;
-use crate::kernel::image::labels::border;
+use crate::kernel::image::labels::{border, labelled};
 
 /// Voxels that are in memory at a time, about: planes are read in slabs, as stores keep them in bricks.
 const SLAB_VOXELS: i64 = 1 << 24;
@@ -32,11 +32,9 @@ pub fn label_borders(volume: &LabelVolume, cancel: &Cancel) -> Result<BTreeMap<u
         volume.read_planes(around.lo[2]..around.hi[2], &mut labels)?;
         marked.resize(part.len(), 0);
         border(&labels, &around, &part, &mut marked);
-        for ((y, z), row) in part.rows().zip(marked.chunks_exact(width as usize)) {
-            for (x, &label) in (0..).zip(row).filter(|(_, label)| **label > 0) {
-                found.entry(label).or_default().push(geometry.position([x, y, z]));
-                count += 1;
-            }
+        for (voxel, label) in labelled(&marked, &part) {
+            found.entry(label).or_default().push(geometry.position(voxel));
+            count += 1;
         }
         refuse_too_many("border voxels", count)?;
     }

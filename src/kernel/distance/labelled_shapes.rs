@@ -19,6 +19,12 @@ impl<'a> LabelledShapes<'a> {
         Self { sets, triangles: (0..sets.mesh.len()).map(|n| Triangle::new(sets.mesh.corners(n))).collect() }
     }
 
+    /// The data sets.
+    #[must_use]
+    pub fn sets(&self) -> &'a DataSets {
+        self.sets
+    }
+
     /// The label of a source; 0 for none.
     #[must_use]
     pub fn label(&self, source: u32) -> u32 {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::grid::{Box3, FACES};
+use crate::grid::{Box3, DataSets, FACES};
 use crate::store::Element;
 
 /// Writes `label` into `out` where u is at least 1/2. `u` is dense `[z][y][x]` over the box `from`, `out` over the box
@@ -13,6 +13,21 @@ pub fn paint<T: Element>(u: &[f32], from: &Box3, label: T, to: &Box3, out: &mut 
         let out = &mut out[to.offset_of([from.lo[0], y, z])..][..width];
         out.iter_mut().zip(row).filter(|(_, u)| **u >= 0.5).for_each(|(o, _)| *o = label);
     }
+}
+
+/// The labels of voxels by their sources, into `out`; 0 for those without one.
+pub fn of_sources(sets: &DataSets, sources: &[u32], out: &mut Vec<u32>) {
+    out.clear();
+    // Neighbours mostly have one source, so a label is looked up once for all of a run.
+    for run in sources.chunk_by(|a, b| a == b) {
+        out.resize(out.len() + run.len(), sets.label(run[0]));
+    }
+}
+
+/// 1 where voxels have a label, else 0.
+#[must_use]
+pub fn mask(labels: &[u32], label: u32) -> Vec<f32> {
+    labels.iter().map(|&other| f32::from(u8::from(other == label))).collect()
 }
 
 /// Voxels of each label but 0.
@@ -42,6 +57,13 @@ pub fn border<T: Copy + Default + PartialEq>(labels: &[T], around: &Box3, part: 
     }
 }
 
+/// The voxels of a box that have a label, with it, in the order of the voxels; `labels` is dense over the box.
+pub fn labelled<'a>(labels: &'a [u32], part: &'a Box3) -> impl Iterator<Item = ([i64; 3], u32)> + 'a {
+    let rows = part.rows().zip(labels.chunks_exact(part.shape()[0] as usize));
+    rows.flat_map(|((y, z), row)| (part.lo[0]..).zip(row).map(move |(x, &label)| ([x, y, z], label)))
+        .filter(|(_, label)| *label > 0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -52,6 +74,20 @@ mod tests {
         let mut out = [9_u8, 9, 9, 9, 0, 0, 0, 0];
         paint(&[0.5, 0.4999, 0.0, 1.0], &from, 3, &to, &mut out);
         assert_eq!(out, [9, 3, 9, 9, 0, 0, 3, 0]);
+    }
+
+    #[test]
+    fn sources_have_the_labels_of_their_sets() {
+        let mut sets = DataSets::default();
+        sets.add_labelled(4, &[[0.0; 3]; 2]);
+        sets.add_labelled(9, &[[1.0; 3]]);
+        let mut labels = vec![7];
+        of_sources(&sets, &[2, 2, 0, 1, u32::MAX], &mut labels);
+        assert_eq!(labels, [9, 9, 4, 4, 0]);
+        assert_eq!(mask(&labels, 4), [0.0, 0.0, 1.0, 1.0, 0.0]);
+        let part = Box3::new([3, 5, 7], [8, 6, 8]);
+        assert_eq!(labelled(&labels, &part).last(), Some(([6, 5, 7], 4)));
+        assert_eq!(labelled(&labels, &part).count(), 4);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use crate::kernel::distance::extent::extent;
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::method::DistanceMethod;
 use crate::kernel::distance::precision::Precision;
+use crate::kernel::image::labels;
 use crate::store::{BoxSource, BrickArray};
 
 /// A solved distance.
@@ -48,7 +49,7 @@ pub struct Measured {
 }
 
 impl<P: Precision> Solved<'_, P> {
-    /// Looks at every voxel; counts those of each label where `labels` says which data set a source belongs to.
+    /// Looks at every voxel; counts those of each label where `labelled` says which data set a source belongs to.
     ///
     /// # Errors
     /// When the run is interrupted.
@@ -56,18 +57,19 @@ impl<P: Precision> Solved<'_, P> {
         &self,
         stage: &Stage<'_>,
         set: &BrickSet,
-        labels: Option<&DataSets>,
+        labelled: Option<&DataSets>,
     ) -> Result<(Measured, BTreeMap<u32, u64>)> {
         let len = set.grid().brick_len();
-        let workers = Workers::new(move || (vec![P::default(); len], Vec::new()));
-        let parts = stage.run(&one_wave(set), &workers, |(values, sources), &slot| {
+        let workers = Workers::new(move || (vec![P::default(); len], Vec::new(), Vec::new()));
+        let parts = stage.run(&one_wave(set), &workers, |(values, sources, labels_of_voxels), &slot| {
             let part = set.grid().brick_box(set.id(slot));
             let values = &mut values[..part.len()];
             let mut counts = BTreeMap::new();
-            if let Some(sets) = labels {
+            if let Some(sets) = labelled {
                 sources.resize(part.len(), NO_SOURCE);
                 self.read_both(&part, values, sources)?;
-                counts = voxels_of_labels(sets, sources);
+                labels::of_sources(sets, sources, labels_of_voxels);
+                counts = labels::count(labels_of_voxels);
             } else {
                 self.values.read_box(&part, values)?;
             }
@@ -82,7 +84,6 @@ impl<P: Precision> Solved<'_, P> {
                 *all.1.entry(label).or_default() += n;
             }
         }
-        all.1.remove(&0);
         Ok(all)
     }
 
@@ -96,22 +97,6 @@ impl<P: Precision> Solved<'_, P> {
     }
 }
 
-/// How many voxels each label has, 0 where they have no source.
-fn voxels_of_labels(sets: &DataSets, sources: &[u32]) -> BTreeMap<u32, u64> {
-    let mut counts = BTreeMap::<u32, u64>::new();
-    let mut run = (0, 0);
-    for same in sources.chunk_by(|a, b| a == b) {
-        let label = sets.label(same[0]);
-        if label != run.0 {
-            *counts.entry(run.0).or_default() += run.1;
-            run = (label, 0);
-        }
-        run.1 += same.len() as u64;
-    }
-    *counts.entry(run.0).or_default() += run.1;
-    counts
-}
-
 /// A method's state, read as distances or sources.
 pub(super) struct Values<M: DistanceMethod> {
     pub(super) method: M,
@@ -122,6 +107,16 @@ pub(super) struct Values<M: DistanceMethod> {
 }
 
 impl<M: DistanceMethod> Values<M> {
+    /// What was solved, where sources too are made of the state.
+    pub(super) fn solved<'a, P: Precision>(self, fixed_voxels: u64, triangle_distances: u64) -> Solved<'a, P>
+    where
+        M: 'a,
+    {
+        let (values, together) = (Arc::new(self), None);
+        let (sources, fixed) = (values.clone(), values.clone());
+        Solved { values, sources, together, fixed, fixed_voxels, triangle_distances }
+    }
+
     /// Reads the state of a box and hands each voxel on, with its place in the box.
     fn each(&self, part: &Box3, mut f: impl FnMut(usize, M::State, [i64; 3])) -> Result<()> {
         self.buffers.with(|states| {

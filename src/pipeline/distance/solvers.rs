@@ -361,17 +361,8 @@ impl<'a> Job<'_, 'a> {
         state: BrickArray<M::State>,
         seeded: &Seeded,
     ) -> Solved<'a, P> {
-        let buffers = Workers::new(Vec::new);
-        let values = Arc::new(Values { method, state, farthest: self.options.farthest, buffers });
-        let Seeded { fixed_voxels, triangle_distances, .. } = *seeded;
-        Solved {
-            sources: values.clone(),
-            together: None,
-            fixed: values.clone(),
-            values,
-            fixed_voxels,
-            triangle_distances,
-        }
+        let values = Values { method, state, farthest: self.options.farthest, buffers: Workers::new(Vec::new) };
+        values.solved(seeded.fixed_voxels, seeded.triangle_distances)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
 use crate::kernel::distance::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::source_trees::SourceTrees;
+use crate::kernel::image::labels;
 use crate::kernel::surface::{
     Interfaces, Known, MarchingCubes, Measures, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder, cells_of_brick,
 };
@@ -88,11 +89,7 @@ impl Worker {
         let part = Box3::new(cells.lo, cells.hi.map(|v| v + 1)).grow(1).intersect(&geometry.domain());
         self.sources.resize(part.len(), 0);
         labelled.sources.read_box(&part, &mut self.sources)?;
-        self.labels.clear();
-        // Neighbours mostly have one source, so labels are looked up once for all of a run.
-        for run in self.sources.chunk_by(|a, b| a == b) {
-            self.labels.resize(self.labels.len() + run.len(), shapes.label(run[0]));
-        }
+        labels::of_sources(shapes.sets(), &self.sources, &mut self.labels);
         if self.labels.iter().all(|&label| label == self.labels[0]) {
             return Ok(patch);
         }
@@ -103,8 +100,7 @@ impl Worker {
             }
             SurfaceKind::Labels => {
                 let [low, high] = labelled.first_labels;
-                let inside: Vec<f32> = self.labels.iter().map(|&label| f32::from(u8::from(label == high))).collect();
-                self.cubes.extract(&inside, &part, &cells, &mut patch.patch);
+                self.cubes.extract(&labels::mask(&self.labels, high), &part, &cells, &mut patch.patch);
                 patch.patch.pairs = vec![[low, high]; patch.patch.triangles.len()];
                 patch.distances = self.distances_of(labelled, &part, &patch);
             }
