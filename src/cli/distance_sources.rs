@@ -89,6 +89,9 @@ fn add_labels(
         grouped(borders.len() as u64),
         grouped(points as u64)
     ));
+    if 2 * points as u64 > volume.geometry().domain().volume() {
+        console.note(&format!("{}: most voxels are borders; is it an image, and no label volume?", path.display()));
+    }
     for (label, positions) in borders {
         let numbered = before.checked_add(label).filter(|label| *label < u32::MAX).ok_or_else(|| {
             Error::input(format!("has the label {label}, which is too large to be numbered on")).at(path)

@@ -76,6 +76,19 @@ fn labels_of_a_volume_share_its_voxels() {
 }
 
 #[test]
+fn an_image_in_place_of_labels_is_noted() {
+    let bench = Bench::bare();
+    let (geometry, voxels) = bodies();
+    let grey: Vec<u16> = (0..voxels.len()).map(|n| (n * 7919 % 1000) as u16).collect();
+    for (name, values) in [("image.tif", &grey), ("labels.tif", &voxels)] {
+        write_stack(&bench.path(name), &geometry, &[values]);
+        let told = bench.run(&format!("middle {name} -o none --dry-run"));
+        let is_noted = String::from_utf8_lossy(&told.stderr).contains("is it an image");
+        assert_eq!((told.status.success(), is_noted), (true, name == "image.tif"), "{told:?}");
+    }
+}
+
+#[test]
 fn what_holds_no_labels_is_refused() {
     let bench = Bench::bare();
     let (geometry, voxels) = bodies();
