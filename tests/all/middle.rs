@@ -8,6 +8,7 @@ use std::fs;
 
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
 use strandline::io::ome_zarr::StoreWriter;
+use strandline::kernel::distance::labelled_shapes::LabelledShapes;
 use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule};
 use strandline::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle};
 
@@ -271,44 +272,68 @@ fn facets_are_equally_far_from_both_sets() {
     assert!(mean < 0.002 && most < 0.1, "{mean}, {most}");
 }
 
-/// No label is wrong, ties go to the lower one, and neither bricks nor threads change the mesh.
+/// No label is wrong, whatever the method left, ties go to the lower one, distances are those of the new sources, and
+/// neither bricks nor threads change the mesh.
 #[test]
 fn exact_labels_have_no_error() {
     let geometry = Geometry { shape: [33, 40, 25], spacing: [0.05, 0.04, 0.06], origin: [-0.1; 3], unit: None };
     let mut sets = DataSets::default();
-    let clouds: Vec<Vec<[f64; 3]>> = (0..4).map(|n| random_cloud(&geometry, 30, 40 + n)).collect();
-    for cloud in &clouds {
-        sets.add_cloud(cloud);
+    for n in 0..4 {
+        sets.add_cloud(&random_cloud(&geometry, 30, 40 + n));
     }
-    let settings = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Exact, 16);
-    let folder = tempfile::tempdir().unwrap();
-    let store = StoreWriter::create(&folder.path().join("out.zarr"), false).unwrap();
-    middle::<f32>(&Lab::new(2).engine, &geometry, &sets, &settings, Some(&store)).unwrap();
-    store.finish().unwrap();
-    let labels = volume(&folder.path().join("out.zarr/labels/nearest"));
-    let border = volume(&folder.path().join("out.zarr/labels/border"));
+    sets.add_mesh(&meshes::cuboid([0.3, 0.5, 0.2], [0.9, 0.8, 1.1]));
+    let shapes = LabelledShapes::new(&sets);
+    let plain = PlainGrid { shape: geometry.shape };
     let nearest = |voxel: [i64; 3]| {
         let here = position(&geometry, voxel);
-        let off: Vec<f64> =
-            clouds.iter().map(|cloud| cloud.iter().map(|p| squared(here, *p)).fold(f64::MAX, f64::min)).collect();
-        (1..off.len()).fold(0, |best, n| if off[n] < off[best] { n } else { best }) as f64 + 1.0
+        let off = |source| shapes.distance_squared(here, source);
+        let all = 0..sets.len() as u32;
+        all.map(|source| (off(source), shapes.label(source))).fold((f64::MAX, 0), |a, b| if b < a { b } else { a })
     };
-    let plain = PlainGrid { shape: geometry.shape };
-    let wanted: Vec<f64> = plain.voxels().map(nearest).collect();
-    assert_eq!(labels, wanted);
+    let wanted: Vec<(f64, u32)> = plain.voxels().map(nearest).collect();
+    let mut changed = 0;
+    for method in [Method::VDT, Method::FMM] {
+        let with = |labels| settings(method, SurfaceKind::Exact, labels, 16);
+        let [_, tracked, _] = fields_of(&geometry, &sets, &with(LabelMode::Tracked));
+        let [distances, labels, border] = fields_of(&geometry, &sets, &with(LabelMode::Exact));
+        for (n, &(squared, label)) in wanted.iter().enumerate() {
+            assert_eq!(labels[n], f64::from(label));
+            if tracked[n] != labels[n] {
+                changed += 1;
+                assert!(distances[n] <= squared.sqrt() * (1.0 + 1e-6), "{} and {}", distances[n], squared.sqrt());
+            }
+        }
+        check_border(&geometry, &labels, &border);
+        let first = mesh_of(&geometry, &sets, &with(LabelMode::Exact), 1);
+        let distance = DistanceSettings { brick: 32, ..with(LabelMode::Exact).distance };
+        let second = MiddleSettings { distance, ..with(LabelMode::Exact) };
+        assert_eq!(first.0, mesh_of(&geometry, &sets, &second, 3).0);
+    }
+    assert!(changed > 0, "no label was wrong");
+}
+
+/// Distances, labels and borders as a store has them.
+fn fields_of(geometry: &Geometry, sets: &DataSets, settings: &MiddleSettings) -> [Vec<f64>; 3] {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.zarr");
+    let store = StoreWriter::create(&path, false).unwrap();
+    middle::<f32>(&Lab::new(2).engine, geometry, sets, settings, Some(&store)).unwrap();
+    store.finish().unwrap();
+    [path.clone(), path.join("labels/nearest"), path.join("labels/border")].map(|path| volume(&path))
+}
+
+/// The border holds the label of each voxel that has a face neighbour of another one, and 0 elsewhere.
+fn check_border(geometry: &Geometry, labels: &[f64], border: &[f64]) {
     let domain = geometry.domain();
-    for (n, voxel) in plain.voxels().enumerate() {
+    for (n, voxel) in (PlainGrid { shape: geometry.shape }).voxels().enumerate() {
         let beside = (0..6).filter_map(|side| {
             let mut next = voxel;
             next[side / 2] += if side % 2 == 0 { 1 } else { -1 };
-            domain.contains(next).then(|| wanted[domain.offset_of(next)])
+            domain.contains(next).then(|| labels[domain.offset_of(next)])
         });
-        let differs = beside.into_iter().any(|label| label != wanted[n]);
-        assert_eq!(border[n], if differs { wanted[n] } else { 0.0 });
+        let differs = beside.into_iter().any(|label| label != labels[n]);
+        assert_eq!(border[n], if differs { labels[n] } else { 0.0 });
     }
-    let first = mesh_of(&geometry, &sets, &settings, 1);
-    let distance = DistanceSettings { brick: 32, ..settings.distance };
-    assert_eq!(first.0, mesh_of(&geometry, &sets, &MiddleSettings { distance, ..settings }, 3).0);
 }
 
 /// Points as far from the plane between them as each other: the lower label wins all of it.

@@ -31,6 +31,12 @@ impl<'a> LabelledShapes<'a> {
         self.sets.label(source)
     }
 
+    /// Whether a source is a point; else it is a triangle, or none.
+    #[must_use]
+    pub fn is_point(&self, source: u32) -> bool {
+        (source as usize) < self.sets.positions.len()
+    }
+
     /// The place of a source that is closest to a world position; that position itself where there is none.
     #[must_use]
     pub fn closest(&self, here: [f64; 3], source: u32) -> [f64; 3] {
@@ -45,11 +51,17 @@ impl<'a> LabelledShapes<'a> {
     /// The distance of a world position to a source, physical; infinite to none.
     #[must_use]
     pub fn distance(&self, here: [f64; 3], source: u32) -> f64 {
+        self.distance_squared(here, source).sqrt()
+    }
+
+    /// The squared distance of a world position to a source, physical; infinite to none.
+    #[must_use]
+    pub fn distance_squared(&self, here: [f64; 3], source: u32) -> f64 {
         let source = source as usize;
         if let Some(&point) = self.sets.positions.get(source) {
-            return squared_distance(here, point).sqrt();
+            return squared_distance(here, point);
         }
         let triangle = self.triangles.get(source - self.sets.positions.len());
-        triangle.map_or(f64::INFINITY, |triangle| triangle.distance_squared(here).sqrt())
+        triangle.map_or(f64::INFINITY, |triangle| triangle.distance_squared(here))
     }
 }

@@ -2,10 +2,12 @@
 
 pub mod all_neighbours;
 mod buckets;
+pub mod culling;
 mod diagonals;
 pub mod dijkstra_heap;
 pub mod dijkstra_pythagoras;
 mod directions;
+pub mod exact_labels;
 pub mod extent;
 pub mod fast_marching;
 pub mod fast_sweeping;

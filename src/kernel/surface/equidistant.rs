@@ -7,6 +7,7 @@
 //! labels and a tetrahedron of four all of them are made equal by Newton's method.
 
 use super::corner::Corner;
+use super::nearby::Nearby;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::distance::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::source_trees::SourceTrees;
@@ -51,7 +52,9 @@ pub struct Known<'a> {
     pub geometry: &'a Geometry,
     /// What the sources are.
     pub shapes: &'a LabelledShapes<'a>,
-    /// The nearest source of each label.
+    /// The nearest source of each label, near borders.
+    pub nearby: &'a Nearby,
+    /// The same anywhere.
     pub trees: &'a SourceTrees,
     /// The box.
     pub part: Box3,
@@ -83,7 +86,7 @@ impl Candidates {
                 self.distance(known, 0, here) - self.distance(known, 1, here)
             };
             t = root(difference, RESOLUTION * length).clamp(MARGIN, 1.0 - MARGIN);
-            if n == LOOKUPS || (t - last).abs() < SETTLED || !self.look_up(known, &labels, known.world(place(t))) {
+            if n == LOOKUPS || (t - last).abs() < SETTLED || !self.look_up(known, &labels, place(t)) {
                 break;
             }
             last = t;
@@ -110,7 +113,7 @@ impl Candidates {
             };
             weights = balance(at);
             let is_settled = (0..N).all(|n| (weights[n] - last[n]).abs() < SETTLED);
-            if n == LOOKUPS || is_settled || !self.look_up(known, &labels, known.world(place(weights))) {
+            if n == LOOKUPS || is_settled || !self.look_up(known, &labels, place(weights)) {
                 break;
             }
             last = weights;
@@ -124,8 +127,8 @@ impl Candidates {
     pub(super) fn at(&mut self, known: &Known<'_>, corners: &[Corner], position: [f64; 3]) -> Between {
         self.gather(known, corners);
         let labels: Vec<u32> = corners.iter().map(|corner| corner.label).collect();
+        self.look_up(known, &labels, position);
         let here = known.world(position);
-        self.look_up(known, &labels, here);
         let distance = (0..labels.len()).map(|n| self.distance(known, n, here)).fold(f64::INFINITY, f64::min);
         Between { position, distance, normal: [0.0; 3] }
     }
@@ -150,7 +153,8 @@ impl Candidates {
         let hi = std::array::from_fn(|a| (highest(a) + 1).div_euclid(2) + 2);
         let around = Box3::new(lo, hi).intersect(&known.part);
         let sum = |a: usize| corners.iter().map(|corner| corner.place[a]).sum::<f64>();
-        let middle = known.world(std::array::from_fn(|a| sum(a) / corners.len() as f64));
+        let centre = std::array::from_fn(|a| sum(a) / corners.len() as f64);
+        let middle = known.world(centre);
         for (sources, label) in self.of_label.iter_mut().zip(corners.iter().map(|corner| corner.label)) {
             sources.clear();
             for (y, z) in around.rows() {
@@ -166,16 +170,16 @@ impl Candidates {
             sources.truncate(KEPT);
             // A label thinner than a voxel may have none of its own around.
             if sources.is_empty() && label > 0 {
-                sources.push(known.trees.nearest(label, middle));
+                sources.push(known.nearest(label, centre));
             }
         }
     }
 
     /// Collects the nearest source of each label at a place; returns whether any was new.
-    fn look_up(&mut self, known: &Known<'_>, labels: &[u32], here: [f64; 3]) -> bool {
+    fn look_up(&mut self, known: &Known<'_>, labels: &[u32], place: [f64; 3]) -> bool {
         let mut is_new = false;
         for (sources, &label) in self.of_label.iter_mut().zip(labels).filter(|(_, label)| **label > 0) {
-            let nearest = known.trees.nearest(label, here);
+            let nearest = known.nearest(label, place);
             if !sources.contains(&nearest) {
                 sources.push(nearest);
                 is_new = true;
@@ -193,6 +197,13 @@ impl Candidates {
 impl Known<'_> {
     pub(super) fn label(&self, voxel: [i64; 3]) -> u32 {
         self.labels[self.part.offset_of(voxel)]
+    }
+
+    /// The number of a label's source that is nearest to a place.
+    pub(super) fn nearest(&self, label: u32, place: [f64; 3]) -> u32 {
+        let world = self.world(place);
+        let near = self.nearby.nearest(self.shapes, label, place, world);
+        near.unwrap_or_else(|| self.trees.nearest(label, world))
     }
 
     pub(super) fn world(&self, place: [f64; 3]) -> [f64; 3] {

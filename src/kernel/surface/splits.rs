@@ -214,7 +214,7 @@ impl Edge<'_> {
 /// Whether the label of a corner is nearer than those of the edge's ends there.
 fn is_nearest(known: &Known<'_>, corner: &Corner, ends: [u32; 2]) -> bool {
     let here = known.world(corner.place);
-    let distance = |label: u32| known.shapes.distance(here, known.trees.nearest(label, here));
+    let distance = |label: u32| known.shapes.distance(here, known.nearest(label, corner.place));
     let its = distance(corner.label);
     ends.iter().all(|&label| its < distance(label))
 }

@@ -1,59 +1,120 @@
-//! Labels without a wrong one: where the nearest source may belong to another set than the tracked one, it is looked up.
+//! Labels without a wrong one: where the nearest source belongs to another set than the tracked one
+//! (`kernel::distance::exact_labels`), it is put in its place as voxels are read.
 //!
-//! The distance to a set changes by no more than the way one goes. So where, at the middle of a box of voxels, one set is
-//! nearer than all others by twice the box's half diagonal, all of the box is its own; other boxes are halved. Only near
-//! the borders of labels this goes down to voxels, and only voxels whose label changes are remembered.
+//! Only voxels whose label changes are remembered. Distances are lowered to those of their new sources.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
-use crate::grid::{Box3, BrickGrid, BrickId, DataSets, Geometry};
-use crate::kernel::distance::source_trees::SourceTrees;
+use crate::grid::{Box3, BrickGrid, BrickId};
+use crate::kernel::distance::exact_labels::ExactLabels;
+use crate::kernel::distance::precision::Precision;
+use crate::pipeline::distance::{Solved, Together};
 use crate::store::BoxSource;
 
-/// Sources, with others where the tracked ones have the wrong label.
-struct Corrected<'a> {
-    tracked: Arc<dyn BoxSource<u32> + Send + 'a>,
+/// A solved distance, with other sources where the tracked ones have the wrong label.
+struct Corrected<'a, P> {
+    values: Arc<dyn BoxSource<P> + Send + 'a>,
+    sources: Arc<dyn BoxSource<u32> + Send + 'a>,
+    together: Option<Arc<dyn Together<P> + Send + 'a>>,
     grid: BrickGrid,
-    /// Voxels and their sources, by brick.
-    changes: BTreeMap<BrickId, Vec<([i64; 3], u32)>>,
+    /// By brick.
+    changes: BTreeMap<BrickId, Vec<Change>>,
 }
 
-impl BoxSource<u32> for Corrected<'_> {
-    fn shape(&self) -> [i64; 3] {
-        self.tracked.shape()
+/// A voxel, its nearest source and how far that is.
+struct Change {
+    voxel: [i64; 3],
+    source: u32,
+    distance: f64,
+}
+
+impl<P: Precision> Corrected<'_, P> {
+    /// The changes in a box, each with its place in it.
+    fn within<'a>(&'a self, part: &'a Box3) -> impl Iterator<Item = (usize, &'a Change)> {
+        let changes = self.grid.bricks_in(part).filter_map(|id| self.changes.get(&id)).flatten();
+        let inside = |change: &&Change| (0..3).all(|a| (part.lo[a]..part.hi[a]).contains(&change.voxel[a]));
+        changes.filter(inside).map(|change| (part.offset_of(change.voxel), change))
     }
 
-    fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
-        self.tracked.read_box(part, out)?;
-        for (voxel, source) in self.grid.bricks_in(part).filter_map(|id| self.changes.get(&id)).flatten() {
-            if (0..3).all(|a| (part.lo[a]..part.hi[a]).contains(&voxel[a])) {
-                out[part.offset_of(*voxel)] = *source;
-            }
+    fn lower(&self, part: &Box3, values: &mut [P]) {
+        for (at, change) in self.within(part) {
+            values[at] = P::from_f64(values[at].to_f64().min(change.distance));
         }
+    }
+
+    fn replace(&self, part: &Box3, sources: &mut [u32]) {
+        for (at, change) in self.within(part) {
+            sources[at] = change.source;
+        }
+    }
+}
+
+impl<P: Precision> BoxSource<P> for Corrected<'_, P> {
+    fn shape(&self) -> [i64; 3] {
+        self.grid.shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [P]) -> Result<()> {
+        self.values.read_box(part, out)?;
+        self.lower(part, out);
         Ok(())
     }
 }
 
-/// The tracked sources with those of the wrong label replaced by the nearest.
-pub(super) fn exact_sources<'a>(
+impl<P: Precision> BoxSource<u32> for Corrected<'_, P> {
+    fn shape(&self) -> [i64; 3] {
+        self.grid.shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
+        self.sources.read_box(part, out)?;
+        self.replace(part, out);
+        Ok(())
+    }
+}
+
+impl<P: Precision> Together<P> for Corrected<'_, P> {
+    fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
+        match &self.together {
+            Some(together) => together.read_together(part, values, sources)?,
+            None => {
+                self.values.read_box(part, values)?;
+                self.sources.read_box(part, sources)?;
+            }
+        }
+        self.lower(part, values);
+        self.replace(part, sources);
+        Ok(())
+    }
+}
+
+/// A solved distance with the sources of the wrong label replaced by the nearest.
+///
+/// # Errors
+/// When the run is interrupted.
+pub(super) fn with_exact_labels<'a, P: Precision>(
     stage: &Stage<'_>,
-    geometry: &Geometry,
-    sets: &DataSets,
-    trees: &SourceTrees,
+    exact: &ExactLabels<'_>,
     grid: &BrickGrid,
-    tracked: Arc<dyn BoxSource<u32> + Send + 'a>,
-) -> Result<Arc<dyn BoxSource<u32> + Send + 'a>> {
+    solved: Solved<'a, P>,
+) -> Result<Solved<'a, P>> {
     let bricks: Vec<BrickId> = (0..grid.len()).collect();
     let workers = Workers::new(Vec::new);
     let changes = stage.run(&bricks, &workers, |sources, &id| {
         let part = grid.brick_box(id);
         sources.resize(part.len(), 0);
-        tracked.read_box(&part, sources)?;
-        Ok(trees.corrections(geometry, sets, &part, sources))
+        solved.sources.read_box(&part, sources)?;
+        let change = |(voxel, source)| {
+            let distance = exact.shapes.distance(exact.geometry.position(voxel), source);
+            Change { voxel, source, distance }
+        };
+        Ok(exact.corrections(&part, sources).into_iter().map(change).collect::<Vec<_>>())
     })?;
     let changes = bricks.into_iter().zip(changes).filter(|(_, changes)| !changes.is_empty()).collect();
-    Ok(Arc::new(Corrected { tracked, grid: *grid, changes }))
+    let Solved { values, sources, together, .. } = solved;
+    let corrected = Arc::new(Corrected { values, sources, together, grid: *grid, changes });
+    Ok(Solved { values: corrected.clone(), sources: corrected.clone(), together: Some(corrected), ..solved })
 }

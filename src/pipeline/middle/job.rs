@@ -2,7 +2,7 @@
 //! between them, measure and write.
 
 use super::border::Border;
-use super::exact::exact_sources;
+use super::exact::with_exact_labels;
 use super::surface::{Labelled, draw, held};
 use super::table::csv;
 use crate::error::{Error, Result};
@@ -10,12 +10,13 @@ use crate::exec::Engine;
 use crate::grid::{DataSets, Geometry};
 use crate::io::mesh_ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
+use crate::kernel::distance::exact_labels::ExactLabels;
 use crate::kernel::distance::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::source_trees::SourceTrees;
 use crate::kernel::surface::{Measures, Pair};
 use crate::pipeline::distance::{
-    DistanceFound, DistanceSettings, NearestLabels, Needs, Solved, measure, solve_sets, write_fields, write_label_field,
+    DistanceFound, DistanceSettings, NearestLabels, Needs, measure, solve_sets, write_fields, write_label_field,
 };
 use crate::store::NoMesh;
 
@@ -94,9 +95,9 @@ pub fn middle<P: Precision>(
         if settings.labels == LabelMode::Exact {
             let stage = engine.stage("exact labels", 0);
             stage.voxels(geometry.domain().volume());
-            let sources = exact_sources(&stage, geometry, sets, &trees, set.grid(), solved.sources.clone())?;
+            let exact = ExactLabels { geometry, shapes: &shapes, trees: &trees };
+            solved = with_exact_labels(&stage, &exact, set.grid(), solved)?;
             stage.finish();
-            solved = Solved { sources, together: None, ..solved };
         }
         let found = measure(engine, geometry, sets, &distance, &solved, set)?;
         let stage = engine.stage("surface", 0);

@@ -8,7 +8,8 @@ use crate::kernel::distance::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::source_trees::SourceTrees;
 use crate::kernel::image::labels;
 use crate::kernel::surface::{
-    Interfaces, Known, MarchingCubes, Measures, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder, cells_of_brick,
+    Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder,
+    cells_of_brick,
 };
 use crate::store::{BoxSource, MeshSink};
 
@@ -39,6 +40,7 @@ pub(super) struct Labelled<'a> {
 /// Work buffers for one brick.
 struct Worker {
     interfaces: Interfaces,
+    nearby: Nearby,
     cubes: MarchingCubes,
     sources: Vec<u32>,
     labels: Vec<u32>,
@@ -58,6 +60,7 @@ pub(super) fn draw(
     let grid = BrickGrid::new(geometry.shape, EDGE);
     let make = || Worker {
         interfaces: Interfaces::default(),
+        nearby: Nearby::default(),
         cubes: MarchingCubes::new(0.5),
         sources: Vec::new(),
         labels: Vec::new(),
@@ -95,7 +98,9 @@ impl Worker {
         }
         match kind {
             SurfaceKind::Exact => {
-                let known = Known { geometry, shapes, trees, part, sources: &self.sources, labels: &self.labels };
+                let (sources, labels, nearby) = (&self.sources, &self.labels, &mut self.nearby);
+                nearby.enter(geometry, shapes, trees, &part, labels);
+                let known = Known { geometry, shapes, nearby, trees, part, sources, labels };
                 self.interfaces.extract(&known, &cells, &mut patch);
             }
             SurfaceKind::Labels => {

@@ -1,0 +1,91 @@
+//! Which voxels of a box have a source of the wrong label, exactly.
+//!
+//! Boxes are halved, and each half is left the sources that can be nearest to one of its voxels (`culling`), until all
+//! that are left have one label, or until the half is a voxel. Only near the borders of labels this goes down to voxels,
+//! with a handful of sources each.
+
+use super::culling::{Around, Candidate, Culling};
+use super::labelled_shapes::LabelledShapes;
+use super::source_trees::SourceTrees;
+use crate::grid::{Box3, Geometry};
+
+/// What is compared with what.
+#[derive(Clone, Copy, Debug)]
+pub struct ExactLabels<'a> {
+    /// The grid.
+    pub geometry: &'a Geometry,
+    /// All sources.
+    pub shapes: &'a LabelledShapes<'a>,
+    /// The same, sorted.
+    pub trees: &'a SourceTrees,
+}
+
+/// Work buffers.
+#[derive(Clone, Debug, Default)]
+struct Work {
+    candidates: Vec<Candidate>,
+    culling: Culling,
+}
+
+impl ExactLabels<'_> {
+    /// The voxels of a box whose sources, dense over it, have a label that is not the nearest; each with its nearest
+    /// source. Of equal distances the lower label wins, then the lower source.
+    #[must_use]
+    pub fn corrections(&self, part: &Box3, sources: &[u32]) -> Vec<([i64; 3], u32)> {
+        let mut found = Vec::new();
+        let around = Around::centres(self.geometry, part);
+        let mut work = Work { candidates: self.trees.near_all(&around), ..Work::default() };
+        self.settle(part, &mut work, 0, &mut |voxels, left| {
+            for (y, z) in voxels.rows() {
+                for voxel in (voxels.lo[0]..voxels.hi[0]).map(|x| [x, y, z]) {
+                    if self.shapes.label(sources[part.offset_of(voxel)]) != left[0].1 {
+                        found.extend(self.nearest(voxel, left).map(|(source, _)| (voxel, source)));
+                    }
+                }
+            }
+        });
+        found
+    }
+
+    /// Tells for all voxels of a box whose they are: calls `tell` with boxes of voxels and sources of one label, which
+    /// those nearest to the voxels are among. The candidates from `first` on hold all that can be nearest.
+    fn settle(&self, part: &Box3, work: &mut Work, first: usize, tell: &mut impl FnMut(&Box3, &[Candidate])) {
+        let left = work.candidates.len();
+        if part.is_empty() || first == left {
+            return;
+        }
+        if part.len() == 1 {
+            let nearest = self.nearest(part.lo, &work.candidates[first..]);
+            return nearest.into_iter().for_each(|nearest| tell(part, &[nearest]));
+        }
+        work.culling.keep(self.shapes, &Around::centres(self.geometry, part), &mut work.candidates, first);
+        let kept = &work.candidates[left..];
+        if kept.iter().all(|(_, label)| *label == kept[0].1) {
+            tell(part, kept);
+        } else {
+            for half in halves(part) {
+                self.settle(&half, work, left, tell);
+            }
+        }
+        work.candidates.truncate(left);
+    }
+
+    /// The nearest of some sources.
+    fn nearest(&self, voxel: [i64; 3], among: &[Candidate]) -> Option<Candidate> {
+        let here = self.geometry.position(voxel);
+        let rank = |&(source, label): &Candidate| (self.shapes.distance_squared(here, source), label, source);
+        let ranked = among.iter().map(rank);
+        let nearest = ranked.reduce(|best, next| if next < best { next } else { best });
+        nearest.map(|(_, label, source)| (source, label))
+    }
+}
+
+/// The two halves of a box along its longest axis.
+fn halves(part: &Box3) -> [Box3; 2] {
+    let shape = part.shape();
+    let axis = (0..3).rev().max_by_key(|&a| shape[a]).unwrap_or(0);
+    let cut = part.lo[axis] + shape[axis] / 2;
+    let (mut lower, mut upper) = (*part, *part);
+    (lower.hi[axis], upper.lo[axis]) = (cut, cut);
+    [lower, upper]
+}

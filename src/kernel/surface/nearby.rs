@@ -1,0 +1,155 @@
+//! The nearest source of a label at places near the borders of labels: made ready for a box at once, so that a place
+//! asks a handful of sources instead of a tree of all.
+//!
+//! The box is cut into blocks, and these into smaller ones; a block where voxels of different labels are near keeps, for
+//! each of these labels, the sources that can be nearest to one of its places (`kernel::distance::culling`).
+
+use std::ops::Range;
+
+use crate::grid::{Box3, Geometry};
+use crate::kernel::distance::culling::{Around, Candidate, Culling};
+use crate::kernel::distance::labelled_shapes::LabelledShapes;
+use crate::kernel::distance::source_trees::SourceTrees;
+
+/// Edges of the blocks, in cells: trees are asked for the first.
+const EDGES: [i64; 2] = [16, 4];
+/// Voxels around a block whose labels count: those one around the corners of its cells, and one around these.
+const AROUND: i64 = 2;
+
+/// Sources near the borders of labels in one box.
+#[derive(Clone, Debug)]
+pub struct Nearby {
+    cells: Box3,
+    /// The lists of each small block, dense `[z][y][x]`, as places in `lists`.
+    blocks: Vec<Range<usize>>,
+    /// Labels, and where their sources are in `sources`.
+    lists: Vec<(u32, Range<usize>)>,
+    sources: Vec<Candidate>,
+    culling: Culling,
+}
+
+impl Default for Nearby {
+    fn default() -> Self {
+        let cells = Box3::from_shape([0; 3]);
+        let (blocks, lists, sources, culling) = Default::default();
+        Self { cells, blocks, lists, sources, culling }
+    }
+}
+
+impl Nearby {
+    /// Makes ready for the cells between the voxels of a box, of which the labels are known, dense `[z][y][x]`.
+    pub fn enter(
+        &mut self,
+        geometry: &Geometry,
+        shapes: &LabelledShapes<'_>,
+        trees: &SourceTrees,
+        part: &Box3,
+        labels: &[u32],
+    ) {
+        self.cells = cells_between(part);
+        self.lists.clear();
+        self.sources.clear();
+        self.blocks.clear();
+        self.blocks.resize(Box3::from_shape(counts(&self.cells, EDGES[1])).len(), 0..0);
+        for large in blocks(self.cells, EDGES[0]) {
+            let near = labels_near(part, labels, &large);
+            if near.len() < 2 {
+                continue;
+            }
+            let around = Around::cells(geometry, &large);
+            let of_label = |label: &u32| self.culled(shapes, &around, trees.near(*label, &around));
+            let coarse: Vec<Vec<Candidate>> = near.iter().map(of_label).collect();
+            for small in blocks(large, EDGES[1]) {
+                self.enter_block(geometry, shapes, &small, &labels_near(part, labels, &small), &coarse);
+            }
+        }
+    }
+
+    /// Keeps what a small block needs of the sources, by label, of the large one around it.
+    fn enter_block(
+        &mut self,
+        geometry: &Geometry,
+        shapes: &LabelledShapes<'_>,
+        block: &Box3,
+        near: &[u32],
+        coarse: &[Vec<Candidate>],
+    ) {
+        if near.len() < 2 {
+            return;
+        }
+        let (around, first) = (Around::cells(geometry, block), self.lists.len());
+        for of_label in coarse {
+            let Some(&(_, label)) = of_label.first().filter(|(_, label)| near.contains(label)) else { continue };
+            let kept = self.culled(shapes, &around, of_label.clone());
+            let start = self.sources.len();
+            self.sources.extend(kept);
+            self.lists.push((label, start..self.sources.len()));
+        }
+        let at = self.place(block.lo);
+        self.blocks[at] = first..self.lists.len();
+    }
+
+    fn culled(&mut self, shapes: &LabelledShapes<'_>, around: &Around, mut all: Vec<Candidate>) -> Vec<Candidate> {
+        let count = all.len();
+        self.culling.keep(shapes, around, &mut all, 0);
+        all.split_off(count)
+    }
+
+    /// The number of a label's source that is nearest to a place, in voxel units and in the world; none where the label
+    /// is not near. Of equal distances the lower source.
+    #[must_use]
+    pub fn nearest(&self, shapes: &LabelledShapes<'_>, label: u32, place: [f64; 3], world: [f64; 3]) -> Option<u32> {
+        let cell = std::array::from_fn(|a| {
+            let last = (self.cells.hi[a] - 1).max(self.cells.lo[a]);
+            (place[a].floor() as i64).clamp(self.cells.lo[a], last)
+        });
+        let lists = &self.lists[self.blocks[self.place(cell)].clone()];
+        let (_, range) = lists.iter().find(|(of, _)| *of == label)?;
+        let rank = |&(source, _): &Candidate| (shapes.distance_squared(world, source), source);
+        let ranked = self.sources[range.clone()].iter().map(rank);
+        ranked.reduce(|best, next| if next < best { next } else { best }).map(|(_, source)| source)
+    }
+
+    /// The place of the small block that a cell lies in.
+    fn place(&self, cell: [i64; 3]) -> usize {
+        let at: [i64; 3] = std::array::from_fn(|a| (cell[a] - self.cells.lo[a]) / EDGES[1]);
+        Box3::from_shape(counts(&self.cells, EDGES[1])).offset_of(at)
+    }
+}
+
+/// The cells between the voxels of a box, by their lowest corners.
+fn cells_between(part: &Box3) -> Box3 {
+    Box3::new(part.lo, part.hi.map(|v| v - 1))
+}
+
+/// Blocks of so many cells along each axis.
+fn counts(cells: &Box3, edge: i64) -> [i64; 3] {
+    cells.shape().map(|n| (n + edge - 1) / edge)
+}
+
+/// The blocks of cells of that edge that some cells are cut into.
+fn blocks(cells: Box3, edge: i64) -> impl Iterator<Item = Box3> {
+    let at = Box3::from_shape(counts(&cells, edge));
+    let block = move |at: [i64; 3]| {
+        let lo: [i64; 3] = std::array::from_fn(|a| cells.lo[a] + edge * at[a]);
+        Box3::new(lo, lo.map(|v| v + edge)).intersect(&cells)
+    };
+    at.rows().flat_map(move |(y, z)| (0..at.hi[0]).map(move |x| block([x, y, z])))
+}
+
+/// The labels of the voxels around a block of cells, ascending; without 0, which is none.
+fn labels_near(part: &Box3, labels: &[u32], block: &Box3) -> Vec<u32> {
+    let near = Box3::new(block.lo, block.hi.map(|v| v + 1)).grow(AROUND).intersect(part);
+    let mut found = Vec::new();
+    for (y, z) in near.rows() {
+        let row = &labels[part.offset_of([near.lo[0], y, z])..][..near.shape()[0] as usize];
+        // Equal labels come in long runs.
+        for run in row.chunk_by(|a, b| a == b).filter(|run| run[0] > 0) {
+            if !found.contains(&run[0]) {
+                found.push(run[0]);
+            }
+        }
+    }
+    found.sort_unstable();
+    found
+}
