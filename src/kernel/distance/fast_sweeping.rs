@@ -8,7 +8,7 @@
 use std::marker::PhantomData;
 
 use super::diagonals::{Diagonals, MOST_LANES, has_wide_vectors};
-use super::directions::{CHANGED, Swept, sweep_until_quiet};
+use super::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
 use super::method::{DistanceMethod, OrderedSweeps};
 use super::precision::{Precision, Real};
 use super::sweep_sources::Fell;
@@ -261,7 +261,7 @@ impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
     }
 
     fn settle(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3) -> bool {
-        let first = downhill(tile);
+        let first = downhill(tile, |_, value| value.lane().magnitude().f64());
         Self::lay_out(work, tile, first);
         let changed = sweep_until_quiet(first, |upward| {
             if (upward[0] != upward[1]) != work.layout.turned {
@@ -294,30 +294,4 @@ impl<P: Precision, A: Real> OrderedSweeps for FastSweeping<P, A> {
     fn sweep(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3, upward: [bool; 3]) -> bool {
         self.sweep_tile(tile, work, upward, &mut Forget)
     }
-}
-
-/// The direction away from the smallest value in or around the tile: where most of what enters it goes.
-fn downhill<P: Precision>(tile: &HaloTile<P>) -> [bool; 3] {
-    let valid = tile.valid().map(|n| n as isize);
-    let middle = valid.map(|n| n / 2);
-    let mut least = (P::Lane::INFINITY, middle);
-    let mut look = |at: [isize; 3]| {
-        let value = tile.data()[tile.at(at[0], at[1], at[2])].lane().magnitude();
-        if value < least.0 {
-            least = (value, at);
-        }
-    };
-    for axis in 0..3 {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        for layer in [-1, valid[axis]] {
-            for i in (0..valid[u]).step_by(4).chain([valid[u] - 1]) {
-                for j in (0..valid[v]).step_by(4).chain([valid[v] - 1]) {
-                    let mut at = [layer; 3];
-                    (at[u], at[v]) = (i, j);
-                    look(at);
-                }
-            }
-        }
-    }
-    std::array::from_fn(|a| least.1[a] <= middle[a])
 }

@@ -7,6 +7,8 @@ mod diagonals;
 pub mod dijkstra_heap;
 pub mod dijkstra_pythagoras;
 mod directions;
+mod distinct;
+mod due;
 pub mod exact_labels;
 pub mod extent;
 pub mod fast_marching;

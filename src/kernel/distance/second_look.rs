@@ -14,6 +14,7 @@
 //! in
 //! `[z][y][x]` order is taken.
 
+use super::distinct::Distinct;
 use super::initialise::NO_SOURCE;
 use super::precision::Real;
 use super::tracked::TrackedSource;
@@ -54,6 +55,8 @@ pub struct Seen {
     pub squared: Vec<f64>,
     /// Squared distances of the part and of the voxels one step beyond, rounded.
     grown: Vec<f32>,
+    /// Where sources differ.
+    distinct: Distinct,
     /// Voxels of a plane where something may have been lost.
     bent: Vec<u32>,
 }
@@ -63,6 +66,7 @@ impl Seen {
     pub fn look<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
         let Look { geometry, part, .. } = *look;
         self.measure(sources, look);
+        self.distinct.mark(look.known, look.found);
         let [width, height, _] = part.shape().map(|n| n as usize);
         let limit = (look.farthest + geometry.max_spacing()).powi(2);
         for (plane, z) in (part.lo[2]..part.hi[2]).enumerate() {
@@ -73,11 +77,24 @@ impl Seen {
                 if self.squared[at] < limit {
                     let voxel = [part.lo[0] + (n % width) as i64, part.lo[1] + (n / width) as i64, z];
                     let kept = (self.sources[at], self.squared[at]);
-                    (self.sources[at], self.squared[at]) = nearest(sources, look, voxel, kept);
+                    (self.sources[at], self.squared[at]) = self.nearest(sources, look, voxel, kept);
                 }
             }
             self.bent = bent;
         }
+    }
+
+    /// The nearest of the sources around a voxel, which has the one that is `kept`, and its squared distance.
+    fn nearest<S: TrackedSource>(&self, sources: &S, look: &Look<'_>, voxel: [i64; 3], kept: (u32, f64)) -> (u32, f64) {
+        let mut best = kept;
+        let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(look.known);
+        self.distinct.each(look.known, look.found, &around, |source| {
+            let squared = sources.distance_squared(source, voxel);
+            if squared < best.1 {
+                best = (source, squared);
+            }
+        });
+        best
     }
 
     /// Fills in the sources as they are, and how far they are.
@@ -120,26 +137,6 @@ impl Seen {
             bent: &mut self.bent,
         });
     }
-}
-
-/// The nearest of the sources around a voxel, which has the one that is `kept`, and its squared distance.
-fn nearest<S: TrackedSource>(sources: &S, look: &Look<'_>, voxel: [i64; 3], kept: (u32, f64)) -> (u32, f64) {
-    let (mut best, mut asked) = (kept, kept.0);
-    let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(look.known);
-    let width = around.shape()[0] as usize;
-    for (y, z) in around.rows() {
-        for &source in &look.found[look.known.offset_of([around.lo[0], y, z])..][..width] {
-            if source == asked || source == NO_SOURCE {
-                continue;
-            }
-            asked = source;
-            let squared = sources.distance_squared(source, voxel);
-            if squared < best.1 {
-                best = (source, squared);
-            }
-        }
-    }
-    best
 }
 
 /// A plane of squared distances and those beside it, compared for each vector unit.

@@ -7,7 +7,8 @@
 //! holds its source's position beside the index, so that sweeps look nothing up.
 
 use super::diagonals::{Diagonals, MOST_LANES, Run, has_wide_vectors};
-use super::directions::{CHANGED, Swept, sweep_until_quiet};
+use super::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
+use super::due::Due;
 use super::initialise::{NO_SOURCE, squared_distance};
 use super::method::{DistanceMethod, OrderedSweeps};
 use super::precision::Real;
@@ -79,6 +80,7 @@ impl<'a, A: Real> VectorDistance<'a, A> {
 #[derive(Debug)]
 pub struct Work<A> {
     layout: Diagonals,
+    due: Due,
     source: Vec<u32>,
     point: [Vec<A>; 3],
     /// Coordinates of voxels along x (from the upper end on), y and z, by index from the lower ghost.
@@ -195,7 +197,7 @@ fn nearest<A: Real, const N: usize, const TURNED: bool>(
 /// One ordered pass, `N` voxels at a time.
 #[inline(always)]
 fn pass<A: Real, const N: usize, const TURNED: bool>(work: &mut Work<A>, upward: [bool; 2]) -> Swept {
-    let Work { layout, source, point: [px, py, pz], at: [at_x, at_y, at_z] } = work;
+    let Work { layout, due, source, point: [px, py, pz], at: [at_x, at_y, at_z] } = work;
     let (depth, last_x) = (layout.valid[2], layout.edge() + 1);
     let passed = Diagonals::passed(upward);
     // Coordinates along x are kept from the upper end on.
@@ -205,9 +207,13 @@ fn pass<A: Real, const N: usize, const TURNED: bool>(work: &mut Work<A>, upward:
         let z = if upward[1] { n + 1 } else { depth - n };
         let z_places = [at_z[z], at_z[before(z, upward[1])]];
         for (start, count) in layout.diagonals(upward[0]) {
+            let (s, y) = (start / layout.row, start % layout.row);
+            if !due.take(z, s) {
+                continue;
+            }
             let count = count.next_multiple_of(N);
             let place = z * layout.plane + start;
-            let (s, y) = (start / layout.row, start % layout.row);
+            let mut fell = 0;
             let x = last_x + y - s;
             let mut sources = layout.run(source, place, count);
             let [mut run_x, mut run_y, mut run_z] =
@@ -219,8 +225,10 @@ fn pass<A: Real, const N: usize, const TURNED: bool>(work: &mut Work<A>, upward:
                     z: z_places,
                 };
                 let points = [Lanes::new(&mut run_x, at), Lanes::new(&mut run_y, at), Lanes::new(&mut run_z, at)];
-                swept |= nearest::<A, N, TURNED>(Lanes::new(&mut sources, at), points, &places, passed);
+                fell |= nearest::<A, N, TURNED>(Lanes::new(&mut sources, at), points, &places, passed);
             }
+            due.tell(z, s, fell, upward);
+            swept |= fell;
         }
     }
     swept
@@ -250,6 +258,7 @@ impl<A: Real> Work<A> {
         let len = Diagonals::len(edge);
         Self {
             layout: Diagonals::new(edge),
+            due: Due::new(edge),
             source: vec![FIXED | NO_SOURCE; len],
             point: std::array::from_fn(|_| vec![A::INFINITY; len]),
             at: std::array::from_fn(|_| vec![A::default(); edge + 3 + MOST_LANES]),
@@ -276,7 +285,7 @@ impl<A: Real> VectorDistance<'_, A> {
         }
         work.layout = Diagonals { valid, turned: upward[0] != upward[1], ..work.layout };
         work.layout.load(tile, &mut work.source, |state, ghost| if ghost { state | FIXED } else { state });
-        let Work { layout, source, point: [px, py, pz], at } = work;
+        let Work { layout, source, point: [px, py, pz], at, .. } = work;
         layout.each_voxel(|place| [px[place], py[place], pz[place]] = self.point(source[place]));
         let last = tile.edge() + 1;
         for n in 0..=last {
@@ -310,12 +319,17 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
     }
 
     fn settle(&self, tile: &mut HaloTile<u32>, work: &mut Work<A>, part: &Box3) -> bool {
-        let first = [true; 3];
+        let first = downhill(tile, |at, state| {
+            let here = std::array::from_fn(|a| self.coordinate(a, part.lo[a] + at[a] as i64));
+            squared(here, self.point(state)).f64()
+        });
         self.lay_out(work, tile, part, first);
+        work.due.all(tile.valid());
         let changed = sweep_until_quiet(first, |upward| {
             if (upward[0] != upward[1]) != work.layout.turned {
                 work.layout.store(&work.source, tile, |s| s);
                 self.lay_out(work, tile, part, upward);
+                work.due.turn();
             }
             work.sweep(upward)
         });
@@ -352,6 +366,7 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
 impl<A: Real> OrderedSweeps for VectorDistance<'_, A> {
     fn sweep(&self, tile: &mut HaloTile<u32>, work: &mut Work<A>, part: &Box3, upward: [bool; 3]) -> bool {
         self.lay_out(work, tile, part, upward);
+        work.due.all(tile.valid());
         let changed = work.sweep(upward) & CHANGED != 0;
         if changed {
             work.layout.store(&work.source, tile, |s| s);

@@ -1,0 +1,92 @@
+//! Which diagonals of a tile a sweep has to look at: those beside a voxel that fell since they were looked at last.
+//!
+//! No voxel of a diagonal asks another of it (`diagonals`), but those on the two beside it in its plane, and on its own
+//! in the planes beside. Of these, the two that a sweep comes to later are due once any voxel has fallen; the two that
+//! it passed before, when one of their voxels is to be carried something back to. What is left out would have changed
+//! nothing: sweeps end with the same bits.
+
+use super::directions::{CHANGED, Swept};
+
+/// Bits of [`Swept`]: along x or y, and along z.
+const IN_PLANE: Swept = 3;
+const ACROSS: Swept = 4;
+
+/// The diagonals of all planes, by x + y and z counted from the lower ghosts.
+#[derive(Clone, Debug)]
+pub(crate) struct Due {
+    is_due: Vec<bool>,
+    /// Diagonals of a plane and of its ghosts.
+    row: usize,
+    /// The last diagonal that holds a voxel.
+    last: usize,
+}
+
+/// The first diagonal that holds a voxel.
+const FIRST: usize = 2;
+
+impl Due {
+    /// For a tile of `edge`^3 voxels.
+    pub(crate) fn new(edge: usize) -> Self {
+        let row = 2 * (edge + 2);
+        Self { is_due: vec![false; row * (edge + 2)], row, last: 2 * edge }
+    }
+
+    /// All of a tile of which so many voxels are in use are due.
+    pub(crate) fn all(&mut self, valid: [usize; 3]) {
+        self.is_due.fill(true);
+        self.last = valid[0] + valid[1];
+    }
+
+    /// Planes are laid out along other diagonals: all of one are due where any was.
+    pub(crate) fn turn(&mut self) {
+        for plane in self.is_due.chunks_exact_mut(self.row) {
+            let any = plane[FIRST..=self.last].iter().fold(false, |any, due| any | due);
+            plane.fill(any);
+        }
+    }
+
+    /// Whether diagonal `s` of plane `z` is due; it no longer is.
+    #[inline(always)]
+    pub(crate) fn take(&mut self, z: usize, s: usize) -> bool {
+        std::mem::take(&mut self.is_due[z * self.row + s])
+    }
+
+    /// What a sweep told of it; `upward` along the plane's diagonals, and along z.
+    #[inline(always)]
+    pub(crate) fn tell(&mut self, z: usize, s: usize, swept: Swept, upward: [bool; 2]) {
+        if swept & CHANGED == 0 {
+            return;
+        }
+        let at = z * self.row + s;
+        let beside = |step: usize, up: bool| if up { [at + step, at - step] } else { [at - step, at + step] };
+        let ([next, passed], [next_plane, passed_plane]) = (beside(1, upward[0]), beside(self.row, upward[1]));
+        (self.is_due[next], self.is_due[next_plane]) = (true, true);
+        self.is_due[passed] |= swept & IN_PLANE != 0;
+        self.is_due[passed_plane] |= swept & ACROSS != 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_beside_a_fall_is_due() {
+        let mut due = Due::new(4);
+        due.all([4, 4, 4]);
+        let is_due = |due: &mut Due| {
+            let all = (1..5).flat_map(|z| (2..9).map(move |s| (z, s)));
+            all.filter(|&(z, s)| due.take(z, s)).collect::<Vec<_>>()
+        };
+        assert_eq!(is_due(&mut due).len(), 28);
+        due.tell(2, 5, 0, [true; 2]);
+        assert_eq!(is_due(&mut due), []);
+        due.tell(2, 5, CHANGED, [true, false]);
+        assert_eq!(is_due(&mut due), [(1, 5), (2, 6)]);
+        due.tell(2, 5, CHANGED | 2, [true; 2]);
+        assert_eq!(is_due(&mut due), [(2, 4), (2, 6), (3, 5)]);
+        due.tell(2, 5, CHANGED | 4, [false, true]);
+        due.turn();
+        assert_eq!(is_due(&mut due).len(), 21);
+    }
+}
