@@ -14,7 +14,7 @@ const ACROSS: Swept = 4;
 /// The diagonals of all planes, by x + y and z counted from the lower ghosts.
 #[derive(Clone, Debug)]
 pub(crate) struct Due {
-    is_due: Vec<bool>,
+    flags: Vec<bool>,
     /// Diagonals of a plane and of its ghosts.
     row: usize,
     /// The last diagonal that holds a voxel.
@@ -28,18 +28,18 @@ impl Due {
     /// For a tile of `edge`^3 voxels.
     pub(crate) fn new(edge: usize) -> Self {
         let row = 2 * (edge + 2);
-        Self { is_due: vec![false; row * (edge + 2)], row, last: 2 * edge }
+        Self { flags: vec![false; row * (edge + 2)], row, last: 2 * edge }
     }
 
     /// All of a tile of which so many voxels are in use are due.
     pub(crate) fn all(&mut self, valid: [usize; 3]) {
-        self.is_due.fill(true);
+        self.flags.fill(true);
         self.last = valid[0] + valid[1];
     }
 
     /// Planes are laid out along other diagonals: all of one are due where any was.
     pub(crate) fn turn(&mut self) {
-        for plane in self.is_due.chunks_exact_mut(self.row) {
+        for plane in self.flags.chunks_exact_mut(self.row) {
             let any = plane[FIRST..=self.last].iter().fold(false, |any, due| any | due);
             plane.fill(any);
         }
@@ -48,7 +48,7 @@ impl Due {
     /// Whether diagonal `s` of plane `z` is due; it no longer is.
     #[inline(always)]
     pub(crate) fn take(&mut self, z: usize, s: usize) -> bool {
-        std::mem::take(&mut self.is_due[z * self.row + s])
+        std::mem::take(&mut self.flags[z * self.row + s])
     }
 
     /// What a sweep told of it; `upward` along the plane's diagonals, and along z.
@@ -60,9 +60,9 @@ impl Due {
         let at = z * self.row + s;
         let beside = |step: usize, up: bool| if up { [at + step, at - step] } else { [at - step, at + step] };
         let ([next, passed], [next_plane, passed_plane]) = (beside(1, upward[0]), beside(self.row, upward[1]));
-        (self.is_due[next], self.is_due[next_plane]) = (true, true);
-        self.is_due[passed] |= swept & IN_PLANE != 0;
-        self.is_due[passed_plane] |= swept & ACROSS != 0;
+        (self.flags[next], self.flags[next_plane]) = (true, true);
+        self.flags[passed] |= swept & IN_PLANE != 0;
+        self.flags[passed_plane] |= swept & ACROSS != 0;
     }
 }
 

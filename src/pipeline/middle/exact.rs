@@ -78,12 +78,11 @@ impl<P: Precision> BoxSource<u32> for Corrected<'_, P> {
 
 impl<P: Precision> Together<P> for Corrected<'_, P> {
     fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
-        match &self.together {
-            Some(together) => together.read_together(part, values, sources)?,
-            None => {
-                self.values.read_box(part, values)?;
-                self.sources.read_box(part, sources)?;
-            }
+        if let Some(together) = &self.together {
+            together.read_together(part, values, sources)?;
+        } else {
+            self.values.read_box(part, values)?;
+            self.sources.read_box(part, sources)?;
         }
         self.lower(part, values);
         self.replace(part, sources);
