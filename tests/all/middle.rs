@@ -8,7 +8,6 @@ use std::fs;
 
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
 use strandline::io::ome_zarr::StoreWriter;
-use strandline::kernel::distance::labelled_shapes::LabelledShapes;
 use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule};
 use strandline::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle};
 
@@ -276,18 +275,20 @@ fn facets_are_equally_far_from_both_sets() {
 #[test]
 fn exact_labels_have_no_error() {
     let geometry = Geometry { shape: [33, 40, 25], spacing: [0.05, 0.04, 0.06], origin: [-0.1; 3], unit: None };
+    let clouds: Vec<Vec<[f64; 3]>> = (0..4).map(|n| random_cloud(&geometry, 30, 40 + n)).collect();
+    // Off the grid that some points lie on: rounding would decide between a face and a point that are equally far.
+    let (lo, hi) = ([0.303, 0.507, 0.211], [0.891, 0.803, 1.097]);
     let mut sets = DataSets::default();
-    for n in 0..4 {
-        sets.add_cloud(&random_cloud(&geometry, 30, 40 + n));
+    for cloud in &clouds {
+        sets.add_cloud(cloud);
     }
-    sets.add_mesh(&meshes::cuboid([0.3, 0.5, 0.2], [0.9, 0.8, 1.1]));
-    let shapes = LabelledShapes::new(&sets);
+    sets.add_mesh(&meshes::cuboid(lo, hi));
     let plain = PlainGrid { shape: geometry.shape };
     let nearest = |voxel: [i64; 3]| {
         let here = position(&geometry, voxel);
-        let off = |source| shapes.distance_squared(here, source);
-        let all = 0..sets.len() as u32;
-        all.map(|source| (off(source), shapes.label(source))).fold((f64::MAX, 0), |a, b| if b < a { b } else { a })
+        let to_cloud = |cloud: &Vec<[f64; 3]>| cloud.iter().map(|p| squared(here, *p)).fold(f64::MAX, f64::min);
+        let all = clouds.iter().map(to_cloud).chain([squared_to_cuboid(here, lo, hi)]);
+        all.zip(1..).fold((f64::MAX, 0), |a, b| if b < a { b } else { a })
     };
     let wanted: Vec<(f64, u32)> = plain.voxels().map(nearest).collect();
     let mut changed = 0;
@@ -305,6 +306,13 @@ fn exact_labels_have_no_error() {
         check_border(&geometry, &labels, &border);
     }
     assert!(changed > 0, "no label was wrong");
+}
+
+/// The squared distance to the faces of a cuboid.
+fn squared_to_cuboid(here: [f64; 3], lo: [f64; 3], hi: [f64; 3]) -> f64 {
+    let inside = (0..3).map(|a| (here[a] - lo[a]).min(hi[a] - here[a])).fold(f64::MAX, f64::min);
+    let outside = (0..3).map(|a| (lo[a] - here[a]).max(here[a] - hi[a]).max(0.0).powi(2)).sum();
+    if inside > 0.0 { inside * inside } else { outside }
 }
 
 /// Neither bricks nor threads change the mesh between clouds.

@@ -153,3 +153,44 @@ fn labels_near(part: &Box3, labels: &[u32], block: &Box3) -> Vec<u32> {
     found.sort_unstable();
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::DataSets;
+
+    /// Every source of every label is asked, at places all over the cells that have two labels around.
+    #[test]
+    fn the_nearest_of_a_label_is_that_of_all() {
+        let geometry = Geometry { shape: [23, 19, 21], spacing: [0.5, 0.4, 0.7], origin: [3.0, -2.0, 1.0], unit: None };
+        let part = geometry.domain();
+        let spread = |n: usize| [2.0_f64, 3.0, 5.0].map(|root| (n as f64 * root.sqrt()).fract());
+        let within = |share: [f64; 3]| std::array::from_fn(|a| share[a] * (geometry.shape[a] - 1) as f64);
+        let world = |place: [f64; 3]| std::array::from_fn(|a| geometry.origin[a] + place[a] * geometry.spacing[a]);
+        let points: Vec<[f64; 3]> = (1..181).map(|n| world(within(spread(n)))).collect();
+        let mut sets = DataSets::default();
+        points.chunks(60).for_each(|cloud| sets.add_cloud(cloud));
+        let (shapes, trees) = (LabelledShapes::new(&sets), SourceTrees::new(&sets));
+        let squared =
+            |here: [f64; 3], source: usize| (0..3).map(|a| (here[a] - points[source][a]).powi(2)).sum::<f64>();
+        let nearest = |here: [f64; 3], among: Range<usize>| {
+            among.min_by(|&a, &b| squared(here, a).total_cmp(&squared(here, b))).unwrap() as u32
+        };
+        let voxels = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
+        let labels: Vec<u32> = voxels.map(|v| sets.label(nearest(geometry.position(v), 0..180))).collect();
+        let mut nearby = Nearby::default();
+        nearby.enter(&geometry, &shapes, &trees, &part, &labels);
+        let mut found = 0;
+        for place in (200..2200).map(|n| within(spread(n))) {
+            let here = world(place);
+            for label in 1..=3_u32 {
+                let own = 60 * (label as usize - 1)..60 * label as usize;
+                if let Some(source) = nearby.nearest(&shapes, label, place, here) {
+                    assert_eq!(source, nearest(here, own), "{place:?}");
+                    found += 1;
+                }
+            }
+        }
+        assert!(found > 2000, "{found}");
+    }
+}
