@@ -24,8 +24,8 @@ pub(super) struct SurfaceArgs {
     /// Surface between labels: where both distances are equal, or the isosurface of the voxels' labels (two sources)
     #[arg(long, value_enum, default_value_t = SurfaceArg::Exact)]
     pub(super) surface: SurfaceArg,
-    /// Labels: those of the sources that the method tracks, or of the nearest sources without an exception, of equal
-    /// distances the lower label
+    /// Labels: those of the sources that the method tracks, or of the nearest sources without an exception. Of equal
+    /// distances the lower label, but with fsm and fmm for tracked ones
     #[arg(long, value_enum, default_value_t = LabelsArg::Tracked)]
     pub(super) labels: LabelsArg,
     /// Write the surface once more, in a file of its own, in the format of its name

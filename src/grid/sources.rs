@@ -124,11 +124,25 @@ impl DataSets {
     /// The label of a source: that of its data set; 0 for a number that is no source.
     #[must_use]
     pub fn label(&self, source: u32) -> u32 {
+        self.run_of(source).1
+    }
+
+    /// The numbers of the sources that share a source's label, and the label; 0 for numbers that are no sources.
+    #[must_use]
+    pub fn run_of(&self, source: u32) -> (Range<u32>, u32) {
         let points = self.positions.len() as u32;
-        let (kind, at) = if source < points { (0, source) } else { (1, source - points) };
+        let (kind, first) = if source < points { (0, 0) } else { (1, points) };
         // Sets are added in order, so that the first one that ends beyond a source holds it.
-        let set = self.sets.partition_point(|set| set[kind].end <= at);
-        self.labels.get(set).copied().unwrap_or(0)
+        let set = self.sets.partition_point(|set| first + set[kind].end <= source);
+        let run = self.sets.get(set).map(|set| first + set[kind].start..first + set[kind].end);
+        run.map_or((self.len() as u32..u32::MAX, 0), |run| (run, self.labels[set]))
+    }
+
+    /// Whether all of these sources have one label.
+    #[must_use]
+    pub fn share_label(&self, sources: &[u32]) -> bool {
+        let most = sources.iter().fold((u32::MAX, 0), |(lo, hi), &source| (lo.min(source), hi.max(source)));
+        sources.is_empty() || self.run_of(most.0).0.contains(&most.1)
     }
 
     /// The smallest box that holds all sources, `(lowest, highest)`.
@@ -156,6 +170,10 @@ mod tests {
         sets.add_mesh(&triangle);
         let labels: Vec<u32> = (0..8).map(|source| sets.label(source)).collect();
         assert_eq!(labels, [1, 1, 7, 2, 2, 8, 8, 0]);
+        let runs: Vec<Range<u32>> = [0, 1, 2, 3, 6].map(|source| sets.run_of(source).0).into();
+        assert_eq!(runs, [0..2, 0..2, 2..3, 3..5, 5..7]);
+        assert!(sets.share_label(&[4, 3]) && sets.share_label(&[]) && sets.share_label(&[9, u32::MAX >> 1]));
+        assert!(!sets.share_label(&[4, 5]) && !sets.share_label(&[5, u32::MAX >> 1]));
         assert_eq!(sets.labels(), [1, 2, 7, 8]);
         assert_eq!(sets.mesh.triangles[2], [3, 4, 5]);
         assert_eq!(sets.bounds(), Some(([-1.0; 3], [5.0, 2.0, 2.0])));

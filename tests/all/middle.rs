@@ -8,6 +8,7 @@ use std::fs;
 
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
 use strandline::io::ome_zarr::StoreWriter;
+use strandline::kernel::distance::Neighbours::{All, Faces};
 use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule};
 use strandline::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle};
 
@@ -28,7 +29,7 @@ fn settings(method: Method, surface: SurfaceKind, labels: LabelMode, brick: i64)
     let distance = DistanceSettings {
         method,
         schedule: Schedule::Front,
-        neighbours: strandline::kernel::distance::Neighbours::Faces,
+        neighbours: Faces,
         init: if method == Method::FSM { Init::Contiguous } else { Init::Cell },
         farthest: None,
         signed: false,
@@ -353,21 +354,85 @@ fn check_border(geometry: &Geometry, labels: &[f64], border: &[f64]) {
     }
 }
 
-/// Points as far from the plane between them as each other: the lower label wins all of it.
+const BOTH_SCHEDULES: [Schedule; 2] = [Schedule::Front, Schedule::Sweep { iterations: 4 }];
+
+/// Points as far from the plane between them as each other: the lower label wins all of it, by the methods that track
+/// sources and in any case where labels are exact.
 #[test]
 fn ties_go_to_the_lower_label() {
     let geometry = cube_grid(-1.0, 1.0, 0.1);
+    let points = [[[-0.5, 0.0, 0.0]], [[0.5, 0.0, 0.0]]];
     for order in [[0, 1], [1, 0]] {
-        let points = [[[-0.5, 0.0, 0.0]], [[0.5, 0.0, 0.0]]];
         let mut sets = DataSets::default();
         for n in order {
             sets.add_cloud(&points[n]);
         }
-        let settings = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Exact, 16);
-        let found = middle::<f64>(&Lab::new(2).engine, &geometry, &sets, &settings, None).unwrap();
-        // 21 planes, the middle one at the same distance.
-        assert_eq!(found.distance.label_voxels.into_iter().collect::<Vec<_>>(), [(1, 11 * 441), (2, 10 * 441)]);
-        assert!((found.measures.area - 4.0).abs() < 0.02, "{:?}", found.measures);
+        for method in Method::all() {
+            let tracked = [Method::VDT, Method::DP].contains(&method).then_some(LabelMode::Tracked);
+            let modes = tracked.into_iter().chain([LabelMode::Exact]);
+            for (labels, schedule) in modes.flat_map(|labels| BOTH_SCHEDULES.map(|schedule| (labels, schedule))) {
+                let settings = settings(method, SurfaceKind::Exact, labels, 16);
+                let distance = DistanceSettings { schedule, init: Init::Cell, ..settings.distance };
+                let settings = MiddleSettings { distance, ..settings };
+                let found = middle::<f64>(&Lab::new(2).engine, &geometry, &sets, &settings, None).unwrap();
+                // 21 planes, the middle one at the same distance.
+                let counts: Vec<(u32, u64)> = found.distance.label_voxels.into_iter().collect();
+                assert_eq!(counts, [(1, 11 * 441), (2, 10 * 441)], "{} {schedule:?} {order:?}", method.name());
+                assert!((found.measures.area - 4.0).abs() < 0.02, "{:?}", found.measures);
+            }
+        }
+    }
+}
+
+/// Points and faces on a lattice that numbers of the machine hold exactly: most voxels between labels are as far from
+/// one as from another.
+#[test]
+fn tracked_ties_go_to_the_lower_label() {
+    let geometry = Geometry { shape: [41, 37, 33], spacing: [0.125; 3], origin: [0.0; 3], unit: None };
+    let lattice = |seed| {
+        let cloud = random_cloud(&geometry, 12, seed);
+        cloud.iter().map(|p| p.map(|v| (2.0 * v).round() / 2.0)).collect::<Vec<_>>()
+    };
+    // The first set is a mesh, whose sources are numbered after those of clouds; the last has points of others again.
+    let (lo, hi) = ([1.0, 1.5, 1.0], [2.0, 2.5, 3.0]);
+    let mut clouds: Vec<Vec<[f64; 3]>> = (1..4).map(lattice).collect();
+    clouds.push(clouds[0][..4].iter().copied().chain([lo, hi, [4.5, 4.0, 3.5]]).collect());
+    let mut sets = DataSets::default();
+    sets.add_mesh(&meshes::cuboid(lo, hi));
+    for cloud in &clouds {
+        sets.add_cloud(cloud);
+    }
+    let plain = PlainGrid { shape: geometry.shape };
+    let wanted = plain.voxels().map(|voxel| {
+        let here = position(&geometry, voxel);
+        let to_cloud = |cloud: &Vec<[f64; 3]>| cloud.iter().map(|p| squared(here, *p)).fold(f64::MAX, f64::min);
+        let all: Vec<f64> = [squared_to_cuboid(here, lo, hi)].into_iter().chain(clouds.iter().map(to_cloud)).collect();
+        let least = all.iter().copied().fold(f64::MAX, f64::min);
+        let tied = all.iter().filter(|d| **d == least).count() > 1;
+        (least, all.iter().position(|d| *d == least).map_or(0.0, |at| (at + 1) as f64), tied)
+    });
+    let wanted: Vec<(f64, f64, bool)> = wanted.collect();
+    for method in [Method::VDT, Method::DP] {
+        for (schedule, neighbours) in BOTH_SCHEDULES.into_iter().flat_map(|s| [(s, Faces), (s, All)]) {
+            if neighbours == All && method == Method::VDT && schedule != Schedule::Front {
+                continue;
+            }
+            for brick in [16, 32] {
+                let settings = settings(method, SurfaceKind::Exact, LabelMode::Tracked, brick);
+                let distance = DistanceSettings { schedule, neighbours, ..settings.distance };
+                let settings = MiddleSettings { distance, ..settings };
+                let [distances, labels, _] = fields_of(&geometry, &sets, &settings);
+                let mut ties = 0;
+                for (n, &(squared, label, tied)) in wanted.iter().enumerate() {
+                    if tied && distances[n] == f64::from(squared.sqrt() as f32) {
+                        let what = format!("{} {schedule:?} {neighbours:?} {brick}", method.name());
+                        assert_eq!(labels[n], label, "{what} at {:?}", plain.voxels().nth(n));
+                        ties += 1;
+                    }
+                }
+                assert!(ties > 2000, "{ties}");
+            }
+        }
     }
 }
 

@@ -86,7 +86,7 @@ fn fixed_by_bricks(geometry: &Geometry, mesh: &TriangleMesh, edge: i64) -> BTree
         let part = grid.brick_box(brick);
         let (mut squared, mut source) = (vec![f64::INFINITY; grid.brick_len()], vec![NO_SOURCE; grid.brick_len()]);
         let triangles = bins.of(brick).iter().map(|&n| (n, mesh.corners(n as usize)));
-        fix_voxels(geometry, &part, edge as usize, triangles, &mut squared, &mut source);
+        fix_voxels(geometry, &part, edge as usize, triangles, |_| 1, &mut squared, &mut source);
         for (y, z) in part.rows() {
             for x in part.lo[0]..part.hi[0] {
                 let [i, j, k] = [x - part.lo[0], y - part.lo[1], z - part.lo[2]];

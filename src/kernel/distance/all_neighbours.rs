@@ -67,7 +67,8 @@ impl<S: TrackedSource> AllNeighbours<S> {
             last = source;
             let kept = best.1.unwrap_or_else(|| self.sources.squared(here, best.0));
             let squared = self.sources.squared(here, source);
-            best = if squared < kept { (source, Some(squared)) } else { (best.0, Some(kept)) };
+            let nearer = self.sources.is_nearer((squared, source), (kept, best.0));
+            best = if nearer { (source, Some(squared)) } else { (best.0, Some(kept)) };
         }
         best.0
     }
@@ -92,7 +93,8 @@ impl<S: TrackedSource> AllNeighbours<S> {
                 continue;
             }
             let there = self.position(there);
-            back |= Swept::from(self.sources.squared(there, state[at]) < self.sources.squared(there, own)) << slowest;
+            let [entering, own] = [state[at], own].map(|state| (self.sources.squared(there, state), state));
+            back |= Swept::from(self.sources.is_nearer(entering, own)) << slowest;
         }
         back
     }

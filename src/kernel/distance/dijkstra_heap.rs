@@ -1,8 +1,8 @@
 //! DP over a whole volume in memory, in the textbook's order (Kósa & Mikula 2023, Alg. 5 as mended; algorithms:
 //! sections 3 and 9).
 //!
-//! One heap: the smallest voxel takes the nearest of the sources of its frozen neighbours, of equally near ones the
-//! first of -x, +x, -y, +y, -z, +z (of 26: z slowest), and is frozen at the exact distance d to it. To neighbours that
+//! One heap: the smallest voxel takes the nearest of the sources of its frozen neighbours, of equally near ones that
+//! of the lower label where triangles are among them, then the first of -x, +x, -y, +y, -z, +z (of 26: z slowest), and is frozen at the exact distance d to it. To neighbours that
 //! are not frozen it offers d and the way to them: an upper bound, by which the heap is ordered. Fixed voxels are on
 //! trial from the beginning. In and out: dense `[z][y][x]` states, the top bit set on fixed voxels. All in f64.
 //!
@@ -70,7 +70,7 @@ impl<'a, S: TrackedSource<Number = f64> + DistanceMethod> DijkstraHeap<'a, S> {
             let state = beside.map_or(NO_SOURCE, |beside| self.states[beside]);
             if has_source(state) && source_of(state) != best.0 {
                 let squared = self.method.squared(here, state);
-                if squared < best.1 {
+                if self.method.is_nearer((squared, state), (best.1, best.0)) {
                     best = (source_of(state), squared);
                 }
             }

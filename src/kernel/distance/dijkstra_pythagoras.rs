@@ -115,7 +115,7 @@ impl<A: Real> Work<A> {
             self.squared[place] = sources.squared(here, kept);
         }
         let squared = sources.squared(here, source);
-        if squared < self.squared[place] {
+        if sources.is_nearer((squared, source), (self.squared[place], kept)) {
             self.squared[place] = squared;
             self.source[place] = source;
             self.fallen.push(place as u32);

@@ -16,6 +16,7 @@ pub mod fast_sweeping;
 pub mod initialise;
 pub mod labelled_shapes;
 pub mod leaving;
+mod lower_label;
 pub mod marching_heap;
 pub mod method;
 pub mod parents;

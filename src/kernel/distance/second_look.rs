@@ -10,15 +10,16 @@
 //! voxels of all.
 //!
 //! In: source indices, [`NO_SOURCE`] where none is known, halo 2 on all 26 sides; out: source indices and squared
-//! distances, f64. Bends are looked for in f32. Ties keep the source that was there; of equally near others the first
-//! in
-//! `[z][y][x]` order is taken.
+//! distances, f64. Bends are looked for in f32. Of equally near sources the one of the lower label is taken
+//! (`lower_label`); else the one that was there stays, and of others the first in `[z][y][x]` order is taken.
 
 use super::distinct::Distinct;
 use super::initialise::NO_SOURCE;
+use super::lower_label::LowerLabels;
 use super::precision::Real;
+use super::seeds::counts_before;
 use super::tracked::TrackedSource;
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, DataSets, Geometry};
 
 /// How far around a voxel others are asked.
 pub const MARGIN: i64 = 2;
@@ -41,9 +42,11 @@ pub struct Look<'a> {
     pub known: &'a Box3,
     /// The sources of `known`, dense `[z][y][x]`.
     pub found: &'a [u32],
-    /// The farthest distance that counts: voxels a spacing beyond are not looked at. Sources were carried [`REACH`]
-    /// voxels farther.
-    pub farthest: f64,
+    /// The farthest distance that counts, where sources may have been lost: voxels a spacing beyond are not looked at.
+    /// Sources were carried [`REACH`] voxels farther.
+    pub lost_within: Option<f64>,
+    /// The data sets of the sources, where their labels decide.
+    pub sets: Option<&'a DataSets>,
 }
 
 /// What a look ends with, dense `[z][y][x]` over its part.
@@ -51,7 +54,7 @@ pub struct Look<'a> {
 pub struct Seen {
     /// The nearer sources.
     pub sources: Vec<u32>,
-    /// The squared distances to them; infinite where none is known.
+    /// The squared distances to them; infinite where none is known. Zeros where nothing needed them.
     pub squared: Vec<f64>,
     /// Squared distances of the part and of the voxels one step beyond, rounded.
     grown: Vec<f32>,
@@ -59,16 +62,28 @@ pub struct Seen {
     distinct: Distinct,
     /// Voxels of a plane where something may have been lost.
     bent: Vec<u32>,
+    /// Where another label begins.
+    lower: LowerLabels,
 }
 
 impl Seen {
     /// Looks again at all voxels of a part.
     pub fn look<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
+        let labelled = look.sets.filter(|sets| !sets.share_label(look.found));
+        self.measure(sources, look, look.lost_within.is_some() || labelled.is_some());
+        if let Some(farthest) = look.lost_within {
+            self.find_lost(sources, look, farthest);
+        }
+        if let Some(sets) = labelled {
+            self.break_ties(sources, look, sets);
+        }
+    }
+
+    fn find_lost<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>, farthest: f64) {
         let Look { geometry, part, .. } = *look;
-        self.measure(sources, look);
         self.distinct.mark(look.known, look.found);
         let [width, height, _] = part.shape().map(|n| n as usize);
-        let limit = (look.farthest + geometry.max_spacing()).powi(2);
+        let limit = (farthest + geometry.max_spacing()).powi(2);
         for (plane, z) in (part.lo[2]..part.hi[2]).enumerate() {
             self.bends(geometry, part, z);
             let bent = std::mem::take(&mut self.bent);
@@ -84,21 +99,34 @@ impl Seen {
         }
     }
 
+    /// Of equally near sources beside a voxel the one of the lowest label takes the place of its own.
+    fn break_ties<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>, sets: &DataSets) {
+        let Self { sources: kept, squared, lower, .. } = self;
+        lower.each(look, sets, |voxel, source| {
+            let at = look.part.offset_of(voxel);
+            let beside = (sources.distance_squared(source, voxel), source);
+            if beside.0 == squared[at] && counts_before(beside, (squared[at], kept[at]), |s| sets.label(s)) {
+                kept[at] = source;
+            }
+        });
+    }
+
     /// The nearest of the sources around a voxel, which has the one that is `kept`, and its squared distance.
     fn nearest<S: TrackedSource>(&self, sources: &S, look: &Look<'_>, voxel: [i64; 3], kept: (u32, f64)) -> (u32, f64) {
         let mut best = kept;
         let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(look.known);
         self.distinct.each(look.known, look.found, &around, |source| {
             let squared = sources.distance_squared(source, voxel);
-            if squared < best.1 {
+            let label = |source| look.sets.map_or(0, |sets| sets.label(source));
+            if squared < best.1 || (squared == best.1 && label(source) < label(best.0)) {
                 best = (source, squared);
             }
         });
         best
     }
 
-    /// Fills in the sources as they are, and how far they are.
-    fn measure<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
+    /// Fills in the sources as they are, and how far they are, where that is `needed`.
+    fn measure<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>, needed: bool) {
         let Look { part, known, found, .. } = *look;
         let grown = part.grow(1);
         self.sources.resize(part.len(), NO_SOURCE);
@@ -111,7 +139,9 @@ impl Seen {
         let mut row = vec![0.0; width];
         for (y, z) in within.rows() {
             let found = &found[known.offset_of([within.lo[0], y, z])..][..width];
-            sources.squared_row(found, [within.lo[0], y, z], &mut row);
+            if needed {
+                sources.squared_row(found, [within.lo[0], y, z], &mut row);
+            }
             let grown = &mut self.grown[grown.offset_of([within.lo[0], y, z])..][..width];
             grown.iter_mut().zip(&row).for_each(|(rounded, squared)| *rounded = *squared as f32);
             if (part.lo[1]..part.hi[1]).contains(&y) && (part.lo[2]..part.hi[2]).contains(&z) {
@@ -228,7 +258,7 @@ mod tests {
 
     fn looked(method: &VectorDistance<'_, f32>, geometry: &Geometry, known: &Box3, found: &[u32], part: &Box3) -> Seen {
         let mut seen = Seen::default();
-        seen.look(method, &Look { geometry, part, known, found, farthest: f64::INFINITY });
+        seen.look(method, &Look { geometry, part, known, found, lost_within: Some(f64::INFINITY), sets: None });
         seen
     }
 

@@ -2,7 +2,7 @@
 //! (Kósa & Mikula 2023, Alg. 1; algorithms: section 2).
 //!
 //! Arrays are dense `[z][y][x]` over a brick. Of what fixes a voxel and what it is told of it starts from the nearer;
-//! of equal distances from the lower index.
+//! of equal distances from the lower label, then from the lower index.
 
 use super::initialise::NO_SOURCE;
 use super::method::DistanceMethod;
@@ -39,15 +39,21 @@ impl Seeds {
     }
 }
 
+/// Whether of two sources, each with its squared distance, the first counts.
+pub(super) fn counts_before(a: (f64, u32), b: (f64, u32), label: impl Fn(u32) -> u32) -> bool {
+    a.0 < b.0 || (a.0 == b.0 && (label(a.1), a.1) < (label(b.1), b.1))
+}
+
 /// The states of voxels that are `fixed`, and of others that are `told` of a source (which may have no voxels: none
-/// is).
-pub fn write_states<M: DistanceMethod>(fixed: &Seeds, told: &Seeds, out: &mut [M::State]) {
+/// is). Each source has a `label`.
+pub fn write_states<M: DistanceMethod>(fixed: &Seeds, told: &Seeds, label: impl Fn(u32) -> u32, out: &mut [M::State]) {
     for (at, out) in out.iter_mut().enumerate() {
         let nearest = |seeds: &Seeds| (seeds.squared[at], seeds.source[at]);
         let (fixing, beside) = (nearest(fixed), if told.source.is_empty() { NONE } else { nearest(told) });
         *out = match (fixing.1 == NO_SOURCE, beside.1 == NO_SOURCE) {
-            (false, _) => {
-                let (squared, source) = if beside < fixing { beside } else { fixing };
+            (false, told) => {
+                let farther = told || !counts_before(beside, fixing, &label);
+                let (squared, source) = if farther { fixing } else { beside };
                 M::fixed(squared, source)
             }
             (true, false) => M::told(beside.1).unwrap_or(M::UNKNOWN),

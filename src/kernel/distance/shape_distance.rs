@@ -1,12 +1,14 @@
 //! VDT to points and triangles together (Kósa & Mikula 2023, Alg. 3 with Alg. 6; algorithms: sections 2 and 3).
 //!
-//! The state, its ties and its sweeps are those of `vector_distance`; only the distance to a source is another: exact
+//! The state and its sweeps are those of `vector_distance`; only the distance to a source is another: exact
 //! point–triangle distance (Eberly 1999), f64. It costs tens of additions, so a source is asked for its distance only
-//! where a neighbour's differs from the kept one and from those just asked.
+//! where a neighbour's differs from the kept one and from those just asked. Triangles are numbered after points; so of
+//! equal distances the one to the lower label counts, and among those of one label the one kept.
 
-use super::directions::{CHANGED, Swept, sweep_until_quiet};
+use super::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
 use super::initialise::{NO_SOURCE, squared_distance};
 use super::method::{DistanceMethod, OrderedSweeps};
+use super::tracked::{TrackedSource, has_source, source_of};
 use super::vector_distance::FIXED;
 use crate::grid::{Box3, DataSets, Geometry};
 use crate::kernel::triangle::Triangle;
@@ -16,16 +18,21 @@ use crate::tile::HaloTile;
 #[derive(Clone, Debug)]
 pub struct ShapeDistance<'a> {
     geometry: &'a Geometry,
-    positions: &'a [[f64; 3]],
+    sets: &'a DataSets,
     triangles: Vec<Triangle>,
 }
 
 impl<'a> ShapeDistance<'a> {
     /// For sources in the world and a grid.
     #[must_use]
-    pub fn new(geometry: &'a Geometry, sources: &'a DataSets) -> Self {
-        let triangles = (0..sources.mesh.len()).map(|n| Triangle::new(sources.mesh.corners(n))).collect();
-        Self { geometry, positions: &sources.positions, triangles }
+    pub fn new(geometry: &'a Geometry, sets: &'a DataSets) -> Self {
+        let triangles = (0..sets.mesh.len()).map(|n| Triangle::new(sets.mesh.corners(n))).collect();
+        Self { geometry, sets, triangles }
+    }
+
+    /// Whether the first of two states has a source of a lower label than the second's.
+    pub(super) fn has_lower_label(&self, state: u32, than: u32) -> bool {
+        has_source(state) && self.sets.label(source_of(state)) < self.sets.label(source_of(than))
     }
 
     /// The coordinate of a voxel's centre along an axis.
@@ -36,10 +43,10 @@ impl<'a> ShapeDistance<'a> {
     /// The squared distance of a world position to a source; infinite to none.
     pub(super) fn squared(&self, here: [f64; 3], source: u32) -> f64 {
         let source = (source & !FIXED) as usize;
-        if let Some(&point) = self.positions.get(source) {
+        if let Some(&point) = self.sets.positions.get(source) {
             return squared_distance(here, point);
         }
-        let triangle = self.triangles.get(source - self.positions.len());
+        let triangle = self.triangles.get(source - self.sets.positions.len());
         triangle.map_or(f64::INFINITY, |triangle| triangle.distance_squared(here))
     }
 
@@ -60,7 +67,7 @@ impl<'a> ShapeDistance<'a> {
             now[side] = source;
             let kept = asked.squared(at, || self.squared(here, best));
             let squared = self.squared(here, source);
-            if squared < kept {
+            if self.is_nearer((squared, source), (kept, best)) {
                 (best, asked.squared[at]) = (source, squared);
             }
         }
@@ -118,7 +125,8 @@ impl<'a> ShapeDistance<'a> {
             let mut there = voxel;
             there[axis] += if upward[axis] { -1 } else { 1 };
             let there = self.geometry.position(there);
-            self.squared(there, state[at]) < asked.squared(before, || self.squared(there, state[before]))
+            let own = asked.squared(before, || self.squared(there, state[before]));
+            self.is_nearer((self.squared(there, state[at]), state[at]), (own, state[before]))
         };
         (0..3).map(|axis| u32::from(is_nearer(axis)) << axis).sum()
     }
@@ -185,7 +193,10 @@ impl DistanceMethod for ShapeDistance<'_> {
 
     fn settle(&self, tile: &mut HaloTile<u32>, asked: &mut Asked, part: &Box3) -> bool {
         asked.forget();
-        sweep_until_quiet([true; 3], |upward| self.pass(tile, asked, part, upward))
+        let first = downhill(tile, |at, state| {
+            self.distance_squared(state, std::array::from_fn(|a| part.lo[a] + at[a] as i64))
+        });
+        sweep_until_quiet(first, |upward| self.pass(tile, asked, part, upward))
     }
 
     fn entering(&self, beside: u32, state: u32, voxel: [i64; 3]) -> Option<f64> {
@@ -194,7 +205,8 @@ impl DistanceMethod for ShapeDistance<'_> {
         }
         let here = self.geometry.position(voxel);
         let entering = self.squared(here, beside);
-        (entering < self.squared(here, state)).then(|| entering.sqrt())
+        let kept = (self.squared(here, state), state);
+        self.is_nearer((entering, beside), kept).then(|| entering.sqrt())
     }
 
     fn distance(&self, state: u32, voxel: [i64; 3]) -> f64 {

@@ -18,6 +18,13 @@ pub trait TrackedSource: DistanceMethod<State = u32> {
     /// The squared distance of a place to the source of a state; infinite to none.
     fn squared(&self, here: [Self::Number; 3], state: u32) -> Self::Number;
 
+    /// Whether the first of two sources, each with a voxel's squared distance to it, is to be kept rather than the
+    /// second. Of equally near ones that is the second, which was there before; unless their labels differ, and their
+    /// numbers do not tell of which label is lower.
+    fn is_nearer(&self, (squared, _): (Self::Number, u32), than: (Self::Number, u32)) -> bool {
+        squared < than.0
+    }
+
     /// The squared distance of a voxel to a source, physical units, in f64: of which [`DistanceMethod::distance`] is
     /// the root.
     fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64;
@@ -72,6 +79,11 @@ impl TrackedSource for ShapeDistance<'_> {
 
     fn squared(&self, here: [f64; 3], state: u32) -> f64 {
         self.squared(here, state)
+    }
+
+    #[inline]
+    fn is_nearer(&self, a: (f64, u32), b: (f64, u32)) -> bool {
+        a.0 < b.0 || (a.0 == b.0 && self.has_lower_label(a.1, b.1))
     }
 
     fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {

@@ -1,13 +1,14 @@
 //! Initialisation from a triangle mesh (Kósa & Mikula 2023, Alg. 6; algorithms: section 2).
 //!
 //! All corners of every cell that a triangle cuts are fixed at their exact distance to it (point–triangle distance:
-//! Eberly 1999); a grid point keeps the smallest one and that triangle; of equal distances the lower index wins,
-//! whatever the order in which triangles come. A triangle without area acts as a segment or point, and fixes what a
+//! Eberly 1999); a grid point keeps the smallest one and that triangle; of equal distances the lower label wins, then
+//! the lower index, whatever the order in which triangles come. A triangle without area acts as a segment or point, and fixes what a
 //! point cloud's point there would. Cells are those of `floor`, half-open: a triangle that lies in a grid plane fixes
 //! that plane's points and the next one's above. Cells that stick out of the grid count for the voxels they share
 //! with it. In: positions in f64, `[x, y, z]`, physical; out: squared lengths. No halo; a brick needs the triangles
 //! that `TriangleBins` lists for it.
 
+use super::seeds::counts_before;
 use crate::grid::{Box3, Geometry, VoxelTriangle, cells_beside};
 use crate::kernel::triangle::Triangle;
 
@@ -40,14 +41,15 @@ fn halve(triangle: &VoxelTriangle, cells: &Box3, visit: &mut impl FnMut([i64; 3]
 /// Fixes the voxels of `part` beside the given triangles, each with its index and its corners as world positions.
 ///
 /// `squared` holds squared distances (start: infinity), `source` the index of the fixing triangle (start:
-/// [`NO_SOURCE`](super::initialise::NO_SOURCE)); both dense `[z][y][x]` with room for `edge`^3 voxels from `part.lo`
-/// on. Returns how many distances it computed: for each voxel one to each triangle that cuts a cell beside it, so that
+/// [`NO_SOURCE`](super::initialise::NO_SOURCE)), points that were there before among them, each with a `label`; both
+/// dense `[z][y][x]` with room for `edge`^3 voxels from `part.lo` on. Returns how many distances it computed: for each voxel one to each triangle that cuts a cell beside it, so that
 /// the sum over parts of a grid is that of the grid. Scratch: 4 bytes a voxel.
 pub fn fix_voxels(
     geometry: &Geometry,
     part: &Box3,
     edge: usize,
     triangles: impl Iterator<Item = (u32, [[f64; 3]; 3])>,
+    label: impl Fn(u32) -> u32,
     squared: &mut [f64],
     source: &mut [u32],
 ) -> u64 {
@@ -70,8 +72,7 @@ pub fn fix_voxels(
                 measured[place] = number;
                 distances += 1;
                 let distance = triangle.distance_squared(geometry.position(voxel));
-                let nearer = distance < squared[place] || (distance == squared[place] && index < source[place]);
-                if nearer {
+                if counts_before((distance, index), (squared[place], source[place]), &label) {
                     squared[place] = distance;
                     source[place] = index;
                 }
@@ -95,7 +96,7 @@ mod tests {
     fn fixed(triangles: &[(u32, [[f64; 3]; 3])]) -> (Vec<f64>, Vec<u32>) {
         let (mut squared, mut source) = (vec![f64::INFINITY; EDGE.pow(3)], vec![NO_SOURCE; EDGE.pow(3)]);
         let all = Box3::from_shape([EDGE as i64; 3]);
-        fix_voxels(&grid(), &all, EDGE, triangles.iter().copied(), &mut squared, &mut source);
+        fix_voxels(&grid(), &all, EDGE, triangles.iter().copied(), |_| 1, &mut squared, &mut source);
         (squared, source)
     }
 
@@ -144,7 +145,7 @@ mod tests {
         let (squared, source) = fixed(&[(0, shape)]);
         let part = Box3::new([3, 2, 1], [7, 6, 5]);
         let (mut own, mut indices) = (vec![f64::INFINITY; 64], vec![NO_SOURCE; 64]);
-        fix_voxels(&grid(), &part, 4, [(0, shape)].into_iter(), &mut own, &mut indices);
+        fix_voxels(&grid(), &part, 4, [(0, shape)].into_iter(), |_| 1, &mut own, &mut indices);
         let mut count = 0;
         for (y, z) in part.rows() {
             for x in part.lo[0]..part.hi[0] {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::grid::{Box3, DataSets, FACES};
+use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::store::Element;
 
 /// Writes `label` into `out` where u is at least 1/2. `u` is dense `[z][y][x]` over the box `from`, `out` over the box
@@ -18,16 +19,32 @@ pub fn paint<T: Element>(u: &[f32], from: &Box3, label: T, to: &Box3, out: &mut 
 /// The labels of voxels by their sources, into `out`; 0 for those without one.
 pub fn of_sources(sets: &DataSets, sources: &[u32], out: &mut Vec<u32>) {
     out.clear();
-    // Neighbours mostly have one source, so a label is looked up once for all of a run.
-    for run in sources.chunk_by(|a, b| a == b) {
-        out.resize(out.len() + run.len(), sets.label(run[0]));
-    }
+    // Neighbours mostly have one label, so it is looked up where another begins.
+    let mut known = sets.run_of(NO_SOURCE);
+    out.extend(sources.iter().map(|source| {
+        if !known.0.contains(source) {
+            known = sets.run_of(*source);
+        }
+        known.1
+    }));
 }
 
 /// 1 where voxels have a label, else 0.
 #[must_use]
 pub fn mask(labels: &[u32], label: u32) -> Vec<f32> {
     labels.iter().map(|&other| f32::from(u8::from(other == label))).collect()
+}
+
+/// Voxels of each label but 0, by their sources.
+#[must_use]
+pub fn count_sources(sets: &DataSets, sources: &[u32], labels: &mut Vec<u32>) -> BTreeMap<u32, u64> {
+    match sources.first().map(|first| sets.label(*first)) {
+        Some(label) if label > 0 && sets.share_label(sources) => BTreeMap::from([(label, sources.len() as u64)]),
+        _ => {
+            of_sources(sets, sources, labels);
+            count(labels)
+        }
+    }
 }
 
 /// Voxels of each label but 0.
@@ -95,5 +112,12 @@ mod tests {
         let counts = count(&[0, 2, 2, 0, 1, 2, 70_000, 1, 1]);
         assert_eq!(counts, BTreeMap::from([(1, 3), (2, 3), (70_000, 1)]));
         assert!(count(&[0, 0]).is_empty() && count(&[]).is_empty());
+        let mut sets = DataSets::default();
+        sets.add_labelled(4, &[[0.0; 3]; 2]);
+        sets.add_labelled(9, &[[1.0; 3]]);
+        let of = |sources: &[u32]| count_sources(&sets, sources, &mut Vec::new());
+        assert_eq!(of(&[1, 0, 2, NO_SOURCE]), BTreeMap::from([(4, 2), (9, 1)]));
+        assert_eq!(of(&[1, 0, 1]), BTreeMap::from([(4, 3)]));
+        assert!(of(&[NO_SOURCE; 2]).is_empty() && of(&[]).is_empty());
     }
 }

@@ -68,8 +68,7 @@ impl<P: Precision> Solved<'_, P> {
             if let Some(sets) = labelled {
                 sources.resize(part.len(), NO_SOURCE);
                 self.read_both(&part, values, sources)?;
-                labels::of_sources(sets, sources, labels_of_voxels);
-                counts = labels::count(labels_of_voxels);
+                counts = labels::count_sources(sets, sources, labels_of_voxels);
             } else {
                 self.values.read_box(&part, values)?;
             }

@@ -65,12 +65,13 @@ pub(super) fn initialise<M: DistanceMethod>(
         told.clear();
         let points = sources.points_seeding(id, [0; 3]);
         fix_voxels(sources.geometry, &part, edge, points, &mut fixed.squared, &mut fixed.source);
+        let label = |source| sources.sets.map_or(0, |sets| sets.label(source));
         let mut distances = 0;
         if let Some((mesh, bins)) = sources.mesh {
             let first = sources.positions.len() as u32;
             let beside = bins.of(id).iter().map(|&n| (first + n, mesh.corners(n as usize)));
             let (squared, source) = (&mut fixed.squared, &mut fixed.source);
-            distances = triangles::fix_voxels(sources.geometry, &part, edge, beside, squared, source);
+            distances = triangles::fix_voxels(sources.geometry, &part, edge, beside, label, squared, source);
         }
         if tells {
             let points = sources.points_seeding(id, margin);
@@ -78,11 +79,11 @@ pub(super) fn initialise<M: DistanceMethod>(
         }
         let (count, known) = (fixed.count(), fixed.count() + told.count());
         if known > 0 {
-            array.write(slot, |out| write_states::<M>(fixed, told, out));
+            array.write(slot, |out| write_states::<M>(fixed, told, label, out));
             array.refresh_faces(slot);
         }
         if let Some(kept) = kept.filter(|_| count > 0) {
-            kept.write(slot, |out| write_states::<ShapeDistance<'_>>(fixed, told, out));
+            kept.write(slot, |out| write_states::<ShapeDistance<'_>>(fixed, told, label, out));
             kept.refresh_faces(slot);
         }
         Ok((count, known, distances))

@@ -145,7 +145,7 @@ pub fn solve_sets<P: Precision, R>(
         bins: &bins,
         cubes: &cubes,
         mesh: triangles.as_ref().map(|bins| (&sets.mesh, bins)),
-        sets: triangles.is_some().then_some(sets),
+        sets: Some(sets),
     };
     stage.finish();
     let stage = engine.stage("distance", set.len() as u64);

@@ -26,12 +26,15 @@ pub fn solve<'a, P: Precision>(
     options: Options,
 ) -> Result<Solved<'a, P>> {
     let solved = solve_once(stage, sources, set, method, schedule, options)?;
-    let looks_again = schedule == Schedule::Front && method.solver::<P>().tracks_sources();
-    Ok(if looks_again { with_second_look(solved, sources, options) } else { solved })
+    Ok(if method.solver::<P>().tracks_sources() {
+        with_second_look(solved, sources, options, schedule == Schedule::Front)
+    } else {
+        solved
+    })
 }
 
-/// The same without a second look at voxels whose nearest source the front may have lost: they are few, away from the
-/// sources, and off by less than a spacing.
+/// The same without a second look at voxels whose nearest source the front may have lost (they are few, away from the
+/// sources, and off by less than a spacing), or whose source is as near as one of a lower label.
 pub(super) fn solve_once<'a, P: Precision>(
     stage: &Stage<'_>,
     sources: &Sources<'a>,

@@ -1,6 +1,6 @@
-//! What the `front` schedule leaves of a method that tracks sources, read with a second look at each voxel
-//! (`kernel::distance::second_look`). Nothing more is stored, and no brick is visited for it: whoever reads a box reads
-//! two voxels more around it.
+//! What a method leaves, read with a second look at the source of each voxel (`kernel::distance::second_look`): at
+//! those that the `front` schedule may have lost where sources are tracked, and at equally near ones of lower labels.
+//! Nothing more is stored, and no brick is visited for it: whoever reads a box reads two voxels more around it.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use super::field::Together;
 use super::{Options, Solved, Sources};
 use crate::error::Result;
 use crate::exec::Workers;
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, DataSets, Geometry};
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::second_look::{Look, MARGIN, Seen};
@@ -21,28 +21,47 @@ use crate::store::BoxSource;
 /// Edge of the pieces that a box is looked at in: some 6 MB of buffers for each thread.
 const PIECE: i64 = 64;
 
-/// A solved distance, each voxel looked at again as it is read.
+/// A solved distance of a method that tracks sources, each voxel looked at again as it is read: for sources that were
+/// lost too where a `front` solved it.
 pub(super) fn with_second_look<'a, P: Precision>(
     solved: Solved<'a, P>,
     sources: &Sources<'a>,
     options: Options,
+    is_front: bool,
 ) -> Solved<'a, P> {
-    let geometry = sources.geometry;
-    match sources.sets {
-        Some(sets) => join(solved, geometry, ShapeDistance::new(geometry, sets), options),
-        None => join(solved, geometry, VectorDistance::<P::Fast>::new(geometry, sources.positions), options),
+    let sets = sources.sets.filter(|sets| options.sources && sets.count() > 1);
+    let (geometry, positions) = (sources.geometry, sources.positions);
+    let kind = Kind { is_front, sets, farthest: options.farthest };
+    match (sources.shapes(), is_front || sets.is_some()) {
+        (_, false) => solved,
+        (Some(shapes), _) => join(solved, geometry, ShapeDistance::new(geometry, shapes), kind),
+        (None, _) => join(solved, geometry, VectorDistance::<P::Fast>::new(geometry, positions), kind),
     }
+}
+
+/// What is looked for.
+#[derive(Clone, Copy)]
+struct Kind<'a> {
+    /// Whether sources came by a front, which loses some.
+    is_front: bool,
+    /// The data sets, where labels decide.
+    sets: Option<&'a DataSets>,
+    farthest: f64,
 }
 
 fn join<'a, P: Precision, S: TrackedSource + 'a>(
     solved: Solved<'a, P>,
     geometry: &'a Geometry,
     method: S,
-    options: Options,
+    kind: Kind<'a>,
 ) -> Solved<'a, P> {
     let buffers = Workers::new(Default::default);
-    let seen = Arc::new(SecondLook { method, geometry, found: solved.sources, farthest: options.farthest, buffers });
-    Solved { values: seen.clone(), together: Some(seen.clone()), sources: seen, ..solved }
+    let seen = Arc::new(SecondLook { method, geometry, found: solved.sources, kind, buffers });
+    if kind.is_front {
+        Solved { values: seen.clone(), together: Some(seen.clone()), sources: seen, ..solved }
+    } else {
+        Solved { sources: seen, ..solved }
+    }
 }
 
 /// Sources as a method left them, and what tells how far they are.
@@ -50,7 +69,7 @@ struct SecondLook<'a, S> {
     method: S,
     geometry: &'a Geometry,
     found: Arc<dyn BoxSource<u32> + Send + 'a>,
-    farthest: f64,
+    kind: Kind<'a>,
     /// Kept from one read to the next: fresh memory would cost more than what is computed in it.
     buffers: Workers<(Vec<u32>, Seen)>,
 }
@@ -58,14 +77,15 @@ struct SecondLook<'a, S> {
 impl<S: TrackedSource> SecondLook<'_, S> {
     /// Looks at a box, a piece at a time so that buffers stay small, and hands on what was seen of each.
     fn see(&self, part: &Box3, mut then: impl FnMut(&Box3, &Seen)) -> Result<()> {
-        let (geometry, farthest) = (self.geometry, self.farthest);
+        let (geometry, Kind { is_front, sets, farthest }) = (self.geometry, self.kind);
+        let lost_within = is_front.then_some(farthest);
         self.buffers.with(|(found, seen)| {
             for piece in pieces(part) {
                 let known = piece.grow(MARGIN).intersect(&geometry.domain());
                 found.resize(known.len().max(found.len()), NO_SOURCE);
                 let found = &mut found[..known.len()];
                 self.found.read_box(&known, found)?;
-                seen.look(&self.method, &Look { geometry, part: &piece, known: &known, found, farthest });
+                seen.look(&self.method, &Look { geometry, part: &piece, known: &known, found, lost_within, sets });
                 then(&piece, seen);
             }
             Ok(())
@@ -76,7 +96,7 @@ impl<S: TrackedSource> SecondLook<'_, S> {
 impl<S> SecondLook<'_, S> {
     fn distances<P: Precision>(&self, squared: &[f64], out: &mut [P]) {
         for (out, squared) in out.iter_mut().zip(squared) {
-            *out = P::from_f64(squared.sqrt().min(self.farthest));
+            *out = P::from_f64(squared.sqrt().min(self.kind.farthest));
         }
     }
 }

@@ -206,7 +206,7 @@ fn vector_distance<'a, P: Precision>(
 ) -> Result<Solved<'a, P>> {
     let job = Job { stage, engine, sources, set, options };
     let (geometry, positions) = (sources.geometry, sources.positions);
-    if let Some(sets) = sources.sets {
+    if let Some(sets) = sources.shapes() {
         let method = ShapeDistance::new(geometry, sets);
         return match schedule {
             Schedule::Front => job.front_vector(method),
@@ -230,7 +230,7 @@ fn fast_marching<'a, P: Precision>(
     let job = Job { stage, engine, sources, set, options };
     let (geometry, positions) = (sources.geometry, sources.positions);
     let method = FastMarching::<P, P::Fast>::new(geometry.spacing);
-    match (schedule, sources.sets) {
+    match (schedule, sources.shapes()) {
         (Schedule::Front, _) => job.front_then_sources::<P, _, ShortestWay>(method),
         (_, Some(sets)) => job.heap_marching(method, &ShapeDistance::new(geometry, sets)),
         (_, None) => job.heap_marching(method, &VectorDistance::<f64>::new(geometry, positions)),
@@ -247,7 +247,7 @@ fn dijkstra_pythagoras<'a, P: Precision>(
 ) -> Result<Solved<'a, P>> {
     let job = Job { stage, engine, sources, set, options };
     let (geometry, positions) = (sources.geometry, sources.positions);
-    match (schedule, sources.sets) {
+    match (schedule, sources.shapes()) {
         (Schedule::Front, Some(sets)) => job.front_dijkstra(ShapeDistance::new(geometry, sets)),
         (Schedule::Front, None) => job.front_dijkstra(VectorDistance::<P::Fast>::new(geometry, positions)),
         (_, Some(sets)) => job.heap_dijkstra(ShapeDistance::new(geometry, sets)),

@@ -17,7 +17,7 @@ pub struct Sources<'a> {
     pub cubes: &'a [(u32, Cube)],
     /// Triangles, whose numbers follow those of the points.
     pub mesh: Option<(&'a TriangleMesh, &'a TriangleBins)>,
-    /// All of them as data sets, where there are triangles.
+    /// All of them as data sets; a cloud alone needs none.
     pub sets: Option<&'a DataSets>,
 }
 
@@ -26,6 +26,11 @@ impl<'a> Sources<'a> {
     #[must_use]
     pub fn cloud(geometry: &'a Geometry, positions: &'a [[f64; 3]], bins: &'a PointBins) -> Self {
         Self { geometry, positions, bins, cubes: &[], mesh: None, sets: None }
+    }
+
+    /// Points and triangles as data sets, where there are triangles.
+    pub(super) fn shapes(&self) -> Option<&'a DataSets> {
+        self.sets.filter(|_| self.mesh.is_some())
     }
 
     fn cube(&self, point: u32) -> Cube {

@@ -32,7 +32,8 @@ pub enum SurfaceKind {
 /// How labels are told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LabelMode {
-    /// By the sources that the method tracks.
+    /// By the sources that the method tracks. Of equally near ones VDT and DP take the lower label; FSM and FMM the one
+    /// that the published rule of parents leads to.
     Tracked,
     /// By the nearest source, looked up wherever the tracked one may belong to the wrong set; of equal distances the
     /// lower label wins.
