@@ -7,8 +7,9 @@
 //! and out: a grown tile of source indices, the top bit set on fixed voxels. Halo 1, all 26 directions. No scratch.
 
 use super::Neighbours;
-use super::directions::{CHANGED, Swept, sweep_until_quiet};
+use super::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
 use super::method::DistanceMethod;
+use super::precision::Real;
 use super::tracked::{TrackedSource, has_source, source_of};
 use crate::grid::{Box3, NEIGHBOURS_26};
 use crate::tile::HaloTile;
@@ -124,7 +125,11 @@ impl<S: TrackedSource> DistanceMethod for AllNeighbours<S> {
     fn work(_: usize) {}
 
     fn settle(&self, tile: &mut HaloTile<u32>, (): &mut (), part: &Box3) -> bool {
-        sweep_until_quiet([true; 3], |upward| self.pass(tile, part, upward))
+        let first = downhill(tile, |at, state| {
+            let here = self.position(std::array::from_fn(|a| part.lo[a] + at[a] as i64));
+            self.sources.squared(here, state).f64()
+        });
+        sweep_until_quiet(first, |upward| self.pass(tile, part, upward))
     }
 
     fn neighbours(&self) -> Neighbours {
