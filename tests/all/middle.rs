@@ -316,18 +316,24 @@ fn squared_to_cuboid(here: [f64; 3], lo: [f64; 3], hi: [f64; 3]) -> f64 {
     if inside > 0.0 { inside * inside } else { outside }
 }
 
-/// Neither bricks nor threads change the mesh between clouds.
+/// Neither bricks nor threads change the mesh.
 #[test]
 fn exact_labels_have_one_mesh() {
     let geometry = Geometry { shape: [33, 40, 25], spacing: [0.05, 0.04, 0.06], origin: [-0.1; 3], unit: None };
     let mut sets = DataSets::default();
-    for n in 0..4 {
+    for n in 0..3 {
         sets.add_cloud(&random_cloud(&geometry, 30, 40 + n));
     }
-    let small = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Exact, 16);
-    let large = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Exact, 32);
-    let meshes = [mesh_of(&geometry, &sets, &small, 1).0, mesh_of(&geometry, &sets, &large, 3).0];
-    assert!(meshes[0] == meshes[1]);
+    // One off the grid, one whose corners lie on it.
+    sets.add_mesh(&meshes::cuboid([0.303, 0.507, 0.211], [0.891, 0.803, 1.097]));
+    sets.add_mesh(&meshes::sphere([1.1, 1.1, 0.7], 0.3, 12, PI));
+    for method in Method::all() {
+        let small = settings(method, SurfaceKind::Exact, LabelMode::Exact, 16);
+        let large = settings(method, SurfaceKind::Exact, LabelMode::Exact, 32);
+        let meshes = [mesh_of(&geometry, &sets, &small, 1).0, mesh_of(&geometry, &sets, &large, 3).0];
+        let differ = meshes[0].vertices.iter().zip(&meshes[1].vertices).position(|(a, b)| a != b);
+        assert!(meshes[0] == meshes[1], "{}: from vertex {differ:?} on", method.name());
+    }
 }
 
 /// Distances, labels and borders as a store has them.
