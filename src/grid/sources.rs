@@ -127,6 +127,19 @@ impl DataSets {
         self.run_of(source).1
     }
 
+    /// The position of a point, the middle of a triangle's corners.
+    ///
+    /// # Panics
+    /// For a number that is no source.
+    #[must_use]
+    pub fn centre(&self, source: u32) -> [f64; 3] {
+        let source = source as usize;
+        self.positions.get(source).copied().unwrap_or_else(|| {
+            let [a, b, c] = self.mesh.corners(source - self.positions.len());
+            std::array::from_fn(|n| (a[n] + b[n] + c[n]) / 3.0)
+        })
+    }
+
     /// The numbers of the sources that share a source's label, and the label; 0 for numbers that are no sources.
     #[must_use]
     pub fn run_of(&self, source: u32) -> (Range<u32>, u32) {

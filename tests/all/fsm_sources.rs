@@ -37,6 +37,7 @@ fn fsm<P: Stored>(
     let sources = Sources {
         mesh: Some((&sets.mesh, &triangles)),
         sets: Some(sets),
+        trees: None,
         ..Sources::cloud(geometry, &sets.positions, &bins)
     };
     let stage = lab.engine.stage("distance", 0);

@@ -328,6 +328,7 @@ fn a_box_of_triangles_has_its_distance() {
         let sources = Sources {
             mesh: Some((&sets.mesh, &triangles)),
             sets: Some(&sets),
+            trees: None,
             ..Sources::cloud(&geometry, &[], &bins)
         };
         let stage = lab.engine.stage("distance", 0);

@@ -1,6 +1,7 @@
 //! Distance to point sources on one tile: where sources fix voxels, and how sweeps carry them outward.
 
 pub mod all_neighbours;
+mod beside_sources;
 mod buckets;
 pub mod culling;
 mod diagonals;
@@ -14,9 +15,9 @@ pub mod extent;
 pub mod fast_marching;
 pub mod fast_sweeping;
 pub mod initialise;
+mod label_borders;
 pub mod labelled_shapes;
 pub mod leaving;
-mod lower_label;
 pub mod marching_heap;
 pub mod method;
 pub mod parents;

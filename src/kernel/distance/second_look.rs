@@ -9,15 +9,20 @@
 //! fall off either: its sum must be more than 2 (d - k)^2. What is left are the edges and corners where cells meet, few
 //! voxels of all.
 //!
+//! Labels are borders of cells too, and a wrong one is seen. So beside a voxel of another label, whose source is hardly
+//! farther than a voxel's own, the nearest sources of both are looked up among those beside these two.
+//!
 //! In: source indices, [`NO_SOURCE`] where none is known, halo 2 on all 26 sides; out: source indices and squared
-//! distances, f64. Bends are looked for in f32. Of equally near sources the one of the lower label is taken
-//! (`lower_label`); else the one that was there stays, and of others the first in `[z][y][x]` order is taken.
+//! distances, f64. Bends are looked for in f32. Of equally near sources the one of the lower label is taken;
+//! else the one that was there stays, and of others the first in `[z][y][x]` order is taken.
 
+use super::beside_sources::BesideSources;
 use super::distinct::Distinct;
 use super::initialise::NO_SOURCE;
-use super::lower_label::LowerLabels;
+use super::label_borders::LabelBorders;
 use super::precision::Real;
 use super::seeds::counts_before;
+use super::source_trees::SourceTrees;
 use super::tracked::TrackedSource;
 use crate::grid::{Box3, DataSets, Geometry};
 
@@ -26,10 +31,21 @@ pub const MARGIN: i64 = 2;
 /// How much farther sources must be carried than they count, in voxels: those that may come to count, and what they
 /// ask.
 pub const REACH: i64 = MARGIN + 1;
+/// How much farther the source of another label may be, in the smallest spacing, where a nearer one may have been lost.
+const CLOSE: f64 = 0.15;
 /// How much nearer a source may be without being looked for, t above, in the smallest spacing.
 const TOLERANCE: f64 = 0.05;
 /// By how much a second pair of neighbours may fall off, k above, in the smallest spacing.
 const RIDGE: f64 = 0.02;
+
+/// What decides on labels.
+#[derive(Clone, Copy, Debug)]
+pub struct Labels<'a> {
+    /// The data sets of the sources.
+    pub sets: &'a DataSets,
+    /// The same, sorted, where sources may have been lost.
+    pub trees: Option<&'a SourceTrees>,
+}
 
 /// The voxels that are looked at, and what is known of them and of those around.
 #[derive(Clone, Copy, Debug)]
@@ -45,8 +61,15 @@ pub struct Look<'a> {
     /// The farthest distance that counts, where sources may have been lost: voxels a spacing beyond are not looked at.
     /// Sources were carried [`REACH`] voxels farther.
     pub lost_within: Option<f64>,
-    /// The data sets of the sources, where their labels decide.
-    pub sets: Option<&'a DataSets>,
+    /// What decides on labels, where there are several.
+    pub labels: Option<Labels<'a>>,
+}
+
+impl Look<'_> {
+    /// Voxels are looked at whose squared distance is below that.
+    fn counts_below(&self) -> f64 {
+        self.lost_within.map_or(f64::INFINITY, |farthest| (farthest + self.geometry.max_spacing()).powi(2))
+    }
 }
 
 /// What a look ends with, dense `[z][y][x]` over its part.
@@ -63,33 +86,34 @@ pub struct Seen {
     /// Voxels of a plane where something may have been lost.
     bent: Vec<u32>,
     /// Where another label begins.
-    lower: LowerLabels,
+    borders: LabelBorders,
+    beside: BesideSources,
 }
 
 impl Seen {
     /// Looks again at all voxels of a part.
     pub fn look<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
-        let labelled = look.sets.filter(|sets| !sets.share_label(look.found));
-        self.measure(sources, look, look.lost_within.is_some() || labelled.is_some());
-        if let Some(farthest) = look.lost_within {
-            self.find_lost(sources, look, farthest);
+        let labels = look.labels.filter(|labels| !labels.sets.share_label(look.found));
+        self.measure(sources, look, look.lost_within.is_some() || labels.is_some());
+        if look.lost_within.is_some() {
+            self.find_lost(sources, look);
         }
-        if let Some(sets) = labelled {
-            self.break_ties(sources, look, sets);
+        if let Some(labels) = labels {
+            self.settle_labels(sources, look, labels);
         }
     }
 
-    fn find_lost<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>, farthest: f64) {
+    fn find_lost<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
         let Look { geometry, part, .. } = *look;
         self.distinct.mark(look.known, look.found);
         let [width, height, _] = part.shape().map(|n| n as usize);
-        let limit = (farthest + geometry.max_spacing()).powi(2);
+        let counts_below = look.counts_below();
         for (plane, z) in (part.lo[2]..part.hi[2]).enumerate() {
             self.bends(geometry, part, z);
             let bent = std::mem::take(&mut self.bent);
             for (n, _) in bent.iter().enumerate().filter(|(_, bent)| **bent != 0) {
                 let at = plane * width * height + n;
-                if self.squared[at] < limit {
+                if self.squared[at] < counts_below {
                     let voxel = [part.lo[0] + (n % width) as i64, part.lo[1] + (n / width) as i64, z];
                     let kept = (self.sources[at], self.squared[at]);
                     (self.sources[at], self.squared[at]) = self.nearest(sources, look, voxel, kept);
@@ -99,15 +123,33 @@ impl Seen {
         }
     }
 
-    /// Of equally near sources beside a voxel the one of the lowest label takes the place of its own.
-    fn break_ties<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>, sets: &DataSets) {
-        let Self { sources: kept, squared, lower, .. } = self;
-        lower.each(look, sets, |voxel, source| {
+    /// Looks closer where another label's source is hardly farther than a voxel's own.
+    fn settle_labels<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>, labels: Labels<'_>) {
+        let Self { sources: kept, squared, borders, beside, .. } = self;
+        let Labels { sets, trees } = labels;
+        let close = if trees.is_some() { CLOSE * look.geometry.min_spacing() } else { 0.0 };
+        let counts_below = look.counts_below();
+        borders.each(look, sets, |voxel, others| {
             let at = look.part.offset_of(voxel);
-            let beside = (sources.distance_squared(source, voxel), source);
-            if beside.0 == squared[at] && counts_before(beside, (squared[at], kept[at]), |s| sets.label(s)) {
-                kept[at] = source;
+            if squared[at] >= counts_below {
+                return;
             }
+            let to = |source| sources.distance_squared(source, voxel);
+            let limit = (squared[at].sqrt() + close).powi(2).max(squared[at]);
+            let nearly = others.iter().map(|&other| (to(other), other)).filter(|other| other.0 <= limit);
+            let own = (squared[at], kept[at]);
+            let mut best = own;
+            let mut is_close = false;
+            for other in nearly {
+                is_close = true;
+                let other = trees.map_or(other, |trees| beside.descend(trees, sets, other, to));
+                best = if counts_before(other, best, |s| sets.label(s)) { other } else { best };
+            }
+            if let Some(trees) = trees.filter(|_| is_close) {
+                let own = beside.descend(trees, sets, own, to);
+                best = if counts_before(own, best, |s| sets.label(s)) { own } else { best };
+            }
+            (squared[at], kept[at]) = best;
         });
     }
 
@@ -115,9 +157,9 @@ impl Seen {
     fn nearest<S: TrackedSource>(&self, sources: &S, look: &Look<'_>, voxel: [i64; 3], kept: (u32, f64)) -> (u32, f64) {
         let mut best = kept;
         let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(look.known);
+        let label = |source| look.labels.map_or(0, |labels| labels.sets.label(source));
         self.distinct.each(look.known, look.found, &around, |source| {
             let squared = sources.distance_squared(source, voxel);
-            let label = |source| look.sets.map_or(0, |sets| sets.label(source));
             if squared < best.1 || (squared == best.1 && label(source) < label(best.0)) {
                 best = (source, squared);
             }
@@ -258,7 +300,7 @@ mod tests {
 
     fn looked(method: &VectorDistance<'_, f32>, geometry: &Geometry, known: &Box3, found: &[u32], part: &Box3) -> Seen {
         let mut seen = Seen::default();
-        seen.look(method, &Look { geometry, part, known, found, lost_within: Some(f64::INFINITY), sets: None });
+        seen.look(method, &Look { geometry, part, known, found, lost_within: Some(f64::INFINITY), labels: None });
         seen
     }
 

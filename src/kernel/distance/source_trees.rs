@@ -70,6 +70,13 @@ impl SourceTrees {
         tree.and_then(|tree| self.trees[tree].nearest(here)).map_or(u32::MAX, |(source, _)| source)
     }
 
+    /// The sources of a source's label that are nearest to it, itself the first of them; to a triangle's centre.
+    #[must_use]
+    pub fn beside(&self, sets: &DataSets, source: u32, count: usize) -> Vec<u32> {
+        let Ok(n) = self.labels.binary_search(&sets.label(source)) else { return Vec::new() };
+        self.trees[n].nearest_few(sets.centre(source), count)
+    }
+
     /// The sources of a label that can be the nearest of them to a place in a box, and more.
     #[must_use]
     pub fn near(&self, label: u32, around: &Around) -> Vec<Candidate> {
@@ -94,6 +101,13 @@ impl Tree {
         match self {
             Self::Points(tree) => tree.nearest_neighbor(here).map(|p| (p.data, p.distance_2(&here))),
             Self::Triangles(tree) => tree.nearest_neighbor(here).map(|t| (t.data, t.distance_2(&here))),
+        }
+    }
+
+    fn nearest_few(&self, here: [f64; 3], count: usize) -> Vec<u32> {
+        match self {
+            Self::Points(tree) => tree.nearest_neighbor_iter(here).take(count).map(|p| p.data).collect(),
+            Self::Triangles(tree) => tree.nearest_neighbor_iter(here).take(count).map(|t| t.data).collect(),
         }
     }
 

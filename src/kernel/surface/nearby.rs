@@ -110,6 +110,22 @@ impl Nearby {
         ranked.reduce(|best, next| if next < best { next } else { best }).map(|(_, source)| source)
     }
 
+    /// Puts the nearest sources of their labels in the place of those that voxels near borders track, so that what is
+    /// made of these hangs on labels alone. All dense over the box that was entered.
+    pub fn settle(&self, geometry: &Geometry, shapes: &LabelledShapes<'_>, labels: &[u32], sources: &mut [u32]) {
+        let part = Box3::new(self.cells.lo, self.cells.hi.map(|v| v + 1));
+        let mut at = 0;
+        for (y, z) in part.rows() {
+            for voxel in (part.lo[0]..part.hi[0]).map(|x| [x, y, z]) {
+                let place = voxel.map(|v| v as f64);
+                if let Some(nearest) = self.nearest(shapes, labels[at], place, geometry.position(voxel)) {
+                    sources[at] = nearest;
+                }
+                at += 1;
+            }
+        }
+    }
+
     /// The place of the small block that a cell lies in.
     fn place(&self, cell: [i64; 3]) -> usize {
         let at: [i64; 3] = std::array::from_fn(|a| (cell[a] - self.cells.lo[a]) / EDGES[1]);

@@ -14,6 +14,7 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::initialise::Cube;
 use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::source_trees::SourceTrees;
 use crate::kernel::distance::winding_number::WindingTree;
 
 /// Which voxels points fix at the start.
@@ -56,6 +57,12 @@ impl DistanceSettings {
     pub fn keeps_sources(&self) -> bool {
         self.labels || self.closest_point
     }
+
+    /// Whether labels are looked at closer, for which sources are sorted.
+    pub(crate) fn looks_closer<P: Precision>(&self, sets: &DataSets) -> bool {
+        let is_tracked = self.schedule == Schedule::Front && self.method.solver::<P>().tracks_sources();
+        self.labels && sets.count() > 1 && is_tracked
+    }
 }
 
 /// What a job found.
@@ -84,7 +91,8 @@ pub fn distance<P: Precision>(
     settings: &DistanceSettings,
     store: Option<&StoreWriter>,
 ) -> Result<DistanceFound> {
-    solve_sets::<P, _>(engine, geometry, sets, settings, |mut solved, set| {
+    let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));
+    solve_sets::<P, _>(engine, geometry, sets, trees.as_ref(), settings, |mut solved, set| {
         if settings.signed {
             let values = Arc::new(Signed::new(&solved, geometry, WindingTree::new(&sets.mesh), &sets.mesh));
             solved = Solved { values, together: None, ..solved };
@@ -122,7 +130,8 @@ pub fn measure<P: Precision>(
     })
 }
 
-/// Computes the distance to `sets` on a grid, stored as `P`, and hands it on, with the bricks it was solved on.
+/// Computes the distance to `sets` on a grid, stored as `P`, and hands it on, with the bricks it was solved on. `trees`
+/// are the same sources, sorted: with them labels are looked at closer, where these are tracked.
 ///
 /// # Errors
 /// When no source touches the grid, scratch runs out or the run is interrupted, or by what it is handed to.
@@ -130,6 +139,7 @@ pub fn solve_sets<P: Precision, R>(
     engine: &Engine,
     geometry: &Geometry,
     sets: &DataSets,
+    trees: Option<&SourceTrees>,
     settings: &DistanceSettings,
     then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
 ) -> Result<R> {
@@ -146,6 +156,7 @@ pub fn solve_sets<P: Precision, R>(
         cubes: &cubes,
         mesh: triangles.as_ref().map(|bins| (&sets.mesh, bins)),
         sets: Some(sets),
+        trees,
     };
     stage.finish();
     let stage = engine.stage("distance", set.len() as u64);

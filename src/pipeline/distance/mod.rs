@@ -26,6 +26,7 @@ use std::sync::Arc;
 pub use field::{Measured, Solved, Together};
 pub use job::{DistanceFound, DistanceSettings, Init, distance, measure, solve_sets};
 pub use needs::Needs;
+pub(crate) use needs::tree_bytes;
 pub use output::{NearestLabels, write_fields, write_label_field};
 pub use ranks::solve;
 pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};

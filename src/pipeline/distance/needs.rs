@@ -28,8 +28,15 @@ const BRICK_BYTES: u64 = 96;
 const RANK_BYTES: u64 = 16;
 /// Bytes kept of each source: its position, twice, its place in a brick's list, its corners.
 const SOURCE_BYTES: u64 = 160;
+/// Bytes of a point and of a triangle in their trees.
+const TREE_BYTES: [u64; 2] = [48, 240];
 /// Seconds for a voxel on one thread.
 const VOXEL_SECONDS: f64 = 30e-9;
+
+/// Bytes that the trees of all sources take.
+pub(crate) fn tree_bytes(sets: &DataSets) -> u64 {
+    TREE_BYTES[0] * sets.positions.len() as u64 + TREE_BYTES[1] * sets.mesh.len() as u64
+}
 
 impl DistanceSettings {
     /// What these settings take on a grid, on so many threads that so many ranks share; each rank has one at least.
@@ -46,7 +53,8 @@ impl DistanceSettings {
         let cuts = ranks.saturating_sub(1) as u64;
         let of_brick = BRICK_BYTES + cuts * RANK_BYTES;
         let held = buffers + grid.len().saturating_mul(of_brick) + sets.len() as u64 * SOURCE_BYTES;
-        let held = held.saturating_add(self.heap_bytes::<P>(geometry));
+        let trees = if self.looks_closer::<P>(sets) { tree_bytes(sets) } else { 0 };
+        let held = held.saturating_add(self.heap_bytes::<P>(geometry)).saturating_add(trees);
         // On either side of a cut lie ghosts, a plane of bricks at most, of which only faces are stored.
         let plane = grid.counts()[0].unsigned_abs().saturating_mul(grid.counts()[1].unsigned_abs());
         // Along with sweeps the faces of sources are kept a second time, as they were before.

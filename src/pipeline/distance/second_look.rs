@@ -9,10 +9,10 @@ use super::field::Together;
 use super::{Options, Solved, Sources};
 use crate::error::Result;
 use crate::exec::Workers;
-use crate::grid::{Box3, DataSets, Geometry};
+use crate::grid::{Box3, Geometry};
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::precision::Precision;
-use crate::kernel::distance::second_look::{Look, MARGIN, Seen};
+use crate::kernel::distance::second_look::{Labels, Look, MARGIN, Seen};
 use crate::kernel::distance::shape_distance::ShapeDistance;
 use crate::kernel::distance::tracked::TrackedSource;
 use crate::kernel::distance::vector_distance::VectorDistance;
@@ -29,10 +29,11 @@ pub(super) fn with_second_look<'a, P: Precision>(
     options: Options,
     is_front: bool,
 ) -> Solved<'a, P> {
-    let sets = sources.sets.filter(|sets| options.sources && sets.count() > 1);
+    let sets = sources.labelled().filter(|_| options.sources);
+    let labels = sets.map(|sets| Labels { sets, trees: sources.trees.filter(|_| is_front) });
     let (geometry, positions) = (sources.geometry, sources.positions);
-    let kind = Kind { is_front, sets, farthest: options.farthest };
-    match (sources.shapes(), is_front || sets.is_some()) {
+    let kind = Kind { is_front, labels, farthest: options.farthest };
+    match (sources.shapes(), is_front || labels.is_some()) {
         (_, false) => solved,
         (Some(shapes), _) => join(solved, geometry, ShapeDistance::new(geometry, shapes), kind),
         (None, _) => join(solved, geometry, VectorDistance::<P::Fast>::new(geometry, positions), kind),
@@ -44,8 +45,7 @@ pub(super) fn with_second_look<'a, P: Precision>(
 struct Kind<'a> {
     /// Whether sources came by a front, which loses some.
     is_front: bool,
-    /// The data sets, where labels decide.
-    sets: Option<&'a DataSets>,
+    labels: Option<Labels<'a>>,
     farthest: f64,
 }
 
@@ -77,7 +77,7 @@ struct SecondLook<'a, S> {
 impl<S: TrackedSource> SecondLook<'_, S> {
     /// Looks at a box, a piece at a time so that buffers stay small, and hands on what was seen of each.
     fn see(&self, part: &Box3, mut then: impl FnMut(&Box3, &Seen)) -> Result<()> {
-        let (geometry, Kind { is_front, sets, farthest }) = (self.geometry, self.kind);
+        let (geometry, Kind { is_front, labels, farthest }) = (self.geometry, self.kind);
         let lost_within = is_front.then_some(farthest);
         self.buffers.with(|(found, seen)| {
             for piece in pieces(part) {
@@ -85,7 +85,7 @@ impl<S: TrackedSource> SecondLook<'_, S> {
                 found.resize(known.len().max(found.len()), NO_SOURCE);
                 let found = &mut found[..known.len()];
                 self.found.read_box(&known, found)?;
-                seen.look(&self.method, &Look { geometry, part: &piece, known: &known, found, lost_within, sets });
+                seen.look(&self.method, &Look { geometry, part: &piece, known: &known, found, lost_within, labels });
                 then(&piece, seen);
             }
             Ok(())

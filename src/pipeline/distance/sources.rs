@@ -2,6 +2,7 @@
 
 use crate::grid::{Box3, BrickId, DataSets, Geometry, PointBins, TriangleBins, TriangleMesh};
 use crate::kernel::distance::initialise::Cube;
+use crate::kernel::distance::source_trees::SourceTrees;
 
 /// Points, and triangles where there are any, sorted by the bricks of a grid.
 #[derive(Clone, Copy, Debug)]
@@ -19,18 +20,25 @@ pub struct Sources<'a> {
     pub mesh: Option<(&'a TriangleMesh, &'a TriangleBins)>,
     /// All of them as data sets; a cloud alone needs none.
     pub sets: Option<&'a DataSets>,
+    /// The same, sorted; where labels are asked for.
+    pub trees: Option<&'a SourceTrees>,
 }
 
 impl<'a> Sources<'a> {
     /// A cloud whose points fix the corners of their cells.
     #[must_use]
     pub fn cloud(geometry: &'a Geometry, positions: &'a [[f64; 3]], bins: &'a PointBins) -> Self {
-        Self { geometry, positions, bins, cubes: &[], mesh: None, sets: None }
+        Self { geometry, positions, bins, cubes: &[], mesh: None, sets: None, trees: None }
     }
 
     /// Points and triangles as data sets, where there are triangles.
     pub(super) fn shapes(&self) -> Option<&'a DataSets> {
         self.sets.filter(|_| self.mesh.is_some())
+    }
+
+    /// Points and triangles as data sets, where these are several.
+    pub(super) fn labelled(&self) -> Option<&'a DataSets> {
+        self.sets.filter(|sets| sets.count() > 1)
     }
 
     fn cube(&self, point: u32) -> Cube {

@@ -16,7 +16,8 @@ use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::source_trees::SourceTrees;
 use crate::kernel::surface::{Measures, Pair};
 use crate::pipeline::distance::{
-    DistanceFound, DistanceSettings, NearestLabels, Needs, measure, solve_sets, write_fields, write_label_field,
+    DistanceFound, DistanceSettings, NearestLabels, Needs, measure, solve_sets, tree_bytes, write_fields,
+    write_label_field,
 };
 use crate::store::NoMesh;
 
@@ -51,16 +52,13 @@ pub struct MiddleSettings {
     pub labels: LabelMode,
 }
 
-/// Bytes of a point, and of a triangle, in a tree.
-const TREE_BYTES: [u64; 2] = [48, 240];
-
 impl MiddleSettings {
     /// What these settings take on a grid, on so many threads that so many ranks share.
     #[must_use]
     pub fn needs<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize, ranks: usize) -> Needs {
         let distance = DistanceSettings { labels: true, ..self.distance };
         let needs = distance.needs::<P>(geometry, sets, threads, ranks);
-        let trees = TREE_BYTES[0] * sets.positions.len() as u64 + TREE_BYTES[1] * sets.mesh.len() as u64;
+        let trees = if distance.looks_closer::<P>(sets) { 0 } else { tree_bytes(sets) };
         Needs { held: needs.held + trees + held(geometry), ..needs }
     }
 }
@@ -91,8 +89,9 @@ pub fn middle<P: Precision>(
 ) -> Result<MiddleFound> {
     refuse(sets, settings.surface)?;
     let distance = DistanceSettings { labels: true, ..settings.distance };
-    solve_sets::<P, _>(engine, geometry, sets, &distance, |mut solved, set| {
-        let (shapes, trees) = (LabelledShapes::new(sets), SourceTrees::new(sets));
+    let trees = SourceTrees::new(sets);
+    solve_sets::<P, _>(engine, geometry, sets, Some(&trees), &distance, |mut solved, set| {
+        let shapes = LabelledShapes::new(sets);
         if settings.labels == LabelMode::Exact {
             let stage = engine.stage("exact labels", 0);
             stage.voxels(geometry.domain().volume());

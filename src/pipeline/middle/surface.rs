@@ -98,8 +98,9 @@ impl Worker {
         }
         match kind {
             SurfaceKind::Exact => {
-                let (sources, labels, nearby) = (&self.sources, &self.labels, &mut self.nearby);
+                let (sources, labels, nearby) = (&mut self.sources, &self.labels, &mut self.nearby);
                 nearby.enter(geometry, shapes, trees, &part, labels);
+                nearby.settle(geometry, shapes, labels, sources);
                 let known = Known { geometry, shapes, nearby, trees, part, sources, labels };
                 self.interfaces.extract(&known, &cells, &mut patch);
             }
