@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::exec::{Stage, Workers, one_wave};
-use crate::grid::{Box3, BrickSet, DataSets};
+use crate::exec::{Stage, Workers};
+use crate::grid::{Box3, BrickGrid, BrickId, BrickSet, DataSets};
 use crate::kernel::distance::extent::extent;
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::method::DistanceMethod;
@@ -39,6 +39,15 @@ pub trait Together<P>: Sync {
     fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()>;
 }
 
+/// Edge of the boxes that all voxels are looked at in: a second look reads two voxels more around each, whatever bricks
+/// it cuts.
+const LOOK_EDGE: i64 = 64;
+
+/// These boxes.
+pub(super) fn boxes_to_look_at(grid: &BrickGrid) -> BrickGrid {
+    BrickGrid::new(grid.shape(), LOOK_EDGE.max(grid.edge()))
+}
+
 /// What a field holds, for the report.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
@@ -59,11 +68,12 @@ impl<P: Precision> Solved<'_, P> {
         set: &BrickSet,
         labelled: Option<&DataSets>,
     ) -> Result<(Measured, BTreeMap<u32, u64>)> {
-        let len = set.grid().brick_len();
-        let workers = Workers::new(move || (vec![P::default(); len], Vec::new(), Vec::new()));
-        let parts = stage.run(&one_wave(set), &workers, |(values, sources, labels_of_voxels), &slot| {
-            let part = set.grid().brick_box(set.id(slot));
-            let values = &mut values[..part.len()];
+        let boxes = boxes_to_look_at(set.grid());
+        let ids: Vec<BrickId> = (0..boxes.len()).collect();
+        let workers = Workers::new(|| (Vec::new(), Vec::new(), Vec::new()));
+        let parts = stage.run(&ids, &workers, |(values, sources, labels_of_voxels), &id| {
+            let part = boxes.brick_box(id);
+            values.resize(part.len(), P::default());
             let mut counts = BTreeMap::new();
             if let Some(sets) = labelled {
                 sources.resize(part.len(), NO_SOURCE);

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::contiguous::contiguous_margin;
+use super::field::boxes_to_look_at;
 use super::output::write_fields;
 use super::sign::Signed;
 use super::{Method, Options, Schedule, Solved, Sources, solve};
@@ -117,7 +118,7 @@ pub fn measure<P: Precision>(
     solved: &Solved<'_, P>,
     set: &Arc<BrickSet>,
 ) -> Result<DistanceFound> {
-    let stage = engine.stage("measure", set.len() as u64);
+    let stage = engine.stage("measure", boxes_to_look_at(set.grid()).len());
     stage.voxels(geometry.domain().volume());
     let (measured, label_voxels) = solved.measure(&stage, set, settings.labels.then_some(sets))?;
     stage.finish();
