@@ -8,10 +8,17 @@ use std::collections::HashMap;
 use super::source_trees::SourceTrees;
 use crate::grid::DataSets;
 
-/// How many sources beside one are asked: two or three rings of a surface.
-const BESIDE: usize = 32;
-/// Sources whose neighbours are remembered; 128 bytes each and what the table takes.
-const REMEMBERED: usize = 1 << 14;
+/// How many sources beside one are asked: two rings of a surface.
+const BESIDE: usize = 16;
+/// Sources whose neighbours are remembered at most.
+const REMEMBERED: usize = 1 << 16;
+/// Bytes of one that is remembered: its list and its place in the table.
+const REMEMBERED_BYTES: u64 = 4 * BESIDE as u64 + 64;
+
+/// Bytes that a thread remembers of so many sources at most.
+pub(crate) fn remembered_bytes(sources: usize) -> u64 {
+    sources.min(REMEMBERED) as u64 * REMEMBERED_BYTES
+}
 
 /// Sources beside others, remembered.
 #[derive(Clone, Debug, Default)]

@@ -1,7 +1,7 @@
 //! Distance to point sources on one tile: where sources fix voxels, and how sweeps carry them outward.
 
 pub mod all_neighbours;
-mod beside_sources;
+pub(crate) mod beside_sources;
 mod buckets;
 pub mod culling;
 mod diagonals;

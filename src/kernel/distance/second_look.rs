@@ -160,7 +160,8 @@ impl Seen {
         let label = |source| look.labels.map_or(0, |labels| labels.sets.label(source));
         self.distinct.each(look.known, look.found, &around, |source| {
             let squared = sources.distance_squared(source, voxel);
-            if squared < best.1 || (squared == best.1 && label(source) < label(best.0)) {
+            let is_tied = squared == best.1 && source != best.0;
+            if squared < best.1 || (is_tied && label(source) < label(best.0)) {
                 best = (source, squared);
             }
         });

@@ -6,6 +6,9 @@ use crate::grid::{Box3, DataSets, FACES};
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::store::Element;
 
+/// Sources whose labels are looked up at once.
+const AT_ONCE: usize = 64;
+
 /// Writes `label` into `out` where u is at least 1/2. `u` is dense `[z][y][x]` over the box `from`, `out` over the box
 /// `to`, which holds `from`.
 pub fn paint<T: Element>(u: &[f32], from: &Box3, label: T, to: &Box3, out: &mut [T]) {
@@ -19,14 +22,21 @@ pub fn paint<T: Element>(u: &[f32], from: &Box3, label: T, to: &Box3, out: &mut 
 /// The labels of voxels by their sources, into `out`; 0 for those without one.
 pub fn of_sources(sets: &DataSets, sources: &[u32], out: &mut Vec<u32>) {
     out.clear();
-    // Neighbours mostly have one label, so it is looked up where another begins.
     let mut known = sets.run_of(NO_SOURCE);
-    out.extend(sources.iter().map(|source| {
-        if !known.0.contains(source) {
-            known = sets.run_of(*source);
+    for few in sources.chunks(AT_ONCE) {
+        // Neighbours mostly have one label: whether they do costs less than to look at each.
+        let (lo, hi) = few.iter().fold((u32::MAX, 0), |(lo, hi), &source| (lo.min(source), hi.max(source)));
+        if known.0.contains(&lo) && known.0.contains(&hi) {
+            out.resize(out.len() + few.len(), known.1);
+            continue;
         }
-        known.1
-    }));
+        out.extend(few.iter().map(|source| {
+            if !known.0.contains(source) {
+                known = sets.run_of(*source);
+            }
+            known.1
+        }));
+    }
 }
 
 /// 1 where voxels have a label, else 0.
