@@ -2,7 +2,8 @@
 //! distances (`kernel::distance::trace`), for `sweep` what `sweep_sources` left pending.
 //!
 //! Bricks in which something may be found come first, then those beside bricks in which something was, as long as any
-//! is missing there. Bricks with a face, edge or corner in common never run at the same time, so what a round does not
+//! is missing there: of these the nearest to the sources, since chains come from there and the others would wait for
+//! them. Bricks with a face, edge or corner in common never run at the same time, so what a round does not
 //! depend on threads; what is found does not even depend on the rounds.
 
 use crate::error::Result;
@@ -38,6 +39,7 @@ pub(super) fn trace_sources<P: Precision, R: Parents>(
     };
     let complete = (0..set.len() as Slot).map(|slot| distances.unwritten(slot).is_some()).collect();
     let mut rounds = Rounds::new(states, &exchange, complete);
+    rounds.order(middles(distances)?, edge as f64 * geometry.max_spacing());
     rounds.begin(start, true);
     rounds.run(stage, &workers, |(distance, state, tracer), slot| {
         gather(distance, state, slot);
@@ -72,12 +74,36 @@ pub(super) struct Rounds<'a> {
     untold: Vec<bool>,
     /// Bricks in which nothing is missing.
     complete: Vec<bool>,
+    /// How far from the sources bricks are, and by how much they may be farther than the nearest that is due.
+    far: Vec<f64>,
+    window: f64,
+}
+
+/// The distance in the middle of each brick of this rank; 0 for others.
+fn middles<P: Precision>(distances: &BrickArray<P>) -> Result<Vec<f64>> {
+    let set = distances.set();
+    let mut middles = vec![0.0; set.len()];
+    for slot in set.owned() {
+        let part = set.grid().brick_box(set.id(slot));
+        let lo = std::array::from_fn(|a| i64::midpoint(part.lo[a], part.hi[a]));
+        let mut middle = [P::default()];
+        distances.read_box(&Box3::new(lo, lo.map(|v| v + 1)), &mut middle)?;
+        // No brick waits for ever.
+        middles[slot as usize] = middle[0].to_f64().abs().min(f64::MAX);
+    }
+    Ok(middles)
 }
 
 impl<'a> Rounds<'a> {
     pub(super) fn new(states: &'a BrickArray<u32>, exchange: &'a Exchange<'a>, complete: Vec<bool>) -> Self {
         let bricks = complete.len();
-        Self { states, exchange, due: vec![f64::INFINITY; bricks], untold: vec![false; bricks], complete }
+        let (due, untold) = (vec![f64::INFINITY; bricks], vec![false; bricks]);
+        Self { states, exchange, due, untold, complete, far: vec![0.0; bricks], window: 0.0 }
+    }
+
+    /// Visits bricks in about the order of how `far` they are, those within a `window` together.
+    fn order(&mut self, far: Vec<f64>, window: f64) {
+        (self.far, self.window) = (far, window);
     }
 
     /// Makes bricks due; with `untold` also those beside them, afterwards, whether anything is found in them or not.
@@ -96,9 +122,18 @@ impl<'a> Rounds<'a> {
     ) -> Result<()> {
         let set = self.states.set().clone();
         let colour = |slot: Slot| set.grid().coords(set.id(slot)).iter().fold(0, |colour, at| colour << 1 | (at & 1));
-        while stage.comm().any(self.due.contains(&0.0))? {
+        loop {
+            let due = set.owned().filter(|&slot| self.due[slot as usize] == 0.0);
+            let nearest = due.fold(f64::INFINITY, |least, slot| least.min(self.far[slot as usize]));
+            let nearest = stage.comm().least(nearest)?;
+            if nearest == f64::INFINITY {
+                return Ok(());
+            }
             for turn in 0..8 {
-                let is_due = |slot: &Slot| self.due[*slot as usize] == 0.0 && colour(*slot) == turn;
+                let is_due = |slot: &Slot| {
+                    let at = *slot as usize;
+                    self.due[at] == 0.0 && self.far[at] <= nearest + self.window && colour(*slot) == turn
+                };
                 let wave: Vec<Slot> = set.owned().filter(is_due).collect();
                 let visited = stage.run(&wave, workers, |work, &slot| Ok(visit(work, slot)))?;
                 for (&slot, (found, left)) in wave.iter().zip(visited) {
@@ -116,7 +151,6 @@ impl<'a> Rounds<'a> {
                 }
             }
         }
-        Ok(())
     }
 }
 
