@@ -309,6 +309,43 @@ fn exact_labels_have_no_error() {
     assert!(changed > 0, "no label was wrong");
 }
 
+/// Dense points, whose cells are thin needles where labels meet (a corner of Experiment 5): the front's labels are looked
+/// up closer and have none wrong, the textbook's sweeps have some.
+#[test]
+fn tracked_labels_of_dense_points_have_no_error() {
+    let geometry = Geometry { shape: [51, 51, 41], spacing: [0.05; 3], origin: [2.5, 2.5, -1.0], unit: None };
+    let wave = |lift: f64| -> Vec<[f64; 3]> {
+        let at = |n: i32| 2.5 + 0.05 * f64::from(n);
+        let point = |n: i32| [at(n % 51), at(n / 51), 0.2 * (at(n % 51) * at(n / 51)).cos() + lift];
+        (0..51 * 51).map(point).collect()
+    };
+    let clouds = [wave(0.5), wave(-0.5)];
+    let mut sets = DataSets::default();
+    for cloud in &clouds {
+        sets.add_cloud(cloud);
+    }
+    // Elsewhere one wave is nearer by far.
+    let is_between = |[x, y, z]: [f64; 3]| (z - 0.2 * (x * y).cos()).abs() < 0.16;
+    let voxels = PlainGrid { shape: geometry.shape }.voxels().enumerate();
+    let places = voxels.map(|(n, voxel)| (n, position(&geometry, voxel))).filter(|(_, here)| is_between(*here));
+    let nearest = |cloud: &Vec<[f64; 3]>, here| cloud.iter().map(|p| squared(here, *p)).fold(f64::MAX, f64::min);
+    let wanted: Vec<(usize, [f64; 2])> =
+        places.map(|(n, here)| (n, [0, 1].map(|c| nearest(&clouds[c], here)))).collect();
+    let wrong = BOTH_SCHEDULES.map(|schedule| {
+        let settings = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Tracked, 32);
+        let distance = DistanceSettings { schedule, ..settings.distance };
+        let [_, labels, _] = fields_of(&geometry, &sets, &MiddleSettings { distance, ..settings });
+        // Where rounding decides both labels are right.
+        let is_wrong = |&&(n, to): &&(usize, [f64; 2])| {
+            let [own, other] = if labels[n] == 1.0 { to } else { [to[1], to[0]] };
+            own.sqrt() > other.sqrt() + 1e-9
+        };
+        wanted.iter().filter(is_wrong).count()
+    });
+    println!("{wrong:?} of {} wrong, front and sweeps", wanted.len());
+    assert!(wrong[0] == 0 && wrong[1] > 0, "{wrong:?}");
+}
+
 /// The squared distance to the faces of a cuboid.
 fn squared_to_cuboid(here: [f64; 3], lo: [f64; 3], hi: [f64; 3]) -> f64 {
     let inside = (0..3).map(|a| (here[a] - lo[a]).min(hi[a] - here[a])).fold(f64::MAX, f64::min);

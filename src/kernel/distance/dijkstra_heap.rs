@@ -2,9 +2,10 @@
 //! sections 3 and 9).
 //!
 //! One heap: the smallest voxel takes the nearest of the sources of its frozen neighbours, of equally near ones that
-//! of the lower label where triangles are among them, then the first of -x, +x, -y, +y, -z, +z (of 26: z slowest), and is frozen at the exact distance d to it. To neighbours that
-//! are not frozen it offers d and the way to them: an upper bound, by which the heap is ordered. Fixed voxels are on
-//! trial from the beginning. In and out: dense `[z][y][x]` states, the top bit set on fixed voxels. All in f64.
+//! of the lower label where triangles are among them, then the first of -x, +x, -y, +y, -z, +z (of 26: z slowest), and
+//! is frozen at the exact distance d to it. To neighbours that are not frozen it offers d and the way to them: an upper
+//! bound, by which the heap is ordered. Fixed voxels are on trial from the beginning. In and out: dense `[z][y][x]`
+//! states, the top bit set on fixed voxels. All in f64.
 //!
 //! A voxel is never looked at again, so it may miss a source that a neighbour frozen later has: the front of bricks
 //! (`dijkstra_pythagoras`) finds that one.
