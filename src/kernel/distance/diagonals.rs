@@ -5,6 +5,8 @@
 //! `[z][x + y][y]` each of the six is a contiguous run. Sweeps with opposite directions want y turned round.
 //! Any order that keeps "upwind neighbours first" gives the bits of the triple loop (algorithms: section 3).
 
+use std::ops::Range;
+
 use crate::tile::HaloTile;
 
 /// Voxels taken at a time at most.
@@ -88,22 +90,25 @@ impl Diagonals {
                 let from = &tile.data()[from..][..nx + 2];
                 let out = &mut out[self.at([0, y, z])..][..(nx + 1) * step + 1];
                 let beyond = y == 0 || z == 0 || y > ny || z > nz;
-                for (x, &voxel) in from.iter().enumerate() {
-                    out[x * step] = value(voxel, beyond || x == 0 || x > nx);
+                out[0] = value(from[0], true);
+                for (out, &voxel) in out.iter_mut().step_by(step).zip(from).skip(1).take(nx) {
+                    *out = value(voxel, beyond);
                 }
+                out[(nx + 1) * step] = value(from[nx + 1], true);
             }
         }
     }
 
-    /// Calls `f` with the place of every voxel and ghost.
-    pub(crate) fn each_voxel(&self, mut f: impl FnMut(usize)) {
-        let [nx, ny, nz] = self.valid;
-        for z in 0..nz + 2 {
-            for s in 0..nx + ny + 3 {
+    /// The places of all voxels and ghosts, a diagonal at a time.
+    pub(crate) fn whole_diagonals(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let Self { valid: [nx, ny, nz], row, plane, .. } = *self;
+        (0..nz + 2).flat_map(move |z| {
+            (0..nx + ny + 3).map(move |s| {
                 let (first, last) = (s.saturating_sub(nx + 1), s.min(ny + 1));
-                (first..=last).for_each(|y| f(z * self.plane + s * self.row + y));
-            }
-        }
+                let start = z * plane + s * row;
+                start + first..start + last + 1
+            })
+        })
     }
 
     /// Copies the voxels in use back into `tile`.
@@ -115,7 +120,9 @@ impl Diagonals {
                 let to = tile.at(0, y as isize - 1, z as isize - 1);
                 let from = &from[self.at([1, y, z])..][..(nx - 1) * step + 1];
                 let to = &mut tile.data_mut()[to..][..nx];
-                to.iter_mut().enumerate().for_each(|(x, to)| *to = value(from[x * step]));
+                for (to, &from) in to.iter_mut().zip(from.iter().step_by(step)) {
+                    *to = value(from);
+                }
             }
         }
     }

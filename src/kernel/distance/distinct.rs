@@ -32,12 +32,13 @@ impl Distinct {
         }
     }
 
-    /// Calls `tell` with each source in a box of at most [`WIDEST`] voxels along x, once or, where it is in several
-    /// pieces, more often; each first time in the order of their first voxels, z slowest.
-    #[inline(always)]
-    pub(crate) fn each(&self, known: &Box3, sources: &[u32], part: &Box3, mut tell: impl FnMut(u32)) {
+    /// Lists each source in a box of at most [`WIDEST`] voxels along x, once or, where it is in several pieces, more
+    /// often; in the order of their first voxels, z slowest.
+    pub(crate) fn list(&self, known: &Box3, sources: &[u32], part: &Box3, list: &mut Vec<u32>) {
         let width = part.shape()[0] as usize;
-        let all = LOWEST_BITS >> (8 * (WIDEST - width));
+        list.clear();
+        list.resize(part.len(), NO_SOURCE);
+        let mut count = 0;
         for z in part.lo[2]..part.hi[2] {
             let first_plane = if z == part.lo[2] { 4 * LOWEST_BITS } else { 0 };
             for y in part.lo[1]..part.hi[1] {
@@ -45,16 +46,16 @@ impl Distinct {
                 let first_row = if y == part.lo[1] { 2 * LOWEST_BITS } else { 0 };
                 let Some(bytes) = self.differs[row..].first_chunk::<WIDEST>() else { return };
                 let word = u64::from_le_bytes(*bytes) | 1 | first_row | first_plane;
-                let mut firsts = word & word >> 1 & word >> 2 & all;
-                while firsts != 0 {
-                    let source = sources[row + firsts.trailing_zeros() as usize / 8];
-                    firsts &= firsts - 1;
-                    if source != NO_SOURCE {
-                        tell(source);
-                    }
+                let mut firsts = word & word >> 1 & word >> 2;
+                // Each is written, and the next over it unless it counts: which do is no pattern to branch on.
+                for &source in &sources[row..][..width] {
+                    list[count] = source;
+                    count += (firsts & 1) as usize & usize::from(source != NO_SOURCE);
+                    firsts >>= 8;
                 }
             }
         }
+        list.truncate(count);
     }
 }
 
@@ -79,7 +80,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn each_source_is_told_in_order(
+        fn each_source_is_listed_in_order(
             shape in prop::array::uniform3(1_i64..9),
             seed in any::<u64>(),
             kinds in 1_u64..6,
@@ -93,7 +94,7 @@ mod tests {
             let lo: [i64; 3] = std::array::from_fn(|a| known.lo[a] + (corners[a].0 * shape[a] as f64) as i64);
             let hi = std::array::from_fn(|a| lo[a] + 1 + (corners[a].1 * (known.hi[a] - lo[a]) as f64) as i64);
             let part = Box3::new(lo, hi).intersect(&known);
-            let (mut wanted, mut told) = (Vec::new(), Vec::new());
+            let (mut wanted, mut listed) = (Vec::new(), Vec::new());
             for (y, z) in part.rows() {
                 for x in part.lo[0]..part.hi[0] {
                     let source = sources[known.offset_of([x, y, z])];
@@ -104,11 +105,13 @@ mod tests {
             }
             let mut distinct = Distinct::default();
             distinct.mark(&known, &sources);
-            distinct.each(&known, &sources, &part, |source| {
+            distinct.list(&known, &sources, &part, &mut listed);
+            let mut told = Vec::new();
+            for source in listed {
                 if !told.contains(&source) {
                     told.push(source);
                 }
-            });
+            }
             prop_assert_eq!(told, wanted);
         }
     }

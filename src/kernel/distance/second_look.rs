@@ -83,6 +83,8 @@ pub struct Seen {
     grown: Vec<f32>,
     /// Where sources differ.
     distinct: Distinct,
+    /// Those around a voxel.
+    around: Vec<u32>,
     /// Voxels of a plane where something may have been lost.
     bent: Vec<u32>,
     /// Where another label begins.
@@ -154,17 +156,24 @@ impl Seen {
     }
 
     /// The nearest of the sources around a voxel, which has the one that is `kept`, and its squared distance.
-    fn nearest<S: TrackedSource>(&self, sources: &S, look: &Look<'_>, voxel: [i64; 3], kept: (u32, f64)) -> (u32, f64) {
+    fn nearest<S: TrackedSource>(
+        &mut self,
+        sources: &S,
+        look: &Look<'_>,
+        voxel: [i64; 3],
+        kept: (u32, f64),
+    ) -> (u32, f64) {
         let mut best = kept;
         let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(look.known);
         let label = |source| look.labels.map_or(0, |labels| labels.sets.label(source));
-        self.distinct.each(look.known, look.found, &around, |source| {
+        self.distinct.list(look.known, look.found, &around, &mut self.around);
+        for &source in &self.around {
             let squared = sources.distance_squared(source, voxel);
             let is_tied = squared == best.1 && source != best.0;
             if squared < best.1 || (is_tied && label(source) < label(best.0)) {
                 best = (source, squared);
             }
-        });
+        }
         best
     }
 

@@ -286,7 +286,12 @@ impl<A: Real> VectorDistance<'_, A> {
         work.layout = Diagonals { valid, turned: upward[0] != upward[1], ..work.layout };
         work.layout.load(tile, &mut work.source, |state, ghost| if ghost { state | FIXED } else { state });
         let Work { layout, source, point: [px, py, pz], at, .. } = work;
-        layout.each_voxel(|place| [px[place], py[place], pz[place]] = self.point(source[place]));
+        for run in layout.whole_diagonals() {
+            let (px, py, pz) = (&mut px[run.clone()], &mut py[run.clone()], &mut pz[run.clone()]);
+            for (((x, y), z), &state) in px.iter_mut().zip(py).zip(pz).zip(&source[run]) {
+                [*x, *y, *z] = self.point(state);
+            }
+        }
         let last = tile.edge() + 1;
         for n in 0..=last {
             let index = |axis: usize, n: usize| self.coordinate(axis, part.lo[axis] + n as i64 - 1);
