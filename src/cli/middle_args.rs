@@ -25,7 +25,7 @@ pub(super) struct SurfaceArgs {
     #[arg(long, value_enum, default_value_t = SurfaceArg::Exact)]
     pub(super) surface: SurfaceArg,
     /// Labels: those of the sources that the method tracks, or of the nearest sources without an exception. Of equal
-    /// distances the lower label, but with fsm and fmm for tracked ones
+    /// distances the lower label
     #[arg(long, value_enum, default_value_t = LabelsArg::Tracked)]
     pub(super) labels: LabelsArg,
     /// Write the surface once more, in a file of its own, in the format of its name

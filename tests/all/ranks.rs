@@ -92,7 +92,7 @@ impl Case {
     }
 
     fn options(&self) -> Options {
-        Options { farthest: self.farthest, neighbours: self.neighbours, sources: true }
+        Options { farthest: self.farthest, neighbours: self.neighbours, sources: true, labels: false }
     }
 
     fn on<P: Precision>(&self, ranks: usize, threads: usize, method: Method, schedule: Schedule) -> Field<P> {

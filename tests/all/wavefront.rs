@@ -137,7 +137,7 @@ fn ours<P: Precision>(
     let cubes = [(cloud.len() as u32, cube)];
     let sources = Sources { cubes: &cubes, ..Sources::cloud(geometry, cloud, &bins) };
     let stage = lab.engine.stage("distance", 0);
-    let options = Options { farthest: f64::INFINITY, neighbours, sources: true };
+    let options = Options { farthest: f64::INFINITY, neighbours, sources: true, labels: false };
     let solve = method.solver::<P>().solve;
     let solved = solve(&stage, &lab.engine, &sources, &set, schedule, options).expect("room for a distance");
     let part = Box3::from_shape(geometry.shape);
@@ -332,7 +332,7 @@ fn a_box_of_triangles_has_its_distance() {
             ..Sources::cloud(&geometry, &[], &bins)
         };
         let stage = lab.engine.stage("distance", 0);
-        let options = Options { farthest: f64::INFINITY, neighbours, sources: true };
+        let options = Options { farthest: f64::INFINITY, neighbours, sources: true, labels: false };
         let solve = Method::DP.solver::<f32>().solve;
         let solved = solve(&stage, &lab.engine, &sources, &set, schedule, options).expect("room for a distance");
         let part = Box3::from_shape(geometry.shape);

@@ -47,7 +47,7 @@ pub(crate) struct Field<P> {
 
 /// As far as the grid goes, by face neighbours.
 pub(crate) fn everywhere(sources: bool) -> Options {
-    Options { farthest: f64::INFINITY, neighbours: Neighbours::Faces, sources }
+    Options { farthest: f64::INFINITY, neighbours: Neighbours::Faces, sources, labels: false }
 }
 
 /// Solves on bricks of an edge over the whole domain.

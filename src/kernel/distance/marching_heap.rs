@@ -3,7 +3,8 @@
 //!
 //! One heap: the smallest voxel is frozen and its six neighbours are updated from frozen ones by the upwind solution.
 //! Fixed voxels are on trial from the beginning. With sources, a voxel that freezes takes that of the frozen one of its
-//! 26 neighbours with the smallest sum of its distance and the way to it; of equal sums the first, z slowest. In and
+//! 26 neighbours with the smallest sum of its distance and the way to it; of equal sums the one of the lowest label, where
+//! labels are wanted, else the first, z slowest. In and
 //! out: dense `[z][y][x]` arrays, distances in physical units, the sign bit set on fixed voxels. Computed in f64,
 //! rounded to `P` at every update. `fast_marching`, in a front of bricks, computes f32 fields in f32 and takes what a
 //! voxel's neighbours end with: the two differ by rounding alone.
@@ -13,7 +14,7 @@ use super::precision::{Precision, Real};
 use super::tracked::source_of;
 use super::upwind::{Axes, godunov};
 use super::wavefront::Wavefront;
-use crate::grid::{FACES, Geometry, NEIGHBOURS_26};
+use crate::grid::{DataSets, FACES, Geometry, NEIGHBOURS_26};
 
 /// Bytes of a voxel beside its distance and source: whether it is frozen, and its entries in the heap.
 pub const SCRATCH_BYTES: u64 = 25;
@@ -26,20 +27,28 @@ pub struct MarchingHeap<'a, P> {
     values: &'a mut [P],
     /// States of voxels: the source, the top bit set on fixed ones.
     sources: Option<&'a mut [u32]>,
+    /// What tells which label is lower.
+    sets: Option<&'a DataSets>,
     /// Lengths of the 26 steps.
     steps: [f64; 26],
 }
 
 impl<'a, P: Precision> MarchingHeap<'a, P> {
-    /// Ready to start from the fixed voxels among `values`; everything else is infinite.
+    /// Ready to start from the fixed voxels among `values`; everything else is infinite. With the data sets, where
+    /// their labels are wanted.
     #[must_use]
-    pub fn new(geometry: &Geometry, values: &'a mut [P], sources: Option<&'a mut [u32]>) -> Self {
+    pub fn new(
+        geometry: &Geometry,
+        values: &'a mut [P],
+        sources: Option<&'a mut [u32]>,
+        sets: Option<&'a DataSets>,
+    ) -> Self {
         let mut front = Wavefront::new(geometry.shape);
         for (place, value) in values.iter().map(|value| value.lane()).enumerate().filter(|(_, v)| v.is_marked()) {
             front.push(place, value.f64());
         }
         let steps = NEIGHBOURS_26.map(|offset| geometry.length(offset));
-        Self { front, axes: Axes::new(geometry.spacing), values, sources, steps }
+        Self { front, axes: Axes::new(geometry.spacing), values, sources, sets, steps }
     }
 
     /// Freezes up to `count` voxels; false when all that can be reached are frozen.
@@ -89,8 +98,11 @@ impl<'a, P: Precision> MarchingHeap<'a, P> {
         for (offset, step) in NEIGHBOURS_26.iter().zip(self.steps) {
             let beside = self.front.beside(voxel, *offset);
             let way = self.frozen(beside) + step;
-            if let Some(beside) = beside.filter(|_| way < best.0) {
-                best = (way, source_of(sources[beside]));
+            let Some(beside) = beside.filter(|_| way <= best.0 && way < f64::INFINITY) else { continue };
+            let source = source_of(sources[beside]);
+            let is_lower = || self.sets.is_some_and(|sets| sets.label(source) < sets.label(best.1));
+            if way < best.0 || is_lower() {
+                best = (way, source);
             }
         }
         if let Some(sources) = &mut self.sources {

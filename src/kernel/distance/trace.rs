@@ -3,18 +3,20 @@
 //!
 //! Here chains are followed inside a tile, to voxels and ghosts whose source is known. In: grown tiles of distances
 //! (sign bit on fixed voxels) and of source states. Out: the states. Halo 1, all 26 directions. Scratch: a few bytes a
-//! voxel. What is found does not depend on the order in which tiles come.
+//! voxel. What is found does not depend on the order in which tiles come. Where data sets have labels, a voxel with
+//! several parents that are as good waits for the sources of all, and takes that of the lowest label; of equal ones the
+//! first.
 //!
 //! Where distances are so large that a step is lost in rounding, neighbours are equal, and a voxel may have no parent.
 //! Such voxels, and those whose chains lead to them, are *filled* in the end: among the sources that reach one through
 //! such voxels, on a way on which distances never fall, it gets the lowest.
 
 use super::initialise::NO_SOURCE;
-use super::parents::Parents;
+use super::parents::{Parent, Parents};
 use super::precision::{Precision, Real};
 use super::tracked::{has_source, source_of};
 use super::vector_distance::FIXED;
-use crate::grid::Geometry;
+use crate::grid::{DataSets, Geometry};
 use crate::tile::HaloTile;
 
 /// Finds sources in tiles of one size.
@@ -25,20 +27,27 @@ pub struct Tracer<R> {
     rows: Vec<usize>,
     /// Whether a voxel's chain was followed in this tile, or ends there.
     followed: Vec<bool>,
-    chain: Vec<usize>,
+    /// Places on the way, and whether each has several parents.
+    chain: Vec<(usize, bool)>,
+    equals: Vec<usize>,
 }
 
 impl<R: Parents> Tracer<R> {
     /// For tiles of `edge`^3 voxels of a grid.
     #[must_use]
     pub fn new(geometry: &Geometry, edge: usize) -> Self {
-        let followed = vec![true; (edge + 2).pow(3)];
-        Self { parents: R::new(geometry, edge), rows: Vec::new(), followed, chain: Vec::new() }
+        let (followed, parents) = (vec![true; (edge + 2).pow(3)], R::new(geometry, edge));
+        Self { parents, rows: Vec::new(), followed, chain: Vec::new(), equals: Vec::new() }
     }
 
     /// Gives voxels their sources where the chain ends at a known one. Returns whether any got one, and whether any
-    /// that has a distance is left without.
-    pub fn trace<P: Precision>(&mut self, distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> (bool, bool) {
+    /// that has a distance is left without. With the data sets, where their labels are wanted.
+    pub fn trace<P: Precision>(
+        &mut self,
+        labelled: Option<&DataSets>,
+        distance: &HaloTile<P>,
+        state: &mut HaloTile<u32>,
+    ) -> (bool, bool) {
         let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
         let rows = (1..=nz).flat_map(|z| (1..=ny).map(move |y| (z * pitch + y) * pitch + 1));
         self.rows.clear();
@@ -52,7 +61,7 @@ impl<R: Parents> Tracer<R> {
             let row = self.rows[n];
             for place in row..row + nx {
                 if !has_source(state.data()[place]) && distance.data()[place].lane() < P::Lane::INFINITY {
-                    let known = self.follow(distance.data(), state.data_mut(), place);
+                    let known = self.follow(labelled, distance.data(), state.data_mut(), place);
                     found |= known;
                     left |= !known;
                 }
@@ -66,30 +75,74 @@ impl<R: Parents> Tracer<R> {
     }
 
     /// Follows the chain from a voxel; all voxels on it get the source at its end, if that is known.
-    fn follow<P: Precision>(&mut self, distance: &[P], state: &mut [u32], from: usize) -> bool {
+    fn follow<P: Precision>(
+        &mut self,
+        labelled: Option<&DataSets>,
+        distance: &[P],
+        state: &mut [u32],
+        from: usize,
+    ) -> bool {
         if self.followed[from] {
             return false;
         }
-        let mut next = self.parents.parent(distance, from);
-        if let Some(parent) = next.filter(|&parent| has_source(state[parent])) {
-            state[from] = source_of(state[parent]);
+        let parent = |tracer: &Self, at: usize| {
+            let parent = tracer.parents.parent(distance, at);
+            parent.map(|parent| Parent { is_tied: parent.is_tied && labelled.is_some(), ..parent })
+        };
+        let first = parent(self, from);
+        if let Some(parent) = first.filter(|parent| !parent.is_tied && has_source(state[parent.place])) {
+            state[from] = source_of(state[parent.place]);
             return true;
         }
         self.chain.clear();
-        self.chain.push(from);
-        self.followed[from] = true;
-        let mut source = NO_SOURCE;
-        while let Some(at) = next {
-            source = source_of(state[at]);
-            if source != NO_SOURCE || self.followed[at] {
-                break;
+        let mut next = self.enter(from, first);
+        loop {
+            let mut source = NO_SOURCE;
+            while let Some(at) = next {
+                source = source_of(state[at]);
+                if source != NO_SOURCE || self.followed[at] {
+                    break;
+                }
+                next = self.enter(at, parent(self, at));
             }
-            self.followed[at] = true;
-            self.chain.push(at);
-            next = self.parents.parent(distance, at);
+            next = self.leave(labelled, distance, state, source);
+            if next.is_none() {
+                return has_source(state[from]);
+            }
         }
-        self.chain.iter().for_each(|&place| state[place] = source);
-        source != NO_SOURCE
+    }
+
+    /// Takes a voxel into the chain; where that goes on.
+    fn enter(&mut self, at: usize, parent: Option<Parent>) -> Option<usize> {
+        self.followed[at] = true;
+        self.chain.push((at, parent.is_some_and(|parent| parent.is_tied)));
+        parent.map(|parent| parent.place)
+    }
+
+    /// Gives the voxels of the chain, from its end on, a source; up to one with several parents of which another is to
+    /// be followed first.
+    fn leave<P: Precision>(
+        &mut self,
+        labelled: Option<&DataSets>,
+        distance: &[P],
+        state: &mut [u32],
+        mut source: u32,
+    ) -> Option<usize> {
+        while let Some((at, is_tied)) = self.chain.pop() {
+            if let Some(sets) = labelled.filter(|_| is_tied) {
+                self.parents.equals(distance, at, &mut self.equals);
+                let is_unknown = |place: &&usize| !has_source(state[**place]);
+                if let Some(&other) = self.equals.iter().find(|place| is_unknown(place) && !self.followed[**place]) {
+                    self.chain.push((at, true));
+                    return Some(other);
+                }
+                let all = self.equals.iter().map(|&place| source_of(state[place]));
+                let is_known = !self.equals.iter().any(|place| is_unknown(&place));
+                source = all.filter(|_| is_known).min_by_key(|&source| sets.label(source)).unwrap_or(NO_SOURCE);
+            }
+            state[at] = source;
+        }
+        None
     }
 }
 

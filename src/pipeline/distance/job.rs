@@ -166,6 +166,7 @@ pub fn solve_sets<P: Precision, R>(
         farthest: settings.farthest.unwrap_or(f64::INFINITY),
         neighbours: settings.neighbours,
         sources: settings.keeps_sources(),
+        labels: settings.labels,
     };
     let solved = solve::<P>(&stage, &sources, &set, settings.method, settings.schedule, options)?;
     stage.finish();

@@ -59,13 +59,15 @@ pub struct Options {
     pub neighbours: Neighbours,
     /// Sources too, with methods that can do without.
     pub sources: bool,
+    /// Sources stand for the labels of their data sets: of equally near ones those of the lowest label count.
+    pub labels: bool,
 }
 
 impl Options {
     /// Distances up to that one, no more.
     #[must_use]
     pub fn up_to(farthest: f64) -> Self {
-        Self { farthest, neighbours: Neighbours::Faces, sources: false }
+        Self { farthest, neighbours: Neighbours::Faces, sources: false, labels: false }
     }
 }
 

@@ -8,12 +8,12 @@ use super::front::advance_front;
 use super::initialise::{Seeded, Start, initialise};
 use super::sweep::{Alone, sweep_all};
 use super::sweep_sources::TrackedSweeps;
-use super::textbook::{heap_dijkstra, heap_marching};
+use super::textbook::{Wanted, heap_dijkstra, heap_marching};
 use super::trace::{SourceField, trace_sources};
 use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
-use crate::grid::{BrickGrid, BrickSet};
+use crate::grid::{BrickGrid, BrickSet, DataSets};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::all_neighbours::AllNeighbours;
 use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
@@ -306,6 +306,12 @@ impl<'a> Job<'_, 'a> {
             return self.sweeps(method, iterations);
         }
         let (state, sources, seeded) = self.start_apart::<FastSweeping<P, f64>>()?;
+        if self.labelled().is_some() {
+            // An update that lowers nothing is none, so sweeps do not see that another label is as near.
+            sweep_all(self.stage, &method, &state, &mut Alone(self.set), &seeded.bricks, iterations)?;
+            self.trace::<P, UpwindSum>(&state, &sources, &seeded)?;
+            return Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) });
+        }
         let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &seeded.bricks)?;
         sweep_all(self.stage, &method, &state, &mut tracked, &seeded.bricks, iterations)?;
         drop(tracked);
@@ -323,8 +329,23 @@ impl<'a> Job<'_, 'a> {
         let (state, sources, seeded) = self.start_apart::<M>()?;
         let geometry = self.sources.geometry;
         advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, self.options.farthest)?;
-        trace_sources::<P, R>(self.stage, geometry, &state, &sources, &seeded.bricks)?;
+        self.trace::<P, R>(&state, &sources, &seeded)?;
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
+    }
+
+    /// The data sets, where labels are wanted and these are several.
+    fn labelled(&self) -> Option<&'a DataSets> {
+        self.sources.labelled().filter(|_| self.options.labels)
+    }
+
+    fn trace<P: Precision, R: Parents>(
+        &self,
+        state: &BrickArray<P>,
+        sources: &BrickArray<u32>,
+        seeded: &Seeded,
+    ) -> Result<()> {
+        let (geometry, labelled) = (self.sources.geometry, self.labelled());
+        trace_sources::<P, R>(self.stage, geometry, labelled, state, sources, &seeded.bricks)
     }
 
     fn front_vector<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
@@ -351,7 +372,8 @@ impl<'a> Job<'_, 'a> {
     ) -> Result<Solved<'a, P>> {
         let (sources, seeded) = self.start::<S>(Start::Fixed)?;
         let state = BrickArray::new(self.engine.scratch(), self.set)?;
-        heap_marching(self.engine, self.sources.geometry, start, self.options.sources, &state, &sources)?;
+        let wanted = Wanted { sources: self.options.sources, labelled: self.labelled() };
+        heap_marching(self.engine, self.sources.geometry, start, wanted, &state, &sources)?;
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 

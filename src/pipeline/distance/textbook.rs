@@ -4,7 +4,7 @@
 
 use crate::error::Result;
 use crate::exec::Engine;
-use crate::grid::Geometry;
+use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::dijkstra_heap::DijkstraHeap;
 use crate::kernel::distance::initialise::NO_SOURCE;
@@ -38,12 +38,20 @@ pub(super) fn heap_dijkstra<S: TrackedSource<Number = f64>>(
     states.write_box(&domain, &dense)
 }
 
-/// Marches from the fixed voxels among `states` into `distances`; where `sources` are wanted, `states` get them.
+/// What of sources is wanted beside distances.
+#[derive(Clone, Copy)]
+pub(super) struct Wanted<'a> {
+    pub(super) sources: bool,
+    /// The data sets whose labels they stand for.
+    pub(super) labelled: Option<&'a DataSets>,
+}
+
+/// Marches from the fixed voxels among `states` into `distances`; where sources are `wanted`, `states` get them.
 pub(super) fn heap_marching<P: Precision, S: TrackedSource>(
     engine: &Engine,
     geometry: &Geometry,
     start: &S,
-    sources: bool,
+    wanted: Wanted<'_>,
     distances: &BrickArray<P>,
     states: &BrickArray<u32>,
 ) -> Result<()> {
@@ -63,12 +71,13 @@ pub(super) fn heap_marching<P: Precision, S: TrackedSource>(
             }
         }
     }
-    let mut heap = MarchingHeap::new(geometry, &mut values, sources.then_some(&mut dense));
+    let sources = wanted.sources.then_some(dense.as_mut_slice());
+    let mut heap = MarchingHeap::new(geometry, &mut values, sources, wanted.labelled);
     while heap.advance(STRIDE) {
         engine.check()?;
     }
     drop(heap);
-    if sources {
+    if wanted.sources {
         states.write_box(&domain, &dense)?;
     }
     distances.write_box(&domain, &values)

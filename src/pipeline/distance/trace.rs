@@ -8,7 +8,7 @@
 
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
-use crate::grid::{Box3, Geometry, NEIGHBOURS_26, Slot};
+use crate::grid::{Box3, DataSets, Geometry, NEIGHBOURS_26, Slot};
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::parents::Parents;
 use crate::kernel::distance::precision::Precision;
@@ -17,10 +17,12 @@ use crate::kernel::distance::vector_distance::FIXED;
 use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
 
-/// Carries sources from the fixed voxels on the bricks in `start` along finished distances.
+/// Carries sources from the fixed voxels on the bricks in `start` along finished distances; of equally good ones those
+/// of the lowest label, where there are data sets with labels.
 pub(super) fn trace_sources<P: Precision, R: Parents>(
     stage: &Stage<'_>,
     geometry: &Geometry,
+    labelled: Option<&DataSets>,
     distances: &BrickArray<P>,
     states: &BrickArray<u32>,
     start: &[Slot],
@@ -43,7 +45,7 @@ pub(super) fn trace_sources<P: Precision, R: Parents>(
     rounds.begin(start, true);
     rounds.run(stage, &workers, |(distance, state, tracer), slot| {
         gather(distance, state, slot);
-        let (found, left) = tracer.trace(distance, state);
+        let (found, left) = tracer.trace(labelled, distance, state);
         if found {
             plan.scatter(state, states, slot);
         }

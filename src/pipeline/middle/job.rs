@@ -33,8 +33,9 @@ pub enum SurfaceKind {
 /// How labels are told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LabelMode {
-    /// By the sources that the method tracks. Of equally near ones VDT and DP take the lower label; FSM and FMM the one
-    /// that the published rule of parents leads to.
+    /// By the sources that the method tracks. Of equally near ones the lower label is taken: by VDT and DP where the
+    /// distances to both are equal; by FSM and FMM, which do not know these, where their own distance comes equally by
+    /// way of either, to the bit.
     Tracked,
     /// By the nearest source, looked up wherever the tracked one may belong to the wrong set; of equal distances the
     /// lower label wins.
