@@ -77,13 +77,14 @@ impl SourceTrees {
         self.trees[n].nearest_few(sets.centre(source), count)
     }
 
-    /// The sources of a label that can be the nearest of them to a place in a box, and more.
+    /// The sources of a label that can be the nearest of them to a place in a box, and more; none where these are more
+    /// than `most`.
     #[must_use]
-    pub fn near(&self, label: u32, around: &Around) -> Vec<Candidate> {
-        let Ok(n) = self.labels.binary_search(&label) else { return Vec::new() };
-        let tree = &self.trees[n];
-        let nearest = tree.nearest(around.middle);
-        nearest.map_or_else(Vec::new, |(_, squared)| tree.within(around.middle, around.limit(squared), label))
+    pub fn near(&self, label: u32, around: &Around, most: usize) -> Option<Vec<Candidate>> {
+        let tree = &self.trees[self.labels.binary_search(&label).ok()?];
+        let (_, squared) = tree.nearest(around.middle)?;
+        let near = tree.within(around.middle, around.limit(squared), label, most.saturating_add(1));
+        (near.len() <= most).then_some(near)
     }
 
     /// The sources of all labels that can be nearest to a place in a box, and more, labels ascending.
@@ -91,7 +92,7 @@ impl SourceTrees {
     pub fn near_all(&self, around: &Around) -> Vec<Candidate> {
         let nearest = self.trees.iter().filter_map(|tree| tree.nearest(around.middle));
         let limit = around.limit(nearest.map(|(_, squared)| squared).fold(f64::INFINITY, f64::min));
-        let of_label = |(tree, &label): (&Tree, &u32)| tree.within(around.middle, limit, label);
+        let of_label = |(tree, &label): (&Tree, &u32)| tree.within(around.middle, limit, label, usize::MAX);
         self.trees.iter().zip(&self.labels).flat_map(of_label).collect()
     }
 }
@@ -111,10 +112,14 @@ impl Tree {
         }
     }
 
-    fn within(&self, here: [f64; 3], squared: f64, label: u32) -> Vec<Candidate> {
+    fn within(&self, here: [f64; 3], squared: f64, label: u32, most: usize) -> Vec<Candidate> {
         match self {
-            Self::Points(tree) => tree.locate_within_distance(here, squared).map(|p| (p.data, label)).collect(),
-            Self::Triangles(tree) => tree.locate_within_distance(here, squared).map(|t| (t.data, label)).collect(),
+            Self::Points(tree) => {
+                tree.locate_within_distance(here, squared).take(most).map(|p| (p.data, label)).collect()
+            }
+            Self::Triangles(tree) => {
+                tree.locate_within_distance(here, squared).take(most).map(|t| (t.data, label)).collect()
+            }
         }
     }
 }

@@ -202,7 +202,7 @@ impl Known<'_> {
     /// The number of a label's source that is nearest to a place.
     pub(super) fn nearest(&self, label: u32, place: [f64; 3]) -> u32 {
         let world = self.world(place);
-        let near = self.nearby.nearest(self.shapes, label, place, world);
+        let near = self.nearby.nearest(self.shapes, self.trees, label, place, world);
         near.unwrap_or_else(|| self.trees.nearest(label, world))
     }
 

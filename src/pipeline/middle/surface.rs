@@ -100,7 +100,7 @@ impl Worker {
             SurfaceKind::Exact => {
                 let (sources, labels, nearby) = (&mut self.sources, &self.labels, &mut self.nearby);
                 nearby.enter(geometry, shapes, trees, &part, labels);
-                nearby.settle(geometry, shapes, labels, sources);
+                nearby.settle(geometry, shapes, trees, labels, sources);
                 let known = Known { geometry, shapes, nearby, trees, part, sources, labels };
                 self.interfaces.extract(&known, &cells, &mut patch);
             }
