@@ -16,14 +16,20 @@ impl GreyRange {
     /// Takes the grey values of the box `from` to [0, 1] on the box `to`, which may reach past it: there its border is
     /// repeated. Both dense `[z][y][x]`, both boxes in voxels of one grid.
     pub fn normalise<T: Element>(&self, grey: &[T], from: &Box3, to: &Box3, out: &mut [f32]) {
-        let nearest = |v: [i64; 3]| -> [i64; 3] { std::array::from_fn(|a| v[a].clamp(from.lo[a], from.hi[a] - 1)) };
+        let nearest = |v: i64, a: usize| v.clamp(from.lo[a], from.hi[a] - 1);
         let scale = 1.0 / (self.high - self.low).max(f64::MIN_POSITIVE);
+        let seen = |grey: T| ((grey.to_f64() - self.low) * scale).clamp(0.0, 1.0) as f32;
+        // Of each row the part that is there is converted in one piece, which the compiler makes vectors of.
+        let [first, end] = [to.lo[0], to.hi[0]].map(|x| x.clamp(from.lo[0], from.hi[0]));
+        let width = to.shape()[0] as usize;
+        let [before, shared] = [first - to.lo[0], end - first].map(|n| n.clamp(0, to.shape()[0]) as usize);
         for (y, z) in to.rows() {
-            let row = &mut out[to.offset_of([to.lo[0], y, z])..][..to.shape()[0] as usize];
-            for (x, value) in (to.lo[0]..).zip(row) {
-                let grey = grey[from.offset_of(nearest([x, y, z]))].to_f64();
-                *value = ((grey - self.low) * scale).clamp(0.0, 1.0) as f32;
-            }
+            let row = &mut out[to.offset_of([to.lo[0], y, z])..][..width];
+            let grey = &grey[from.offset_of([from.lo[0], nearest(y, 1), nearest(z, 2)])..][..from.shape()[0] as usize];
+            let there = &grey[(first - from.lo[0]) as usize..][..shared];
+            row[..before].fill(seen(grey[0]));
+            row[before + shared..].fill(seen(grey[grey.len() - 1]));
+            row[before..][..shared].iter_mut().zip(there).for_each(|(value, &grey)| *value = seen(grey));
         }
     }
 }
