@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use strandline::kernel::image::gaussian::{Block, Gaussian, Smoothed};
 use strandline::kernel::level_set::covolume::{Fields, Planes, Velocity, assemble};
 use strandline::kernel::level_set::mask::CellMask;
 use strandline::kernel::level_set::scheme::SCHEME_LEN;
@@ -28,5 +29,24 @@ fn level_set(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(kernels, level_set);
+/// A block of 64^3 voxels with its halo, smoothed by two voxels.
+fn gaussian(c: &mut Criterion) {
+    let gaussian = Gaussian::new([2.0; 3], [1.0; 3]);
+    let block = Block::new([64; 3], vec![true; 64], &gaussian);
+    let len: usize = block.grown_plane().iter().product();
+    let image: Vec<f32> = (0..len).map(|i| ((i * 7919) % 1000) as f32 / 1000.0).collect();
+    let (mut smoothed, mut cell) = (Smoothed::default(), vec![0.0; CELL_LEN]);
+    let mut group = c.benchmark_group("image");
+    group.throughput(Throughput::Elements(64 * CELL_LEN as u64));
+    group.bench_function("gaussian", |b| {
+        b.iter(|| {
+            smoothed.begin(&block);
+            (0..block.grown_planes()).for_each(|z| smoothed.plane(&block, &gaussian, z, &image));
+            (0..64).for_each(|n| smoothed.cell(&block, &gaussian, [n % 4, n / 4 % 4, n / 16], &mut cell));
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(kernels, level_set, gaussian);
 criterion_main!(kernels);

@@ -2,6 +2,7 @@
 
 pub mod downsample;
 pub mod edge_detector;
+pub mod gaussian;
 pub mod grey_range;
 pub mod heat;
 pub mod histogram;
