@@ -97,6 +97,9 @@ pub(super) struct ImageArgs {
     /// Pull of the image's edges: the same at strong and weak ones, or as strong as they are
     #[arg(long, value_enum, default_value_t = Edge::Normalised)]
     pub(super) edge: Edge,
+    /// Smoothing before edges are looked for: a Gaussian, or one implicit step of the heat equation
+    #[arg(long, value_enum, default_value_t = SmoothingArg::Gaussian)]
+    pub(super) smoothing: SmoothingArg,
     /// Percentages of the image's values that count as black and white
     #[arg(long, value_name = "LO,HI", value_parser = parse_pair, allow_hyphen_values = true, default_value = "0.1,99.9")]
     pub(super) percentiles: [f64; 2],
@@ -271,6 +274,15 @@ pub(super) enum OverlapArg {
     First,
     /// The one with the higher number
     Last,
+}
+
+/// How the image is smoothed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum SmoothingArg {
+    /// The exact solution of the heat equation
+    Gaussian,
+    /// One implicit step, as in the papers: twice the noise at the same width, and slower
+    Heat,
 }
 
 /// When the time loop ends.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::available_parallelism;
 
-use super::args::{Edge, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, StopArg};
+use super::args::{Edge, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, SmoothingArg, StopArg};
 use super::console::Console;
 use super::text::bytes;
 use super::values::Output;
@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress, machine_memory};
 use crate::pipeline::distance::Method;
 use crate::pipeline::evolve::Stop;
+use crate::pipeline::image_terms::Smoothing;
 use crate::pipeline::motion::Motion;
 use crate::pipeline::reconstruct::ReconstructSettings;
 use crate::pipeline::segment::{Overlap, SegmentSettings};
@@ -51,6 +52,10 @@ pub(super) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
         method: args.distance.method,
         motion: motion(&args.motion, edges)?,
         k: checked("--k", pull.k.unwrap_or(defaults.k), AT_LEAST_ZERO)?,
+        smoothing: match image.smoothing {
+            SmoothingArg::Gaussian => Smoothing::Gaussian,
+            SmoothingArg::Heat => Smoothing::Heat,
+        },
         sigma: optional("--sigma", pull.sigma, AT_LEAST_ZERO)?,
         beta: optional("--beta", args.motion.beta, ABOVE_ZERO)?,
         caps: !image.no_caps,
@@ -263,7 +268,7 @@ mod tests {
     fn every_flag_arrives() {
         let settings = meant(
             "--delta 1 --theta 2 --rho 3 --k 4 --sigma 5 --beta 6 --tau 7 --epsilon 8 --omega 1.5 --stop l2 --tol 9 \
-             --max-steps 10 --method fsm --edge plain --percentiles 1,99 --no-caps --overlap last --brick 32",
+             --max-steps 10 --method fsm --edge plain --smoothing heat --percentiles 1,99 --no-caps --overlap last --brick 32",
         );
         let expected = SegmentSettings {
             method: Method::FSM,
@@ -279,6 +284,7 @@ mod tests {
                 max_steps: 10,
             },
             k: 4.0,
+            smoothing: Smoothing::Heat,
             sigma: Some(5.0),
             beta: Some(6.0),
             caps: false,

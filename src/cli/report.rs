@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Engine, StageReport, peak_resident};
 use crate::grid::Geometry;
 use crate::pipeline::evolve::Stop;
+use crate::pipeline::image_terms::Smoothing;
 use crate::pipeline::motion::Motion;
 use crate::pipeline::segment::{ObjectReport, Outcome, Overlap, SegmentSettings};
 
@@ -59,6 +60,7 @@ pub(super) struct Solver {
     motion: Moves,
     rho: f64,
     k: f64,
+    smoothing: &'static str,
     sigma: f64,
     /// Null when it was found for each object; it is then in the results.
     beta: Option<f64>,
@@ -200,6 +202,10 @@ impl Solver {
             motion: Moves::new(&settings.motion, geometry),
             rho: settings.motion.rho,
             k: settings.k,
+            smoothing: match settings.smoothing {
+                Smoothing::Gaussian => "gaussian",
+                Smoothing::Heat => "heat",
+            },
             sigma: settings.sigma_on(geometry),
             beta: settings.beta,
             edge: if settings.motion.normalised { "normalised" } else { "plain" },

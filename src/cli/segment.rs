@@ -19,7 +19,7 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::io::stacks::{Select, Stack};
 use crate::pipeline::marks::split;
 use crate::pipeline::segment::{
-    Estimate, Guides, Outcome, SegmentSettings, check_marks, check_seed, estimate, segment,
+    Estimate, Guides, Outcome, SegmentSettings, check_marks, check_seed, check_smoothing, estimate, segment,
 };
 use crate::store::free_space;
 
@@ -87,6 +87,7 @@ impl Job {
             let file = &marks.files[&object.object];
             checked.map_err(|error| error.at(file))?.iter().for_each(|note| console.note(note));
         }
+        check_smoothing(&settings, &geometry)?;
         args.seed.iter().try_for_each(|seed| check_seed(seed, &geometry))?;
         let typed = typed.to_vec();
         let stack = opened.stack;

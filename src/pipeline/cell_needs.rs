@@ -4,7 +4,7 @@ use super::evolve::KEPT_LAYERS;
 
 /// Scratch a voxel near the cloud takes while its surface is solved: two time levels, distance and edges, f32 with
 /// faces (3/8 more), flags, and what the time loop keeps of it. Presmoothing before that takes less, though it reaches
-/// farther.
+/// a cell farther.
 pub(super) const SOLVE_BYTES: u64 = 24 + 4 * KEPT_LAYERS as u64;
 /// Scratch a voxel near the cloud takes for the distance alone: state and result, with faces.
 pub(super) const DISTANCE_BYTES: u64 = 11;
@@ -16,7 +16,7 @@ pub(super) const GRID_CELL_BYTES: u64 = 80;
 pub(super) const STORED_CELL_BYTES: u64 = 1200;
 /// Memory a point of the cloud takes: its position, twice, and its place in the bins.
 pub(super) const POINT_BYTES: u64 = 64;
-/// Buffers of one thread for cells and for patches of the surface.
+/// Buffers of one thread for cells and for patches of the surface; presmoothing by the default width takes no more.
 pub(super) const THREAD_BYTES: u64 = 4 << 20;
 /// Voxels a thread holds to make a brick of a coarser level, and a chunk of a shard.
 pub(super) const COARSE_VOXELS: u64 = 128 * 128 * 128 + 4 * 64 * 64 * 64;

@@ -2,34 +2,36 @@
 
 use std::sync::Arc;
 
-use super::band::read_mask;
+use super::heat_step::heat_step;
+use super::smoothing::smoothed;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
-use crate::grid::{BrickSet, Slot};
-use crate::kernel::image::{edge_detector::edge_detector, heat};
+use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
+use crate::grid::{Box3, BrickSet};
+use crate::kernel::image::edge_detector::edge_detector;
 use crate::kernel::level_set::covolume::Planes;
-use crate::kernel::level_set::mask::CellMask;
-use crate::kernel::level_set::scheme::SCHEME_LEN;
-use crate::kernel::level_set::sor::{Halves, Relaxation, relax};
 use crate::kernel::level_set::{CELL, CELL_LEN};
 use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
 
+/// How the image is smoothed before edges are looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Smoothing {
+    /// By the exact solution of the heat equation.
+    Gaussian,
+    /// By one implicit step of it, as published: less smooth, with twice the noise at the same width, and slower.
+    Heat,
+}
+
 /// How edges are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeSettings {
+    /// Form of the presmoothing.
+    pub smoothing: Smoothing,
     /// Width of the presmoothing, a physical length; 0 for none.
     pub sigma: f64,
     /// Contrast parameter K for intensities in [0, 1] and gradients per smallest spacing.
     pub k: f32,
 }
-
-/// Relaxations of a cell each time it is taken up, over-relaxed by [`HEAT_OMEGA`].
-const HEAT_ITERATIONS: usize = 4;
-const HEAT_OMEGA: f32 = 1.4;
-/// The smoothed image is done when the root mean square of the corrections is below this.
-const HEAT_TOLERANCE: f64 = 2e-5;
-const HEAT_ROUNDS: usize = 60;
 
 /// The edge detector g on the cells of `band`, from the smoothed image on (at least) these cells.
 ///
@@ -61,106 +63,39 @@ pub fn edges(
     Ok(edges)
 }
 
-/// One implicit step of the heat equation on the cells within five sigma of the band, from an image normalised to
-/// [0, 1] over the band's grid.
+/// The smoothed image on (at least) the cells of `band` and those around them, from an image normalised to [0, 1] over
+/// the band's grid.
 ///
 /// # Errors
-/// When the image cannot be read, scratch runs out or the run is interrupted.
+/// When the smoothing is too wide, the image cannot be read, scratch runs out or the run is interrupted.
 pub fn presmooth(
     stage: &Stage<'_>,
     engine: &Engine,
     image: &dyn BoxSource<f32>,
     band: &BrickSet,
     spacing: [f64; 3],
-    sigma: f64,
+    settings: &EdgeSettings,
 ) -> Result<BrickArray<f32>> {
-    let set = Arc::new(widened(band, spacing, 5.0 * sigma));
-    let smoothed = BrickArray::with_faces(engine.scratch(), &set)?;
-    let initial = BrickArray::new(engine.scratch(), &set)?;
-    let solved = BrickArray::new(engine.scratch(), &set)?;
+    let sigma = settings.sigma;
+    match settings.smoothing {
+        // One cell more: the edge detector reads a voxel beyond the band, and who looks at its derivatives a few.
+        Smoothing::Gaussian => smoothed(stage, engine, image, &Arc::new(widened(band, [1; 3])), spacing, [sigma; 3]),
+        Smoothing::Heat => {
+            let cells = spacing.map(|h| (5.0 * sigma / (h * CELL as f64)).ceil().max(1.0) as i64);
+            heat_step(stage, engine, image, &Arc::new(widened(band, cells)), spacing, sigma)
+        }
+    }
+}
+
+/// The set with all cells that lie within so many cells of it along each axis.
+fn widened(set: &BrickSet, cells: [i64; 3]) -> BrickSet {
     let grid = *set.grid();
-    stage.voxels((set.len() * CELL_LEN) as u64);
-    stage.run(&one_wave(&set), &Workers::new(|| vec![0.0; CELL_LEN]), |values, &slot| {
-        let part = grid.brick_box(set.id(slot));
-        let values = &mut values[..part.len()];
-        image.read_box(&part, values)?;
-        let copy = |brick: &mut [f32]| spread(values, &part.shape(), brick);
-        initial.write(slot, copy);
-        smoothed.write(slot, copy);
-        solved.write(slot, |flags: &mut [u8]| spread(&vec![1; values.len()], &part.shape(), flags));
-        smoothed.refresh_faces(slot);
-        Ok(())
-    })?;
-    if sigma > 0.0 {
-        relax_heat(stage, &set, [&smoothed, &initial], &solved, spacing, sigma)?;
-    }
-    Ok(smoothed)
-}
-
-/// Copies a dense box, shorter than a cell where the domain ends, into a cell's storage.
-fn spread<T: Copy>(values: &[T], shape: &[i64; 3], brick: &mut [T]) {
-    for (row, values) in values.chunks_exact(shape[0] as usize).enumerate() {
-        let (y, z) = (row % shape[1] as usize, row / shape[1] as usize);
-        brick[(z * CELL + y) * CELL..][..values.len()].copy_from_slice(values);
-    }
-}
-
-fn relax_heat(
-    stage: &Stage<'_>,
-    set: &Arc<BrickSet>,
-    [smoothed, initial]: [&BrickArray<f32>; 2],
-    solved: &BrickArray<u8>,
-    spacing: [f64; 3],
-    sigma: f64,
-) -> Result<()> {
-    let plan = HaloPlan::new(*set.grid(), Reach::Faces);
-    let workers = Workers::new(|| (HaloTile::new(CELL), Halves::new(), CellMask::new(), vec![0.0; SCHEME_LEN]));
-    let waves = checkerboard(set, |_| true);
-    let voxels = (set.len() * CELL_LEN) as f64;
-    for _ in 0..HEAT_ROUNDS {
-        let mut squares = vec![0.0; set.len()];
-        for wave in &waves {
-            let corrections = stage.run(wave, &workers, |(tile, halves, mask, scheme), &slot| {
-                read_mask(solved, slot, mask);
-                close_to_absent(set, slot, mask);
-                initial.read(slot, |values| heat::scheme(values, mask, spacing, sigma, scheme));
-                plan.gather(smoothed, slot, Boundary::Mirror, tile);
-                let by = Relaxation { scheme, mask, omega: HEAT_OMEGA, iterations: HEAT_ITERATIONS };
-                let correction = relax(tile.data_mut(), halves, by);
-                plan.scatter(tile, smoothed, slot);
-                Ok(correction.first)
-            })?;
-            wave.iter().zip(corrections).for_each(|(&slot, c)| squares[slot as usize] = c);
-        }
-        let residual = (squares.iter().sum::<f64>() / voxels).sqrt();
-        stage.iterated(HEAT_ITERATIONS as u64, residual);
-        if residual < HEAT_TOLERANCE {
-            break;
-        }
-    }
-    Ok(())
-}
-
-/// No flux into cells that are not stored.
-fn close_to_absent(set: &BrickSet, slot: Slot, mask: &mut CellMask) {
-    for face in crate::grid::FACES {
-        if set.neighbour(slot, face.offset()).is_none() {
-            let last = if face.upper { CELL - 1 } else { 0 };
-            mask.open[face.axis][usize::from(face.upper)][last] = 0.0;
-        }
-    }
-}
-
-/// The set with all cells that lie within `length` of it.
-fn widened(set: &BrickSet, spacing: [f64; 3], length: f64) -> BrickSet {
-    let grid = *set.grid();
-    let reach: [i64; 3] = std::array::from_fn(|a| (length / (spacing[a] * CELL as f64)).ceil().max(1.0) as i64);
     let mut keep = vec![false; grid.len() as usize];
     for &id in set.ids() {
         let at = grid.coords(id);
-        let around = crate::grid::Box3::new(
-            std::array::from_fn(|a| (at[a] - reach[a]) * CELL as i64),
-            std::array::from_fn(|a| (at[a] + reach[a] + 1) * CELL as i64),
+        let around = Box3::new(
+            std::array::from_fn(|a| (at[a] - cells[a]) * CELL as i64),
+            std::array::from_fn(|a| (at[a] + cells[a] + 1) * CELL as i64),
         );
         grid.bricks_in(&around).for_each(|id| keep[id as usize] = true);
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use strandline::grid::BrickSet;
 use strandline::kernel::level_set::CELL;
-use strandline::pipeline::image_terms::{EdgeSettings, edges, presmooth};
+use strandline::pipeline::image_terms::{EdgeSettings, Smoothing, edges, presmooth};
 use strandline::store::BrickArray;
 
 use crate::common::lab::{Lab, PlainGrid, dense, whole};
@@ -19,8 +19,10 @@ const GRIDS: [([i64; 3], [f64; 3]); 3] =
 fn smoothed(lab: &Lab, shape: [i64; 3], spacing: [f64; 3], sigma: f64, image: &[f32]) -> Vec<f32> {
     let set = dense(shape, CELL as i64);
     let source = lab.field(&set, image);
+    let settings = EdgeSettings { smoothing: Smoothing::Heat, sigma, k: 0.0 };
     whole(
-        &presmooth(&lab.engine.stage("heat", 0), &lab.engine, &source, &set, spacing, sigma).expect("room in scratch"),
+        &presmooth(&lab.engine.stage("heat", 0), &lab.engine, &source, &set, spacing, &settings)
+            .expect("room in scratch"),
     )
 }
 
@@ -115,8 +117,7 @@ fn detected(
     settings: &EdgeSettings,
 ) -> BrickArray<f32> {
     let stage = lab.engine.stage("edges", 0);
-    let smoothed =
-        presmooth(&stage, &lab.engine, image, set, spacing, settings.sigma).expect("smoothing needs only scratch");
+    let smoothed = presmooth(&stage, &lab.engine, image, set, spacing, settings).expect("smoothing needs only scratch");
     edges(&stage, &lab.engine, &smoothed, set, spacing, settings.k).expect("edges need only scratch")
 }
 
@@ -128,7 +129,7 @@ fn edges_are_those_of_the_smoothed_image() {
     let runs = [1, 2].map(|threads| {
         let lab = Lab::new(threads);
         let set = dense(grid.shape, CELL as i64);
-        let settings = EdgeSettings { sigma, k: k as f32 };
+        let settings = EdgeSettings { smoothing: Smoothing::Heat, sigma, k: k as f32 };
         let image = lab.field(&set, &image);
         whole(&detected(&lab, &image, &set, spacing, &settings))
     });
@@ -151,7 +152,7 @@ fn a_part_of_the_cells_has_the_edges_of_the_whole() {
     let all = dense(grid.shape, CELL as i64);
     let part = Arc::new(BrickSet::from_fn(*all.grid(), |id| all.grid().coords(id)[0] == 2));
     let source = lab.field(&all, &image);
-    let settings = EdgeSettings { sigma: 2.0, k: 50.0 };
+    let settings = EdgeSettings { smoothing: Smoothing::Heat, sigma: 2.0, k: 50.0 };
     let [g, near] = [&all, &part].map(|set| whole(&detected(&lab, &source, set, [1.0; 3], &settings)));
     for v in grid.voxels().filter(|v| (32..48).contains(&v[0])) {
         let (found, exact) = (near[grid.at(v)], g[grid.at(v)]);

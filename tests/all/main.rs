@@ -12,6 +12,7 @@ mod distance_meshes;
 mod distance_papers;
 mod flood;
 mod fsm_sources;
+mod gaussian;
 mod heat;
 mod level_set;
 mod maximum_principle;

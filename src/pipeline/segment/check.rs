@@ -1,8 +1,11 @@
 //! Do the marks fit the image? Wrong units and wrong axes are the mistakes that happen, and each can be told.
 
+use super::settings::SegmentSettings;
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
+use crate::pipeline::image_terms::Smoothing;
 use crate::pipeline::marks::{ObjectMarks, Seed};
+use crate::pipeline::smoothing::check_width;
 
 /// Fewer points than this enclose nothing.
 const FEWEST_POINTS: usize = 4;
@@ -75,6 +78,17 @@ pub fn check_seed(seed: &Seed, image: &Geometry) -> Result<()> {
         centre[2],
         spans(&extent(image), image)
     )))
+}
+
+/// Checks that the image can be smoothed as wanted.
+///
+/// # Errors
+/// When a Gaussian would be too wide.
+pub fn check_smoothing(settings: &SegmentSettings, image: &Geometry) -> Result<()> {
+    if settings.smoothing == Smoothing::Heat || settings.motion.rho == 0.0 {
+        return Ok(());
+    }
+    check_width(image.spacing, [settings.sigma_on(image); 3])
 }
 
 /// The physical box that the image's voxels fill, `[lowest, highest]`.

@@ -12,7 +12,9 @@ use crate::pipeline::cell_needs::{
     COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, KEPT_BYTES, POINT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES,
     STORED_CELL_BYTES, THREAD_BYTES,
 };
+use crate::pipeline::image_terms::Smoothing;
 use crate::pipeline::marks::{cloud_of, split_and_seed};
+use crate::pipeline::smoothing::thread_bytes;
 use crate::pipeline::vicinity::Vicinity;
 use crate::store::PlaneSource;
 
@@ -79,8 +81,13 @@ pub fn estimate(
     // Decoders keep their buffers.
     let decoders = threads * plane;
     let coarse = if writes { voxels * size * 3 / 4 } else { 0 };
+    let buffers = if settings.smoothing == Smoothing::Gaussian && settings.motion.rho > 0.0 {
+        THREAD_BYTES.max(thread_bytes(guides.geometry.spacing, [settings.sigma_on(guides.geometry); 3], size))
+    } else {
+        THREAD_BYTES
+    };
     Estimate {
-        held: reading.max(decoders + (solving + threads * THREAD_BYTES).max(writing)),
+        held: reading.max(decoders + (solving + threads * buffers).max(writing)),
         scratch: image + (SOLVE_BYTES * largest_voxels).max(coarse) + KEPT_BYTES * near_voxels,
         least_scratch: image + DISTANCE_BYTES * largest_voxels,
         output: if writes { voxels * (size + 1) * 3 / 2 + 5 * near_voxels } else { 0 },

@@ -15,7 +15,7 @@ mod reach;
 mod seed;
 mod settings;
 
-pub use check::{check_marks, check_seed};
+pub use check::{check_marks, check_seed, check_smoothing};
 pub use estimate::{Estimate, estimate};
 pub use labels::Overlap;
 pub use object::ObjectReport;

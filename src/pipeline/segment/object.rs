@@ -11,7 +11,7 @@ use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::Band;
 use crate::pipeline::enclosure::{Found, Hole, Search, Start, enclose};
 use crate::pipeline::evolve::{Evolution, evolve};
-use crate::pipeline::image_terms::{EdgeSettings, edges, presmooth};
+use crate::pipeline::image_terms::{edges, presmooth};
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::{ObjectMarks, cloud_of};
 use crate::store::{BoxSource, BrickArray, Element};
@@ -160,12 +160,12 @@ fn edge_field<T: Element>(
     }
     let image = Normalised::new(picture.voxels, picture.range, window);
     let (set, spacing) = (band.solved.set(), geometry.spacing);
-    let EdgeSettings { sigma, k } = settings.edges(geometry);
+    let detector = settings.edges(geometry);
     let stage = engine.stage(&name("presmoothing", marks), 0);
-    let smoothed = presmooth(&stage, engine, &image, set, spacing, sigma)?;
+    let smoothed = presmooth(&stage, engine, &image, set, spacing, &detector)?;
     stage.finish();
     let stage = engine.stage(&name("edges", marks), set.len() as u64);
-    let found = edges(&stage, engine, &smoothed, set, spacing, k)?;
+    let found = edges(&stage, engine, &smoothed, set, spacing, detector.k)?;
     stage.finish();
     Ok(Some(found))
 }

@@ -3,7 +3,7 @@
 use super::labels::Overlap;
 use crate::grid::{Geometry, PointCloud};
 use crate::pipeline::distance::Method;
-use crate::pipeline::image_terms::EdgeSettings;
+use crate::pipeline::image_terms::{EdgeSettings, Smoothing};
 use crate::pipeline::marks::Seed;
 use crate::pipeline::motion::Motion;
 
@@ -16,6 +16,8 @@ pub struct SegmentSettings {
     pub motion: Motion,
     /// Contrast parameter of the edge detector.
     pub k: f64,
+    /// Form of the presmoothing.
+    pub smoothing: Smoothing,
     /// Width of the presmoothing, a length.
     pub sigma: Option<f64>,
     /// Distance of the start surface from the cloud; automatic when none.
@@ -36,6 +38,7 @@ impl Default for SegmentSettings {
             method: Method::VDT,
             motion: Motion::default(),
             k: 650.0,
+            smoothing: Smoothing::Gaussian,
             sigma: None,
             beta: None,
             caps: true,
@@ -59,7 +62,7 @@ impl SegmentSettings {
     /// The edge detector for a grid.
     #[must_use]
     pub fn edges(&self, geometry: &Geometry) -> EdgeSettings {
-        EdgeSettings { sigma: self.sigma_on(geometry), k: self.k as f32 }
+        EdgeSettings { smoothing: self.smoothing, sigma: self.sigma_on(geometry), k: self.k as f32 }
     }
 }
 
