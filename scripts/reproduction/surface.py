@@ -239,6 +239,8 @@ def image(setting):
         f"{h},{h},{h}",
         "--edge",
         "plain",
+        "--smoothing",
+        "heat",
         "--rho",
         1,
     ]
