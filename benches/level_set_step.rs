@@ -137,6 +137,7 @@ fn ours(scene: &Scene, threads: usize, tolerance: f64) -> Cost {
         epsilon: VELOCITY.epsilon as f32,
         tau: VELOCITY.tau as f32,
         normalised: VELOCITY.normalised,
+        speed: false,
     };
     let settings =
         TimeLoop { velocity, stop: Stop::L2(0.0), max_steps: STEPS, omega: OMEGA as f32, solver_tolerance: tolerance };

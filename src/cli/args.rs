@@ -94,6 +94,15 @@ pub(super) struct ImageArgs {
     /// Distance between voxel centres, physical [default: the file's]
     #[arg(long, value_name = "HX,HY,HZ", value_parser = parse_triple, allow_hyphen_values = true)]
     pub(super) image_spacing: Option<[f64; 3]>,
+    /// What the image shows at the border of the objects: `level`, inside and outside differ in brightness; `wall`, a
+    /// bright or dark sheet runs along it; `edge`, the papers' edge detector; `none`, nothing to go by; `auto` finds
+    /// out for each object from the grey values under its marks
+    #[arg(long = "image", value_enum, default_value_t = ImageArg::Auto)]
+    pub(super) model: ImageArg,
+    /// Where objects start: `auto`, as the shape of their outlines, or between the points of a cloud; `flood`, where a
+    /// flood from outside ends, as in the papers
+    #[arg(long, value_enum, default_value_t = StartArg::Auto)]
+    pub(super) start: StartArg,
     /// Pull of the image's edges: the same at strong and weak ones, or as strong as they are
     #[arg(long, value_enum, default_value_t = Edge::Normalised)]
     pub(super) edge: Edge,
@@ -261,6 +270,30 @@ pub(super) enum Edge {
     Normalised,
     /// By the gradient of the edge detector
     Plain,
+}
+
+/// What the image shows at the border.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum ImageArg {
+    /// Found for each object
+    Auto,
+    /// Inside and outside differ in brightness
+    Level,
+    /// A sheet runs along the border
+    Wall,
+    /// The papers' edge detector
+    Edge,
+    /// The image is left out
+    None,
+}
+
+/// Where objects start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum StartArg {
+    /// As the shape of their outlines
+    Auto,
+    /// Where a flood from outside ends
+    Flood,
 }
 
 /// Which object gets the voxels where several overlap.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::available_parallelism;
 
-use super::args::{Edge, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, SmoothingArg, StopArg};
+use super::args::{Edge, ImageArg, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, SmoothingArg, StartArg, StopArg};
 use super::console::Console;
 use super::text::bytes;
 use super::values::Output;
@@ -15,7 +15,7 @@ use crate::pipeline::evolve::Stop;
 use crate::pipeline::image_terms::Smoothing;
 use crate::pipeline::motion::Motion;
 use crate::pipeline::reconstruct::ReconstructSettings;
-use crate::pipeline::segment::{Overlap, SegmentSettings};
+use crate::pipeline::segment::{ImageModel, Overlap, SegmentSettings, Start};
 use crate::store::Scratch;
 
 /// What a run may use.
@@ -50,7 +50,21 @@ pub(super) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
     };
     Ok(SegmentSettings {
         method: args.distance.method,
+        image: match image.model {
+            _ if pull.rho == Some(0.0) => ImageModel::None,
+            ImageArg::Auto => ImageModel::Auto,
+            ImageArg::Level => ImageModel::Level,
+            ImageArg::Wall => ImageModel::Wall,
+            ImageArg::Edge => ImageModel::Edge,
+            ImageArg::None => ImageModel::None,
+        },
+        start: match image.start {
+            StartArg::Auto => Start::Auto,
+            StartArg::Flood => Start::Flood,
+        },
         motion: motion(&args.motion, edges)?,
+        theta: args.motion.theta,
+        rho: pull.rho,
         k: checked("--k", pull.k.unwrap_or(defaults.k), AT_LEAST_ZERO)?,
         smoothing: match image.smoothing {
             SmoothingArg::Gaussian => Smoothing::Gaussian,

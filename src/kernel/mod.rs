@@ -35,6 +35,7 @@ pub mod distance;
 pub mod forest;
 pub mod image;
 pub mod level_set;
+pub mod outline;
 pub mod surface;
 pub mod triangle;
-mod vector;
+pub(crate) mod vector;

@@ -25,6 +25,8 @@ pub struct ObjectMarks {
     pub object: u32,
     /// Its marks by contour, in the order of the file; one entry when the file names no contours.
     pub contours: Vec<Vec<[f64; 3]>>,
+    /// The contours' numbers in the file.
+    pub numbers: Vec<i64>,
     /// True when the file names contours: only then are marks joined and ends capped.
     pub drawn: bool,
     /// The ball it starts as; then it has no marks.
@@ -43,7 +45,10 @@ pub fn split(cloud: &PointCloud) -> Vec<ObjectMarks> {
     let drawn = !cloud.contours.is_empty();
     objects
         .into_iter()
-        .map(|(object, contours)| ObjectMarks { object, contours: contours.into_values().collect(), drawn, seed: None })
+        .map(|(object, contours)| {
+            let (numbers, contours) = contours.into_iter().unzip();
+            ObjectMarks { object, contours, numbers, drawn, seed: None }
+        })
         .collect()
 }
 
@@ -52,7 +57,13 @@ pub fn split(cloud: &PointCloud) -> Vec<ObjectMarks> {
 pub fn split_and_seed(cloud: &PointCloud, seeds: &[Seed]) -> Vec<ObjectMarks> {
     let mut objects = split(cloud);
     let first = objects.last().map_or(1, |marks| marks.object + 1);
-    let seeded = |(object, &seed)| ObjectMarks { object, contours: Vec::new(), drawn: false, seed: Some(seed) };
+    let seeded = |(object, &seed)| ObjectMarks {
+        object,
+        contours: Vec::new(),
+        numbers: Vec::new(),
+        drawn: false,
+        seed: Some(seed),
+    };
     objects.extend((first..).zip(seeds).map(seeded));
     objects
 }
@@ -194,7 +205,7 @@ mod tests {
 
     #[test]
     fn caps_lie_half_a_slice_beyond_and_cover_the_area() {
-        let marks = ObjectMarks { object: 1, contours: vec![square(4.0), square(6.0)], drawn: true, seed: None };
+        let marks = ObjectMarks { object: 1, contours: vec![square(4.0), square(6.0)], numbers: vec![0, 1], drawn: true, seed: None };
         let cloud = cloud_of(&marks, &grid(), true);
         let cap: Vec<_> = cloud.iter().filter(|p| p[2] == 3.0).collect();
         assert!(cap.len() >= 15 * 15 && cap.len() <= 17 * 17 + 64, "{}", cap.len());

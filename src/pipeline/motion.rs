@@ -88,6 +88,7 @@ impl Motion {
                 epsilon: self.epsilon_on(geometry) as f32,
                 tau: self.tau_on(geometry) as f32,
                 normalised: self.normalised,
+                speed: false,
             },
             stop: self.stop,
             max_steps: self.max_steps,

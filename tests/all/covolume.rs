@@ -142,6 +142,7 @@ fn single(v: &PlainVelocity) -> Velocity {
         epsilon: v.epsilon as f32,
         tau: v.tau as f32,
         normalised: v.normalised,
+        speed: false,
     }
 }
 

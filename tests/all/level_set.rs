@@ -44,7 +44,7 @@ fn distinct(cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
 fn settings(h: f64, theta: f32, delta: f32) -> TimeLoop {
     let tau = (h / 4.0) as f32;
     TimeLoop {
-        velocity: Velocity { theta, rho: 0.0, delta, epsilon: 0.01, tau, normalised: true },
+        velocity: Velocity { theta, rho: 0.0, delta, epsilon: 0.01, tau, normalised: true, speed: false },
         stop: Stop::L2(1e-4),
         max_steps: 1000,
         omega: 1.2,

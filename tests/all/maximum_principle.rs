@@ -44,7 +44,7 @@ impl Problem {
     fn single(&self) -> Velocity {
         let v = &self.velocity;
         let [theta, rho, delta, epsilon, tau] = [v.theta, v.rho, v.delta, v.epsilon, v.tau].map(|v| v as f32);
-        Velocity { theta, rho, delta, epsilon, tau, normalised: v.normalised }
+        Velocity { theta, rho, delta, epsilon, tau, normalised: v.normalised, speed: false }
     }
 
     /// One time step of the pipeline.

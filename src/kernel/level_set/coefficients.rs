@@ -1,7 +1,8 @@
 //! Coefficients of one plane of voxels from the norms on its faces (Kósa PhD, eq. 3.12, 3.14; algorithms: section 5).
 //!
 //! ```text
-//! c_pq = tau / h_s^2 * ( max(theta (d_q - d_p) + r_p (g_q - g_p), 0) + delta / 4 * M_p * S_pq )
+//! c_pq = tau / h_s^2 * ( max(theta (d_q - d_p) + r_p (g_q - g_p), 0) + max(F_p (u_q - u_p), 0) / 4 * S_pq
+//!                        + delta / 4 * M_p * S_pq )
 //! ```
 //!
 //! for all voxels and faces of the plane's rows, solved or not, open or not: as in `gradients`, everything runs along
@@ -96,9 +97,14 @@ fn mean_norm([x0, x1, y0, y1, z0, z1]: [f32; 6], epsilon_squared: f32) -> f32 {
     (epsilon_squared + m * m).sqrt()
 }
 
+/// What the image gives, told when the coefficients are compiled: nothing, an edge detector, a speed.
+pub(crate) const NO_IMAGE: u8 = 0;
+pub(crate) const EDGES: u8 = 1;
+pub(crate) const SPEED: u8 = 2;
+
 /// Fills the given rows of plane `z`; `step` is `tau / h^2` along each axis.
 #[inline(always)]
-pub(crate) fn coefficients<const EDGES: bool>(
+pub(crate) fn coefficients<const IMAGE: u8>(
     fields: Fields<'_>,
     (z, rows): (usize, [usize; 2]),
     (norms, solved): (PlaneNorms<'_>, &[f32; FLAT]),
@@ -108,8 +114,11 @@ pub(crate) fn coefficients<const EDGES: bool>(
     let (start, len) = flat(rows);
     let center = (z + 1) * PLANE + GROWN + 1 + start;
     let (distances, distance) = (Around::voxels(fields.d, center, len), &fields.d[center..][..len]);
-    let edges_of = if EDGES { fields.g } else { fields.d };
+    let image_of = if IMAGE == NO_IMAGE { fields.d } else { fields.g };
+    // A speed counts where it is; what it moves are differences of u.
+    let edges_of = if IMAGE == SPEED { fields.u } else { image_of };
     let (edges, edge) = (Around::voxels(edges_of, center, len), &edges_of[center..][..len]);
+    let speed = &image_of[center..][..len];
     let (norm, inverse) = (norms.norm(start, len), norms.inverse(start, len));
     let [c0, c1, c2, c3, c4, c5, means] = out;
     let (c0, c1, c2) = (&mut c0[start..][..len], &mut c1[start..][..len], &mut c2[start..][..len]);
@@ -120,11 +129,13 @@ pub(crate) fn coefficients<const EDGES: bool>(
         let mean = mean_norm(norm.at(n), metric.epsilon_squared);
         let (d, g, inverse) = (distances.at(n), edges.at(n), inverse.at(n));
         let (d_here, g_here) = (distance[n], edge[n]);
-        let pull = if EDGES { edge_pull(g, g_here, &metric, &velocity) } else { 0.0 };
+        let pull = if IMAGE == EDGES { edge_pull(g, g_here, &metric, &velocity) } else { 0.0 };
+        let outward = if IMAGE == SPEED { 0.25 * velocity.rho * speed[n] } else { 0.0 };
         let towards = |d: f32, g: f32, inverse: f32, step: f32| {
-            let edge = if EDGES { pull * (g - g_here) } else { 0.0 };
+            let edge = if IMAGE == EDGES { pull * (g - g_here) } else { 0.0 };
             let attraction = velocity.theta * (d - d_here) + edge;
-            solved[n] * step * (attraction.max(0.0) + curvature * mean * inverse)
+            let flow = if IMAGE == SPEED { (outward * (g - g_here)).max(0.0) * inverse } else { 0.0 };
+            solved[n] * step * (attraction.max(0.0) + flow + curvature * mean * inverse)
         };
         c0[n] = towards(d[0], g[0], inverse[0], step[0]);
         c1[n] = towards(d[1], g[1], inverse[1], step[0]);

@@ -8,6 +8,9 @@
 //! r_p  = rho / |grad g_p|_eps   (rho where the edge term is not normalised)
 //! ```
 //!
+//! Where the image gives a speed F along the outward normal in place of g, its term is `max(F (u_q - u_p), 0) S_pq / 4`
+//! in place of that with r_p: `F |grad u|` by upwind differences (Osher & Sethian 1988), over the norms at the faces.
+//!
 //! which is the printed scheme with `A_q / m = 1 / h_s` and the velocity written out. The solver gets it divided by the
 //! diagonal, `u_p = old_p + sum w_pq (u_q - old_p)` with `w = c / (1 + sum c)`: an average of `u_q` and `old_p`, so the
 //! maximum principle is plain to see. Voxels outside of the band have w = 0 and keep their value; faces on the domain's
@@ -17,7 +20,7 @@
 //! a few planes. Cost: 12 tetrahedra norms and about 60 operations per voxel.
 
 use super::coefficients::{
-    Coefficients, NO_COEFFICIENTS, PlaneNorms, add_means, close, coefficients, mean_norms, normalise, old_values,
+    Coefficients, EDGES, NO_COEFFICIENTS, NO_IMAGE, PlaneNorms, SPEED, add_means, close, coefficients, mean_norms, normalise, old_values,
     spread,
 };
 use super::gradients::{FaceNorms, Metric, faces, vertex_plane};
@@ -40,6 +43,8 @@ pub struct Velocity {
     pub tau: f32,
     /// True when the edge term is divided by the norm of grad g.
     pub normalised: bool,
+    /// True when what the image gives is a speed along the outward normal, not an edge detector.
+    pub speed: bool,
 }
 
 /// The fields of one grown cell. The edge detector may be empty when `rho` is 0.
@@ -49,7 +54,7 @@ pub struct Fields<'a> {
     pub u: &'a [f32],
     /// Distance to the cloud, physical.
     pub d: &'a [f32],
-    /// Edge detector.
+    /// Edge detector, or speed along the outward normal.
     pub g: &'a [f32],
 }
 
@@ -167,9 +172,11 @@ fn assemble_cell(
             let (norms, solved, out) = work.split();
             spread(&mask.solved, z, rows, solved);
             if velocity.rho == 0.0 {
-                coefficients::<false>(fields, (z, rows), (norms, solved), by, out);
+                coefficients::<NO_IMAGE>(fields, (z, rows), (norms, solved), by, out);
+            } else if velocity.speed {
+                coefficients::<SPEED>(fields, (z, rows), (norms, solved), by, out);
             } else {
-                coefficients::<true>(fields, (z, rows), (norms, solved), by, out);
+                coefficients::<EDGES>(fields, (z, rows), (norms, solved), by, out);
             }
             add_means(rows, &out[6], &mut sums);
             close(out, mask, z, rows);

@@ -81,6 +81,18 @@ pub fn holds(sides: CellSides<'_>, edge: usize, valid: [usize; 3], reaches: Reac
     rows(edge, valid).flatten().any(|place| sides.solves(place, reaches))
 }
 
+/// Sets 1 at voxels of the domain within `reach` of a surface, 0 elsewhere; `shape` is the signed distance to it.
+/// Returns how many there are.
+pub fn near_surface(shape: &[f32], edge: usize, valid: [usize; 3], reach: f32, solved: &mut [u8]) -> u64 {
+    solved.fill(0);
+    let mut count = 0;
+    for place in rows(edge, valid).flatten() {
+        solved[place] = u8::from(shape[place].abs() <= reach);
+        count += u64::from(solved[place]);
+    }
+    count
+}
+
 /// Sets 1 at voxels beside the border that no reach solves, 0 elsewhere; returns whether there are any. `inside` has
 /// its ghosts across faces.
 pub fn border(d: &[f32], inside: &HaloTile<u8>, reaches: Reaches, near: &mut [u8]) -> bool {

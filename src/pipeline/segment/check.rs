@@ -162,7 +162,7 @@ mod tests {
     }
 
     fn marks(points: Vec<[f64; 3]>) -> ObjectMarks {
-        ObjectMarks { object: 3, contours: vec![points], drawn: true, seed: None }
+        ObjectMarks { object: 3, contours: vec![points], numbers: vec![0], drawn: true, seed: None }
     }
 
     fn ring(centre: [f64; 3], radius: [f64; 2]) -> Vec<[f64; 3]> {

@@ -9,15 +9,22 @@
 mod check;
 mod estimate;
 mod labels;
+mod outlines;
 mod object;
 mod output;
 mod reach;
 mod seed;
 mod settings;
+mod shape_field;
+mod shape_start;
+mod speed;
+mod survey;
+
 
 pub use check::{check_marks, check_seed, check_smoothing};
 pub use estimate::{Estimate, estimate};
 pub use labels::Overlap;
 pub use object::ObjectReport;
 pub use output::{Outcome, segment};
-pub use settings::{Guides, SegmentSettings};
+pub use outlines::crossed;
+pub use settings::{Guides, ImageModel, SegmentSettings, Start};

@@ -2,14 +2,16 @@
 
 use super::reach::first_reach;
 use super::seed::grow;
-use super::settings::SegmentSettings;
+use super::settings::{ImageModel, SegmentSettings, Start};
+use super::shape_start::begin;
+use super::survey::{Outlined, Trust};
 use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::grey_range::GreyRange;
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::Band;
-use crate::pipeline::enclosure::{Found, Hole, Search, Start, enclose};
+use crate::pipeline::enclosure::{self, Found, Hole, Search, enclose};
 use crate::pipeline::evolve::{Evolution, evolve};
 use crate::pipeline::image_terms::{edges, presmooth};
 use crate::pipeline::intensity::Normalised;
@@ -77,19 +79,25 @@ pub(super) fn solve<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
     marks: &ObjectMarks,
+    outlined: Option<(&Outlined, Trust)>,
     settings: &SegmentSettings,
 ) -> Result<Solution> {
     if let Some(seed) = marks.seed {
         return grow(engine, picture, marks, &seed, settings);
     }
+    if let Some(outlined) = outlined {
+        let (begun, forces) = begin(engine, picture, marks, outlined, settings)?;
+        return begun.solve(engine, picture, marks, settings, forces);
+    }
     let cloud = cloud_of(marks, picture.geometry, settings.caps);
+    let loose = settings.start == Start::Auto && !marks.drawn;
     let suffix = format!(" {}", marks.object);
     let search = Search {
         grid: picture.geometry,
         cloud: &cloud,
         method: settings.method,
         beta: settings.beta,
-        start: Start::Tube,
+        start: if loose { enclosure::Start::Watershed } else { enclosure::Start::Tube },
         first_reach: first_reach(marks, picture.geometry, settings),
         suffix: &suffix,
     };
@@ -101,8 +109,17 @@ pub(super) fn solve<T: Element>(
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
     let beta = enclosure.beta;
     let band = enclosure.into_band(engine, &suffix)?;
-    Begun { geometry, window, band, cloud_points: cloud.len() as u64, beta, hole }
-        .solve(engine, picture, marks, settings)
+    let forces = Forces { theta: settings.motion.theta, speed: None };
+    Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole }
+        .solve(engine, picture, marks, settings, forces)
+}
+
+/// What moves an object's surface, beside its curvature and the settings.
+pub(super) struct Forces {
+    /// Weight of the pull towards the marks.
+    pub theta: f64,
+    /// Speed outwards; none where the image's edges pull, or nothing.
+    pub speed: Option<BrickArray<f32>>,
 }
 
 /// An object before its surface moves.
@@ -113,6 +130,8 @@ pub(super) struct Begun {
     pub window: Box3,
     /// What is solved, at its start.
     pub band: Band,
+    /// The distance to the cloud, where something else takes its place in the band.
+    pub distance: Option<BrickArray<f32>>,
     /// Points of the cloud.
     pub cloud_points: u64,
     /// Where the start surface lies.
@@ -129,15 +148,28 @@ impl Begun {
         picture: &Picture<'_, T>,
         marks: &ObjectMarks,
         settings: &SegmentSettings,
+        forces: Forces,
     ) -> Result<Solution> {
-        let Self { geometry, window, mut band, cloud_points, beta, hole } = self;
-        let edge_field = edge_field(engine, picture, marks, settings, &geometry, window, &band)?;
+        let Self { geometry, window, mut band, distance, cloud_points, beta, hole } = self;
+        let edges = match (&forces.speed, settings.image) {
+            (None, ImageModel::Edge | ImageModel::Auto) => {
+                edge_field(engine, picture, marks, settings, &geometry, window, &band)?
+            }
+            _ => None,
+        };
+        let mut time_loop = settings.motion.time_loop(&geometry);
+        time_loop.velocity.theta = forces.theta as f32;
+        time_loop.velocity.speed = forces.speed.is_some();
+        let image = forces.speed.as_ref().or(edges.as_ref());
+        if forces.speed.is_some() || image.is_none() {
+            time_loop.velocity.rho = f32::from(u8::from(image.is_some()));
+        }
         let stage = engine.stage(&name("level set", marks), 0);
         stage.voxels(band.voxels);
-        let time_loop = settings.motion.time_loop(&geometry);
-        let evolution = evolve(&stage, engine, &mut band, edge_field.as_ref(), geometry.spacing, &time_loop)?;
+        let evolution = evolve(&stage, engine, &mut band, image, geometry.spacing, &time_loop)?;
         stage.finish();
-        let Band { u, distance, voxels: band_voxels, .. } = band;
+        let Band { u, distance: pull, voxels: band_voxels, .. } = band;
+        let distance = distance.unwrap_or(pull);
         Ok(Solution { geometry, window, u, distance, cloud_points, beta, hole, band_voxels, evolution })
     }
 }

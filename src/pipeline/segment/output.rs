@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use super::labels::{LabelVolume, Placed};
 use super::object::{ObjectReport, Picture, Solution, solve};
-use super::settings::{Guides, SegmentSettings};
+use super::outlines::scatter_of;
+use super::settings::{Guides, ImageModel, SegmentSettings, Start};
+use super::survey::{Outlined, Trust, trust};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, Geometry};
@@ -71,10 +73,11 @@ fn run<T: Sample>(
             image.extremes[0]
         )));
     }
+    let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry };
+    let (outlined, trusts) = survey(engine, &picture, &objects, settings)?;
     let mut solved = Vec::new();
-    for marks in &objects {
-        let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry };
-        let solution = solve(engine, &picture, marks, settings)?;
+    for (n, marks) in objects.iter().enumerate() {
+        let solution = solve(engine, &picture, marks, outlined[n].as_ref().zip(trusts[n]), settings)?;
         let report = draw(engine, &solution, marks, store, objects.len() > 1)?;
         solved.push((solution, report));
     }
@@ -84,6 +87,28 @@ fn run<T: Sample>(
     }
     let objects = solved.into_iter().map(|(_, report)| report).collect();
     Ok(Outcome { geometry: guides.geometry.clone(), element: T::TYPE, objects, label_voxels })
+}
+
+/// Looks at all objects that are marked by outlines, unless the papers' start was asked for.
+fn survey<T: Element>(
+    engine: &Engine,
+    picture: &Picture<'_, T>,
+    objects: &[ObjectMarks],
+    settings: &SegmentSettings,
+) -> Result<(Vec<Option<Outlined>>, Vec<Option<Trust>>)> {
+    let scatter = scatter_of(objects, picture.geometry);
+    let looks = !matches!(settings.image, ImageModel::None | ImageModel::Edge) && settings.rho != Some(0.0);
+    let outlined = |marks: &ObjectMarks| match settings.start {
+        Start::Auto if marks.seed.is_none() => Outlined::new(engine, picture, marks, scatter, looks),
+        _ => Ok(None),
+    };
+    let outlined: Vec<Option<Outlined>> = objects.iter().map(outlined).collect::<Result<_>>()?;
+    let trusts = trust(&outlined, picture.geometry, scatter);
+    if std::env::var_os("SURVEY").is_some() {
+        eprintln!("{scatter:?}");
+        trusts.iter().for_each(|t| eprintln!("{t:?}"));
+    }
+    Ok((outlined, trusts))
 }
 
 /// Extracts, measures and writes an object's surface, and writes its segmentation function.

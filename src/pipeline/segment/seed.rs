@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::object::{Begun, Picture, Solution, name};
+use super::object::{Begun, Forces, Picture, Solution, name};
 use super::settings::SegmentSettings;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
@@ -27,7 +27,9 @@ pub(super) fn grow<T: Element>(
     stage.voxels(window.volume());
     let band = start_as_ball(&stage, engine, &geometry, seed)?;
     stage.finish();
-    Begun { geometry, window, band, cloud_points: 0, beta: 0.0, hole: None }.solve(engine, picture, marks, settings)
+    let forces = Forces { theta: settings.motion.theta, speed: None };
+    Begun { geometry, window, band, distance: None, cloud_points: 0, beta: 0.0, hole: None }
+        .solve(engine, picture, marks, settings, forces)
 }
 
 /// A band of all voxels, which starts as the ball; no point pulls at it.

@@ -7,13 +7,45 @@ use crate::pipeline::image_terms::{EdgeSettings, Smoothing};
 use crate::pipeline::marks::Seed;
 use crate::pipeline::motion::Motion;
 
+/// What the image shows at the border of the objects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageModel {
+    /// Found for each object.
+    Auto,
+    /// Inside and outside differ in brightness.
+    Level,
+    /// A bright or dark sheet runs along the border.
+    Wall,
+    /// The papers' edge detector.
+    Edge,
+    /// Nothing that is to be used.
+    None,
+}
+
+/// Where objects start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// As the shape of their outlines; of a loose cloud between its points.
+    Auto,
+    /// Where a flood from outside ends, as the papers do it.
+    Flood,
+}
+
 /// What the user may set; `None` leaves a length to the image's spacing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SegmentSettings {
     /// Distance method.
     pub method: Method,
+    /// What the image shows.
+    pub image: ImageModel,
+    /// Where objects start.
+    pub start: Start,
     /// How the surface moves.
     pub motion: Motion,
+    /// Weight of the pull towards the marks; found for each object when none.
+    pub theta: Option<f64>,
+    /// Weight of the image; found for each object when none.
+    pub rho: Option<f64>,
     /// Contrast parameter of the edge detector.
     pub k: f64,
     /// Form of the presmoothing.
@@ -36,7 +68,11 @@ impl Default for SegmentSettings {
     fn default() -> Self {
         Self {
             method: Method::VDT,
+            image: ImageModel::Auto,
+            start: Start::Auto,
             motion: Motion::default(),
+            theta: None,
+            rho: None,
             k: 650.0,
             smoothing: Smoothing::Gaussian,
             sigma: None,

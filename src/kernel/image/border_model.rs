@@ -1,0 +1,156 @@
+//! Which border the image shows under the marks, and how well it tells where that is.
+//!
+//! *Level*: inside and outside differ in brightness, and the border runs where the grey value is that under the
+//! outlines. *Wall*: a bright (or dark) sheet runs along the border, which lies on its crest. Told by the profiles at
+//! the marks: a wall stands out from both its flanks, a step from one.
+
+use super::profiles::Profile;
+
+/// What the image shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BorderModel {
+    /// A step of brightness; positive where the inside is brighter.
+    Level,
+    /// The crest of a sheet that is brighter (1) or darker (-1) than what is beside it.
+    Wall(f32),
+    /// Nothing that could be relied on.
+    None,
+}
+
+/// What the profiles at marks say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// What is shown.
+    pub model: BorderModel,
+    /// How far outside of the marks the border lies in the mean, in smallest spacings.
+    pub bias: f64,
+    /// Height of a wall, or difference between inside and outside, in grey values.
+    pub contrast: f64,
+    /// How many times its standard error the mean contrast is.
+    pub significance: f64,
+    /// The mean place of the value under the outlines between outside (0) and inside (1).
+    pub share: f64,
+    /// Profiles that were read.
+    pub profiles: usize,
+}
+
+/// A wall stands out from the higher of its flanks by more than this part of the difference of inside and outside.
+const WALL_OVER_STEP: f64 = 0.3;
+/// Its flanks are so many smallest spacings from its crest, and that so far from the marks at most.
+const WALL_FLANK: f64 = 2.5;
+const FARTHEST_CREST: f64 = 3.5;
+/// A contrast counts from so many standard errors on.
+const SIGNIFICANT: f64 = 4.0;
+/// Marks that run at such a share of the contrast were drawn along that level on purpose; beyond, beside the border.
+pub const ON_LEVEL: [f64; 2] = [0.15, 0.85];
+
+impl Reading {
+    /// Reads the profiles at the marks of one object or of several.
+    #[must_use]
+    pub fn of(profiles: &[Profile]) -> Self {
+        let steps: Vec<f64> = profiles.iter().map(|p| p.inside() - p.outside()).collect();
+        let shared_crest = |sign: f32| median(profiles.iter().map(|p| p.crest(sign)).collect());
+        let ridge = |sign: f32| {
+            let crest = shared_crest(sign);
+            let value = |p: &Profile, place: f64| f64::from(sign) * at(p, place);
+            let mean = |place: f64| profiles.iter().map(|p| value(p, place)).sum::<f64>();
+            let flanks = [crest - WALL_FLANK, crest + WALL_FLANK];
+            let higher = if mean(flanks[0]) > mean(flanks[1]) { flanks[0] } else { flanks[1] };
+            let heights = profiles.iter().map(|p| value(p, crest) - value(p, higher));
+            (crest, heights.collect::<Vec<f64>>())
+        };
+        let (step, step_error) = mean_and_error(&steps);
+        let mut found = Self {
+            model: BorderModel::None,
+            bias: 0.0,
+            contrast: step,
+            significance: step.abs() / step_error,
+            share: 0.5,
+            profiles: profiles.len(),
+        };
+        for sign in [1.0, -1.0] {
+            let (crest, heights) = ridge(sign);
+            let (height, error) = mean_and_error(&heights);
+            let is_wall = height > WALL_OVER_STEP * step.abs() && height > SIGNIFICANT * error;
+            if is_wall && crest.abs() <= FARTHEST_CREST {
+                let significance = height / error;
+                return Self { model: BorderModel::Wall(sign), bias: crest, contrast: height, significance, ..found };
+            }
+        }
+        if found.significance > SIGNIFICANT {
+            found.model = BorderModel::Level;
+            let outside = profiles.iter().map(|p| p.here() - p.outside()).sum::<f64>() / profiles.len() as f64;
+            found.share = outside / step;
+            if !(ON_LEVEL[0]..=ON_LEVEL[1]).contains(&found.share) {
+                found.bias = half_way(profiles);
+            }
+        }
+        found
+    }
+}
+
+/// Where the mean profile is half way between inside and outside, nearest to the border.
+fn half_way(profiles: &[Profile]) -> f64 {
+    use super::profiles::{LEN, REACH, STEP};
+    let mean = |n: usize| profiles.iter().map(|p| f64::from(p.0[n])).sum::<f64>() / profiles.len() as f64;
+    let values: [f64; LEN] = std::array::from_fn(mean);
+    let half = 0.5 * (values[0] + values[LEN - 1]);
+    let crossing = |n: usize| {
+        let (a, b) = (values[n] - half, values[n + 1] - half);
+        (a * b <= 0.0 && a != b).then(|| (n as f64 + a / (a - b) - REACH as f64) * STEP)
+    };
+    (0..LEN - 1).filter_map(crossing).min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+}
+
+/// A profile's value at a place in smallest spacings from the border.
+fn at(profile: &Profile, place: f64) -> f64 {
+    use super::profiles::{LEN, REACH, STEP};
+    let n = (place / STEP + REACH as f64).clamp(0.0, (LEN - 1) as f64);
+    let (low, share) = ((n.floor() as usize).min(LEN - 2), n - n.floor().min((LEN - 2) as f64));
+    let (a, b) = (f64::from(profile.0[low]), f64::from(profile.0[low + 1]));
+    a + share * (b - a)
+}
+
+fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+    // Neighbouring marks see the same noise: as many independent ones as a third of them.
+    (mean, (variance / (count / 3.0).max(1.0)).sqrt().max(1e-9))
+}
+
+/// The middle value; 0 of none.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::profiles::{REACH, STEP};
+    use super::*;
+
+    fn profiles(of: impl Fn(f64, f64) -> f64) -> Vec<Profile> {
+        let profile = |k: usize| {
+            let wobble = ((k * 7919) % 101) as f64 / 101.0 - 0.5;
+            Profile(std::array::from_fn(|n| of((n as f64 - REACH as f64) * STEP, wobble) as f32))
+        };
+        (0..60).map(profile).collect()
+    }
+
+    #[test]
+    fn steps_walls_and_nothing_are_told_apart() {
+        let blurred = |t: f64| 1.0 / (1.0 + (1.8 * t).exp());
+        let level = Reading::of(&profiles(|t, w| blurred(t - 0.3 * w) + 0.1 * w));
+        assert!(level.model == BorderModel::Level && level.bias == 0.0, "{level:?}");
+        let beside = Reading::of(&profiles(|t, w| blurred(t + 2.0 - 0.3 * w)));
+        assert!(beside.model == BorderModel::Level && (beside.bias + 2.0).abs() < 0.2, "{beside:?}");
+        let wall = Reading::of(&profiles(|t, w| (-(t - 1.0 - w).powi(2) / 2.0).exp() + 0.2 * blurred(t)));
+        assert!(wall.model == BorderModel::Wall(1.0) && (wall.bias - 1.0).abs() < 0.2, "{wall:?}");
+        let dark = Reading::of(&profiles(|t, _| 1.0 - (-t * t / 2.0).exp()));
+        assert_eq!(dark.model, BorderModel::Wall(-1.0));
+        let nothing = Reading::of(&profiles(|t, w| 0.5 + (13.0 * t * (1.0 + w)).sin() * w));
+        assert_eq!(nothing.model, BorderModel::None, "{nothing:?}");
+    }
+}

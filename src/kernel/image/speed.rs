@@ -1,0 +1,109 @@
+//! How far the image says that a border is away, and the speed that follows from it and the shape of the outlines.
+//! Dense arrays over a box of voxels; lengths physical, outwards positive.
+
+use crate::grid::Box3;
+
+/// Grey values of voxels, that of the border near them, and how it falls outwards across it per smallest spacing.
+#[derive(Clone, Copy, Debug)]
+pub struct Grey<'a> {
+    /// The smoothed image.
+    pub values: &'a [f32],
+    /// The grey value of the border.
+    pub level: &'a [f32],
+    /// How it falls.
+    pub fall: &'a [f32],
+    /// How it falls in the mean.
+    pub mean_fall: f32,
+}
+
+/// Falls below this part of the mean one count as it.
+const LEAST_FALL: f32 = 0.35;
+
+/// The distance to where the border's grey value is, by Newton's step: `D = (I - T) / fall`, at most `most`; and how
+/// many times less sure that is than in the mean. `h` is the smallest spacing.
+pub fn level_offsets(grey: Grey<'_>, most: f32, h: f32, offsets: &mut [f32], doubts: &mut [f32]) {
+    let least = LEAST_FALL * grey.mean_fall.abs();
+    let sign = grey.mean_fall.signum();
+    for n in 0..offsets.len() {
+        let fall = (sign * grey.fall[n]).max(least);
+        offsets[n] = (sign * (grey.values[n] - grey.level[n]) / fall * h).clamp(-most, most);
+        doubts[n] = (grey.mean_fall.abs() / fall).max(1.0);
+    }
+}
+
+/// Half the width of a wall, in smallest spacings, as it is seen through the smoothing.
+const WALL: f32 = 2.0;
+/// Slopes below this part of the steepest that a wall has are none.
+const FLAT: f32 = 0.12;
+
+/// The distance to the crest of a wall of some height (negative where it is dark), by the slope of the grey values
+/// along the shape's normal: `D = I' s^2 / A` near the crest of `A exp(-t^2 / 2 s^2)`, held at s beyond. The fields,
+/// grey values and signed distance, reach a voxel around the box but for the domain's end.
+pub fn wall_offsets(
+    [grey, shape]: [&[f32]; 2],
+    around: &Box3,
+    part: &Box3,
+    spacing: [f64; 3],
+    height: f32,
+    offsets: &mut [f32],
+) {
+    let h = spacing.iter().copied().fold(f64::INFINITY, f64::min) as f32;
+    let width = WALL * h;
+    let steepest = height.abs() * (-0.5f32).exp() / width;
+    let strides = [1, around.shape()[0] as usize, (around.shape()[0] * around.shape()[1]) as usize];
+    let voxels = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
+    for (offset, voxel) in offsets.iter_mut().zip(voxels) {
+        let at = around.offset_of(voxel);
+        let slope = |field: &[f32], a: usize| {
+            let (down, up) = (usize::from(voxel[a] > around.lo[a]), usize::from(voxel[a] + 1 < around.hi[a]));
+            let by = (down + up).max(1) as f32 * spacing[a] as f32;
+            (field[at + up * strides[a]] - field[at - down * strides[a]]) / by
+        };
+        let normal: [f32; 3] = std::array::from_fn(|a| slope(shape, a));
+        let norm = normal.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
+        let rise = (0..3).map(|a| slope(grey, a) * normal[a]).sum::<f32>() / norm * height.signum();
+        let seen = (rise.abs() / steepest - FLAT).max(0.0) * rise.signum();
+        *offset = (1.5 * width * seen).clamp(-width, width);
+    }
+}
+
+/// What weighs image against shape; `spacing` is the smallest one, deviations are in units of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weights {
+    /// The smallest spacing.
+    pub spacing: f32,
+    /// A factor for the image.
+    pub rho: f32,
+    /// Deviation of the image's border.
+    pub image: f32,
+    /// Deviation of the shape at an outline.
+    pub shape: f32,
+    /// Growth of that with the square of the distance from outlines.
+    pub growth: f32,
+    /// How far outside of the outlines the image's border lies.
+    pub bias: f32,
+}
+
+/// Speeds are lengths over so many smallest spacings.
+const SPAN: f32 = 3.0;
+/// The image counts up to so many deviations from the shape.
+const GATE: f32 = 3.0;
+/// The fastest.
+const FASTEST: f32 = 1.0;
+
+/// The speed outwards at voxels with signed distance `shape` to the shape and `distance` to the outlines.
+pub fn speeds(shape: &[f32], distance: &[f32], offsets: &[f32], doubts: &[f32], by: Weights, out: &mut [f32]) {
+    let h = by.spacing;
+    for n in 0..out.len() {
+        let away = distance[n] / h;
+        let unsure = by.shape.hypot(by.growth * away * away);
+        let image = by.image * doubts[n];
+        let weight = unsure * unsure / (unsure * unsure + image * image);
+        let weight = if weight.is_finite() { weight } else { 0.0 };
+        let off = shape[n] / h - by.bias;
+        let beyond = (off.abs() / (GATE * unsure.hypot(by.image.min(unsure)).max(1.0)) - 1.0).max(0.0);
+        let gate = (-beyond * beyond * 4.0).exp();
+        let pull = by.rho * weight * gate * offsets[n] / h - (1.0 - weight * gate) * off;
+        out[n] = (pull / SPAN).clamp(-FASTEST, FASTEST);
+    }
+}

@@ -1,0 +1,49 @@
+//! Leave one section out: how far its marks lie from the shape of the others tells how sure a shape is between marks.
+
+use super::section::Section;
+use super::shape::Fitted;
+use crate::kernel::vector::{dot, sub};
+
+/// A shape without a section is fitted to so many of those nearest to it.
+const NEAREST: usize = 6;
+
+/// A mark of a section that was left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldOut {
+    /// Where it is.
+    pub mark: [f64; 3],
+    /// Signed distance to the shape of the other sections, positive outside.
+    pub off: f64,
+    /// Distance to the nearest section that was not left out.
+    pub away: f64,
+    /// The shape's outward direction there.
+    pub normal: [f64; 3],
+}
+
+/// What the sections but the n-th say of its marks; none where they tell no shape.
+#[must_use]
+pub fn leave_out(sections: &[&Section], n: usize, least: f64) -> Option<Vec<HeldOut>> {
+    let out = sections[n];
+    let away = |other: &Section| other.marks.iter().map(|&p| nearest(&out.marks, p)).fold(f64::INFINITY, f64::min);
+    let mut others: Vec<(f64, usize)> =
+        (0..sections.len()).filter(|m| *m != n).map(|m| (away(sections[m]), m)).collect();
+    others.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    others.truncate(NEAREST);
+    others.sort_by_key(|(_, m)| *m);
+    let others: Vec<&Section> = others.into_iter().map(|(_, m)| sections[m]).collect();
+    let fitted = Fitted::new(&others, least)?;
+    let held = |&mark: &[f64; 3]| {
+        let (off, normal) = fitted.distance(mark);
+        let away = others.iter().map(|other| nearest(&other.marks, mark)).fold(f64::INFINITY, f64::min);
+        HeldOut { mark, off, away, normal }
+    };
+    Some(out.marks.iter().map(held).collect())
+}
+
+fn nearest(points: &[[f64; 3]], to: [f64; 3]) -> f64 {
+    let squares = points.iter().map(|&p| {
+        let by = sub(p, to);
+        dot(by, by)
+    });
+    squares.fold(f64::INFINITY, f64::min).sqrt()
+}

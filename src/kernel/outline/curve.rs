@@ -1,0 +1,145 @@
+//! A smooth closed curve through noisy marks: universal kriging along the curve (Rasmussen & Williams 2006, eq. 2.41;
+//! Wahba 1990), each coordinate for itself.
+//!
+//! With the share t of the way around, `q(t) = b0 + b1 cos 2 pi t + b2 sin 2 pi t + f(t)`: an ellipse, which costs
+//! nothing, and a Gaussian process f with covariance
+//!
+//! ```text
+//! A^2 r^2 sum over k from 2 of 2 cos(2 pi k (t - t')) / (k^2 - 1)^2
+//! ```
+//!
+//! r is the outline's radius, so A is a number for shapes of all sizes. Marks carry white noise of variance sigma^2.
+//! In: marks in the plane, in order. Out: points on the curve, and how sure they are.
+
+use nalgebra::{DMatrix, DVector};
+
+/// The highest number of waves around a curve.
+const MOST_WAVES: usize = 40;
+/// Outlines of more marks were drawn freehand: their marks are the curve.
+pub const MOST_MARKS: usize = 128;
+
+/// How marks scatter around an outline, and how much outlines deviate from ellipses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scatter {
+    /// Standard deviation of a mark along each coordinate, a length.
+    pub sigma: f64,
+    /// Amplitude A of the deviation from an ellipse, of the radius.
+    pub amplitude: f64,
+}
+
+/// The marks of an outline with their places along it.
+pub(crate) struct Marked {
+    /// Shares of the way around.
+    pub(crate) places: Vec<f64>,
+    /// The two coordinates, columns of n rows.
+    pub(crate) values: DMatrix<f64>,
+    /// Radius of the circle with the same area.
+    pub(crate) radius: f64,
+}
+
+impl Marked {
+    pub(crate) fn new(marks: &[[f64; 2]]) -> Self {
+        let lengths: Vec<f64> = (0..marks.len()).map(|n| distance(marks[n], marks[(n + 1) % marks.len()])).collect();
+        let whole: f64 = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let mut place = 0.0;
+        let places = lengths.iter().map(|length| {
+            let here = place / whole;
+            place += length;
+            here
+        });
+        let places = places.collect();
+        let values = DMatrix::from_fn(marks.len(), 2, |n, a| marks[n][a]);
+        Self { places, values, radius: (area(marks).abs() / std::f64::consts::PI).sqrt() }
+    }
+
+    /// Covariances without noise for an amplitude of 1 of the radius.
+    pub(crate) fn covariance(&self) -> DMatrix<f64> {
+        let n = self.places.len();
+        DMatrix::from_fn(n, n, |i, j| self.radius * self.radius * wave_sum(self.places[i] - self.places[j]))
+    }
+
+    /// What an ellipse is made of, at each mark.
+    pub(crate) fn ellipse(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.places.len(), 3, |n, m| basis(self.places[n])[m])
+    }
+}
+
+fn basis(t: f64) -> [f64; 3] {
+    let (sin, cos) = (std::f64::consts::TAU * t).sin_cos();
+    [1.0, cos, sin]
+}
+
+/// `sum over k from 2 of 2 cos(2 pi k t) / (k^2 - 1)^2`.
+fn wave_sum(t: f64) -> f64 {
+    let cos = (std::f64::consts::TAU * t).cos();
+    // Chebyshev's recurrence gives the cosines of multiples.
+    let (mut before, mut now, mut sum) = (1.0, cos, 0.0);
+    for k in 2..=MOST_WAVES {
+        (before, now) = (now, 2.0 * cos * now - before);
+        let weight = (k * k - 1) as f64;
+        sum += 2.0 * now / (weight * weight);
+    }
+    sum
+}
+
+/// A closed curve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Points along it, closed from the last to the first.
+    pub points: Vec<[f64; 2]>,
+    /// Standard deviation of its points, a length.
+    pub deviation: f64,
+}
+
+impl Curve {
+    /// The curve through marks, with points no more than about `step` apart.
+    #[must_use]
+    pub fn through(marks: &[[f64; 2]], scatter: Scatter, step: f64) -> Self {
+        let polygon = || Self { points: marks.to_vec(), deviation: scatter.sigma };
+        if !(4..=MOST_MARKS).contains(&marks.len()) {
+            return polygon();
+        }
+        let marked = Marked::new(marks);
+        if marked.radius <= scatter.sigma {
+            return polygon();
+        }
+        let (n, variance) = (marks.len(), scatter.sigma * scatter.sigma);
+        let shape = marked.covariance() * (scatter.amplitude * scatter.amplitude);
+        let ellipse = marked.ellipse();
+        let mut system = DMatrix::zeros(n + 3, n + 3);
+        system.view_mut((0, 0), (n, n)).copy_from(&shape);
+        (0..n).for_each(|i| system[(i, i)] += variance.max(1e-9 * marked.radius * marked.radius));
+        system.view_mut((0, n), (n, 3)).copy_from(&ellipse);
+        system.view_mut((n, 0), (3, n)).copy_from(&ellipse.transpose());
+        let Some(inverse) = system.try_inverse() else { return polygon() };
+        let mut right = DMatrix::zeros(n + 3, 2);
+        right.view_mut((0, 0), (n, 2)).copy_from(&marked.values);
+        let weights = &inverse * right;
+        // The trace of the smoother tells how many parameters the curve has.
+        let free = n as f64 - variance * inverse.view((0, 0), (n, n)).trace();
+        let length: f64 = (0..n).map(|i| distance(marks[i], marks[(i + 1) % n])).sum();
+        let count = ((length / step).ceil() as usize).clamp(2 * n, 4096);
+        let at = |t: f64| -> [f64; 2] {
+            let scale = marked.radius * marked.radius * scatter.amplitude * scatter.amplitude;
+            let waves = marked.places.iter().map(|place| scale * wave_sum(t - place));
+            let row = DVector::from_iterator(n + 3, waves.chain(basis(t)));
+            std::array::from_fn(|a| row.dot(&weights.column(a)))
+        };
+        let points = (0..count).map(|m| at(m as f64 / count as f64)).collect();
+        Self { points, deviation: scatter.sigma * (free.max(1.0) / n as f64).sqrt().min(1.0) }
+    }
+}
+
+/// Twice-signed area halved: positive for a polygon that runs from the first axis to the second.
+#[must_use]
+pub fn area(polygon: &[[f64; 2]]) -> f64 {
+    let twice = |n: usize| {
+        let (a, b) = (polygon[n], polygon[(n + 1) % polygon.len()]);
+        a[0] * b[1] - a[1] * b[0]
+    };
+    0.5 * (0..polygon.len()).map(twice).sum::<f64>()
+}
+
+pub(crate) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}

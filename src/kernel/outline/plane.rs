@@ -1,0 +1,104 @@
+//! The plane that an outline was drawn in: across an axis where it is flat in one, else through the outline itself.
+
+use crate::kernel::vector::{cross, dot, sub, unit};
+
+/// A plane with coordinates of its own. Lengths are physical.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Its unit normal; the largest component is positive.
+    pub normal: [f64; 3],
+    /// `normal . p` of its points.
+    pub offset: f64,
+    axes: [[f64; 3]; 2],
+}
+
+/// Outlines whose normals differ by less than this angle's cosine are parallel (about half a degree).
+const PARALLEL: f64 = 0.999_96;
+
+impl Plane {
+    fn new(normal: [f64; 3], offset: f64) -> Self {
+        let largest = (0..3).max_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs())).unwrap_or(0);
+        let sign = if normal[largest] < 0.0 { -1.0 } else { 1.0 };
+        let normal = normal.map(|v| sign * v);
+        let mut along = [0.0; 3];
+        along[(largest + 1) % 3] = 1.0;
+        let first = unit(sub(along, normal.map(|v| v * dot(normal, along))));
+        Self { normal, offset: sign * offset, axes: [first, cross(normal, first)] }
+    }
+
+    /// The plane of a closed outline, if it is flat within `tolerance` of an axis' planes (a length for each axis), or
+    /// within the smallest of these of any plane.
+    #[must_use]
+    pub fn of(outline: &[[f64; 3]], tolerance: [f64; 3]) -> Option<Self> {
+        if outline.len() < 3 {
+            return None;
+        }
+        let count = outline.len() as f64;
+        let mean: [f64; 3] = std::array::from_fn(|a| outline.iter().map(|p| p[a]).sum::<f64>() / count);
+        let flat = |axis: &usize| outline.iter().all(|p| (p[*axis] - mean[*axis]).abs() <= 0.5 * tolerance[*axis]);
+        if let Some(axis) = [2, 1, 0].into_iter().find(flat) {
+            return Some(Self::new(std::array::from_fn(|a| if a == axis { 1.0 } else { 0.0 }), mean[axis]));
+        }
+        // Newell's normal: the sum of the areas that the edges span with a point.
+        let area = outline.iter().enumerate().fold([0.0; 3], |sum, (n, &p)| {
+            let by = cross(sub(p, mean), sub(outline[(n + 1) % outline.len()], mean));
+            std::array::from_fn(|a| sum[a] + by[a])
+        });
+        let normal = unit(area);
+        let plane = Self::new(normal, dot(normal, mean));
+        let smallest = tolerance.into_iter().fold(f64::INFINITY, f64::min);
+        let is_flat = normal != [0.0; 3] && outline.iter().all(|&p| plane.height(p).abs() <= smallest);
+        is_flat.then_some(plane)
+    }
+
+    /// How far a point lies from the plane, along its normal.
+    #[must_use]
+    pub fn height(&self, point: [f64; 3]) -> f64 {
+        dot(self.normal, point) - self.offset
+    }
+
+    /// A point's coordinates in the plane.
+    #[must_use]
+    pub fn project(&self, point: [f64; 3]) -> [f64; 2] {
+        self.axes.map(|axis| dot(axis, point))
+    }
+
+    /// The point of the plane with these coordinates, moved by `height` along the normal.
+    #[must_use]
+    pub fn lift(&self, [u, v]: [f64; 2], height: f64) -> [f64; 3] {
+        let along = self.offset + height;
+        std::array::from_fn(|a| u * self.axes[0][a] + v * self.axes[1][a] + along * self.normal[a])
+    }
+
+    /// True where both planes face the same way.
+    #[must_use]
+    pub fn is_parallel_to(&self, other: &Self) -> bool {
+        dot(self.normal, other.normal).abs() > PARALLEL
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_of_axes_and_oblique_ones_keep_their_points() {
+        let circle = |of: &dyn Fn(f64, f64) -> [f64; 3]| -> Vec<[f64; 3]> {
+            (0..12).map(|n| f64::from(n) / 12.0 * std::f64::consts::TAU).map(|t| of(4.0 * t.cos(), 3.0 * t.sin())).collect()
+        };
+        let tolerance = [0.25, 0.25, 0.5];
+        let flat = circle(&|a, b| [a, b, 7.0]);
+        assert_eq!(Plane::of(&flat, tolerance).unwrap().normal, [0.0, 0.0, 1.0]);
+        let (s, c) = 0.5f64.sin_cos();
+        let tilted = circle(&|a, b| [a, c * b + 1.0, s * b - 2.0]);
+        let plane = Plane::of(&tilted, tolerance).unwrap();
+        for &p in &tilted {
+            let there = plane.lift(plane.project(p), plane.height(p));
+            assert!((0..3).all(|a| (there[a] - p[a]).abs() < 1e-12), "{p:?} {there:?}");
+            assert!(plane.height(p).abs() < 1e-12);
+        }
+        assert!(!plane.is_parallel_to(&Plane::of(&flat, tolerance).unwrap()));
+        assert!(Plane::of(&circle(&|a, b| [a, b, a * b]), tolerance).is_none(), "a saddle is no plane");
+        assert!(Plane::of(&[[0.0; 3], [1.0, 1.0, 1.0], [2.0, 2.0, 2.0]], tolerance).is_none(), "a line has none");
+    }
+}

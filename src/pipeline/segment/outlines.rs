@@ -1,0 +1,89 @@
+//! Marks become outlines: contours that lie in a plane and run around something, as smooth curves, by the planes that
+//! they were drawn in.
+
+use crate::grid::Geometry;
+use crate::kernel::outline::crossing::crosses_itself;
+use crate::kernel::outline::curve::{Curve, Scatter};
+use crate::kernel::outline::noise;
+use crate::kernel::outline::plane::Plane;
+use crate::kernel::outline::section::Section;
+use crate::pipeline::marks::ObjectMarks;
+
+/// Marks of a plane lie within this part of the spacing along its normal.
+const FLATNESS: f64 = 0.5;
+/// Points of a curve are at most so many smallest spacings apart.
+const CURVE_STEP: f64 = 0.5;
+/// Planes nearer to each other than this part of the smallest spacing are one.
+const SAME_PLANE: f64 = 0.25;
+
+/// An outline as it was marked.
+struct Drawn<'a> {
+    plane: Plane,
+    marks: &'a [[f64; 3]],
+    in_plane: Vec<[f64; 2]>,
+}
+
+/// The outlines of an object; none where any contour of three marks or more is none.
+fn drawn<'a>(marks: &'a ObjectMarks, image: &Geometry) -> Option<Vec<Drawn<'a>>> {
+    if !marks.drawn {
+        return None;
+    }
+    let tolerance = image.spacing.map(|h| FLATNESS * h);
+    let outline = |marks: &'a Vec<[f64; 3]>| {
+        let plane = Plane::of(marks, tolerance)?;
+        let in_plane = marks.iter().map(|&p| plane.project(p)).collect();
+        Some(Drawn { plane, marks, in_plane })
+    };
+    let found: Vec<Drawn> = marks.contours.iter().filter(|c| c.len() > 2).map(outline).collect::<Option<_>>()?;
+    (!found.is_empty()).then_some(found)
+}
+
+/// How the marks of all objects scatter around their outlines.
+#[must_use]
+pub(super) fn scatter_of(objects: &[ObjectMarks], image: &Geometry) -> Scatter {
+    let outlines = objects.iter().filter_map(|marks| drawn(marks, image)).flatten().map(|outline| outline.in_plane);
+    noise::estimate(&outlines.collect::<Vec<_>>(), image.min_spacing())
+}
+
+/// The sections that an object's outlines bound, by direction and along it; none where its contours are no outlines.
+#[must_use]
+pub(super) fn sections_of(marks: &ObjectMarks, image: &Geometry, scatter: Scatter) -> Option<Vec<Section>> {
+    let mut outlines = drawn(marks, image)?;
+    outlines.sort_by(|a, b| {
+        let key = |d: &Drawn| (d.plane.normal.map(|v| -v), d.plane.offset);
+        let ((a, at_a), (b, at_b)) = (key(a), key(b));
+        a.iter().zip(&b).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(at_a.total_cmp(&at_b))
+    });
+    let step = CURVE_STEP * image.min_spacing();
+    let same = SAME_PLANE * image.min_spacing();
+    let shared = |a: &Drawn, b: &Drawn| {
+        a.plane.is_parallel_to(&b.plane) && (a.plane.offset - b.plane.offset).abs() <= same
+    };
+    let section = |group: &[Drawn]| {
+        let curves = group.iter().map(|outline| Curve::through(&outline.in_plane, scatter, step)).collect();
+        let marks = group.iter().flat_map(|outline| outline.marks).copied().collect();
+        Section::new(group[0].plane, curves, marks)
+    };
+    Some(outlines.chunk_by(shared).map(section).collect())
+}
+
+/// The numbers of an object's contours that cross themselves.
+#[must_use]
+pub fn crossed(marks: &ObjectMarks, image: &Geometry) -> Vec<i64> {
+    let tolerance = image.spacing.map(|h| FLATNESS * h);
+    let crosses = |contour: &[[f64; 3]]| {
+        let plane = Plane::of(contour, tolerance)?;
+        Some(crosses_itself(&contour.iter().map(|&p| plane.project(p)).collect::<Vec<_>>()))
+    };
+    let numbered = marks.numbers.iter().zip(&marks.contours);
+    numbered.filter(|(_, contour)| crosses(contour) == Some(true)).map(|(number, _)| *number).collect()
+}
+
+/// The points of all curves, world positions: the cloud that the outlines stand for.
+#[must_use]
+pub(super) fn cloud(sections: &[Section]) -> Vec<[f64; 3]> {
+    let points = |section: &Section| -> Vec<[f64; 3]> {
+        section.curves.iter().flat_map(|curve| &curve.points).map(|&p| section.plane.lift(p, 0.0)).collect()
+    };
+    sections.iter().flat_map(points).collect()
+}

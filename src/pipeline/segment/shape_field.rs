@@ -1,0 +1,104 @@
+//! The shape of an object's outlines on a grid of its own: signed distance, brick by brick, near its surface.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers, one_wave};
+use crate::grid::{Box3, BrickGrid, BrickId, BrickSet, Geometry};
+use crate::kernel::level_set::CELL;
+use crate::kernel::outline::lattice::Lattice;
+use crate::kernel::outline::section::Section;
+use crate::kernel::outline::shape::{Fitted, Shape};
+use crate::kernel::outline::spread;
+use crate::pipeline::vicinity::voxel_bounds;
+use crate::store::BrickArray;
+
+/// Nodes of the lattice that the function is laid out on, about.
+const NODES: f64 = 60_000.0;
+
+/// A fitted shape on the grid of its box.
+pub(super) struct ShapeField<'a> {
+    /// The grid of the box.
+    pub geometry: Geometry,
+    /// The box in voxels of the image; may reach past it.
+    pub window: Box3,
+    shape: Shape<'a>,
+}
+
+impl<'a> ShapeField<'a> {
+    /// Lays a shape out on a box around its sections that reaches `margin` beyond what it may cover.
+    pub(super) fn new(
+        stage: &Stage<'_>,
+        image: &Geometry,
+        sections: &[&'a Section],
+        fitted: &Fitted,
+        margin: f64,
+    ) -> Result<Self> {
+        let (geometry, window) = box_around(image, sections, fitted, margin);
+        let mut lattice = Lattice::for_box(geometry.shape, geometry.spacing, NODES);
+        let planes: Vec<usize> = (0..lattice.planes()).collect();
+        let of = |point: [f64; 3]| fitted.distance(point).0 as f32;
+        let filled = stage.run(&planes, &Workers::none(), |(), &n| Ok(lattice.plane(n, &geometry, of)))?;
+        lattice.fill(filled);
+        Ok(Self { shape: Shape::new(fitted, geometry.clone(), lattice, sections), geometry, window })
+    }
+
+    /// Fills a box of voxels, dense, with the signed distance.
+    pub(super) fn read(&self, part: &Box3, out: &mut [f32]) {
+        self.shape.read(part, out);
+    }
+
+    /// The cells with voxels within `reach` of the surface.
+    pub(super) fn cells_within(&self, stage: &Stage<'_>, reach: f64) -> Result<Arc<BrickSet>> {
+        let grid = BrickGrid::new(self.geometry.shape, CELL as i64);
+        let ids: Vec<BrickId> = (0..grid.len()).collect();
+        let near = stage.run(&ids, &Workers::new(Vec::new), |values, &id| {
+            let part = grid.brick_box(id);
+            if self.shape.is_beyond(&part, reach) {
+                return Ok(false);
+            }
+            values.resize(part.len(), 0.0);
+            self.read(&part, values);
+            Ok(values.iter().any(|v| f64::from(v.abs()) <= reach))
+        })?;
+        Ok(Arc::new(BrickSet::from_fn(grid, |id| near[id as usize])))
+    }
+
+    /// The signed distance on cells.
+    pub(super) fn on_cells(&self, stage: &Stage<'_>, engine: &Engine, set: &Arc<BrickSet>) -> Result<BrickArray<f32>> {
+        let mut field = BrickArray::with_faces(engine.scratch(), set)?;
+        let grid = *set.grid();
+        for id in (0..grid.len()).filter(|&id| set.slot(id).is_none()) {
+            let corner = grid.brick_box(id).lo;
+            let mut value = [0.0];
+            self.read(&Box3::new(corner, corner.map(|v| v + 1)), &mut value);
+            field.set_absent(id, value[0]);
+        }
+        stage.run(&one_wave(set), &Workers::new(Vec::new), |values, &slot| {
+            let part = grid.brick_box(set.id(slot));
+            values.resize(part.len(), 0.0);
+            self.read(&part, values);
+            field.write(slot, |cell| spread(values, &part, CELL, cell));
+            field.refresh_faces(slot);
+            Ok(())
+        })?;
+        Ok(field)
+    }
+}
+
+/// The grid around sections: their bounds, how far the shape may reach beyond them, and a margin, from a whole cell on.
+fn box_around(image: &Geometry, sections: &[&Section], fitted: &Fitted, margin: f64) -> (Geometry, Box3) {
+    let lifted = |section: &&Section| -> Vec<[f64; 3]> {
+        let beyond = fitted.reach_beyond(sections);
+        let points = section.curves.iter().flat_map(|curve| &curve.points);
+        points.flat_map(|&p| [-beyond, beyond].map(|by| section.plane.lift(p, by))).collect()
+    };
+    let bounds = voxel_bounds(&sections.iter().flat_map(lifted).collect::<Vec<_>>(), image);
+    let cell = CELL as i64;
+    let margin: [i64; 3] = image.spacing.map(|h| (margin / h).ceil() as i64 + 2);
+    let window = Box3 {
+        lo: std::array::from_fn(|a| (bounds.lo[a] - margin[a]).div_euclid(cell) * cell),
+        hi: std::array::from_fn(|a| bounds.hi[a] + margin[a]),
+    };
+    (image.crop(&window), window)
+}

@@ -1,0 +1,170 @@
+//! An object that starts as the shape of its outlines: its band, and the speed at which image and shape move it.
+
+use super::object::{Begun, Forces, Picture, name};
+use super::outlines::cloud;
+use super::settings::{ImageModel, SegmentSettings};
+use super::shape_field::ShapeField;
+use super::speed::{Pulls, speed};
+use super::survey::{Outlined, Trust};
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers, one_wave};
+use crate::grid::{BrickGrid, BrickSet, Geometry, PointBins};
+use crate::kernel::image::border_model::BorderModel;
+use crate::kernel::level_set::CELL;
+use crate::kernel::level_set::start::{self, near_surface};
+use crate::pipeline::band::Band;
+use crate::pipeline::distance::{Sources, cloud_distance};
+use crate::pipeline::image_terms::{EdgeSettings, presmooth};
+use crate::pipeline::intensity::Normalised;
+use crate::pipeline::marks::ObjectMarks;
+use crate::store::{BrickArray, Element};
+use std::sync::Arc;
+
+/// The band reaches so many deviations of the shape from it, and within these bounds of smallest spacings.
+const BAND_DEVIATIONS: f64 = 3.0;
+const BAND: [f64; 2] = [5.0, 16.0];
+
+/// Starts an object from its outlines.
+pub(super) fn begin<T: Element>(
+    engine: &Engine,
+    picture: &Picture<'_, T>,
+    marks: &ObjectMarks,
+    (object, trust): (&Outlined, Trust),
+    settings: &SegmentSettings,
+) -> Result<(Begun, Forces)> {
+    let h = picture.geometry.min_spacing();
+    let sections: Vec<_> = object.sections.iter().collect();
+    let reach = h * band_reach(object, &trust, h);
+    let stage = engine.stage(&name("shape", marks), 0);
+    let field = ShapeField::new(&stage, picture.geometry, &sections, &object.fitted, reach)?;
+    let set = field.cells_within(&stage, reach)?;
+    let shape = field.on_cells(&stage, engine, &set)?;
+    stage.voxels((set.len() * set.grid().brick_len()) as u64);
+    stage.finish();
+    let cloud = cloud(&object.sections);
+    let distance = distance_to(engine, marks, &field.geometry, &cloud, &set, settings)?;
+    let stage = engine.stage(&name("band", marks), 0);
+    let band = start_at(&stage, engine, &shape, &distance, reach as f32, pull_range(&trust, h) as f32)?;
+    stage.finish();
+    let uses_edges = settings.image == ImageModel::Edge;
+    let smoothed = match trust.reading.model {
+        BorderModel::None => None,
+        _ if uses_edges => None,
+        model => Some(smooth(engine, picture, marks, &field, &set, settings, model)?),
+    };
+    let speed = if uses_edges {
+        None
+    } else {
+        let stage = engine.stage(&name("speed", marks), 0);
+        let rho = settings.rho.unwrap_or(1.0);
+        let pulls = Pulls { field: &field, trust, rho, image: smoothed.as_ref(), shape: &shape, distance: &distance };
+        let speed = speed(&stage, engine, object, &pulls)?;
+        stage.finish();
+        Some(speed)
+    };
+    let forces = Forces { theta: theta(&trust, settings), speed };
+    let ShapeField { geometry, window, .. } = field;
+    let begun = Begun { geometry, window, band, distance: Some(distance), cloud_points: cloud.len() as u64, beta: 0.0, hole: None };
+    Ok((begun, forces))
+}
+
+/// How far from the shape the surface may go, in smallest spacings.
+fn band_reach(object: &Outlined, trust: &Trust, h: f64) -> f64 {
+    let offsets = || object.sections.windows(2).filter(|w| w[0].plane.is_parallel_to(&w[1].plane));
+    let gap = offsets().map(|w| (w[1].plane.offset - w[0].plane.offset).abs()).fold(0.0, f64::max);
+    let radius = object.sections.iter().map(|s| s.radius()).fold(0.0, f64::max);
+    let farthest = if gap > 0.0 { 0.5 * gap } else { radius };
+    let unsure = trust.shape.hypot(trust.growth * (farthest / h).powi(2));
+    (BAND_DEVIATIONS * unsure + trust.reading.bias.abs()).clamp(BAND[0], BAND[1])
+}
+
+/// The outlines pull from so far, as they are as sure as that.
+fn pull_range(trust: &Trust, h: f64) -> f64 {
+    trust.shape.max(0.5) * h
+}
+
+/// The weight of the pull towards the outlines: what the image does not take over right beside them.
+fn theta(trust: &Trust, settings: &SegmentSettings) -> f64 {
+    let (shape, image) = (trust.shape.powi(2), trust.image.powi(2));
+    let share = if image.is_finite() { image / (shape + image) } else { 1.0 };
+    if trust.reading.bias == 0.0 { settings.theta.unwrap_or(1.0) * share } else { 0.0 }
+}
+
+fn distance_to(
+    engine: &Engine,
+    marks: &ObjectMarks,
+    geometry: &Geometry,
+    cloud: &[[f64; 3]],
+    set: &Arc<BrickSet>,
+    settings: &SegmentSettings,
+) -> Result<BrickArray<f32>> {
+    let bins = PointBins::new(BrickGrid::new(geometry.shape, CELL as i64), geometry, cloud);
+    let sources = Sources::cloud(geometry, cloud, &bins);
+    let stage = engine.stage(&name("distance", marks), 11 * set.len() as u64);
+    stage.voxels((set.len() * set.grid().brick_len()) as u64);
+    let farthest = geometry.length(geometry.shape);
+    let distance = cloud_distance(&stage, engine, &sources, set, settings.method, farthest as f32)?;
+    stage.finish();
+    Ok(distance)
+}
+
+/// The band around a shape, started at it; the outlines' pull fades beyond `range`: `psi = range (1 - exp(-d / range))`
+/// takes the distance's place.
+fn start_at(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    shape: &BrickArray<f32>,
+    distance: &BrickArray<f32>,
+    reach: f32,
+    range: f32,
+) -> Result<Band> {
+    let set = shape.set();
+    let new = || BrickArray::<f32>::with_faces(engine.scratch(), set);
+    let mut band = Band { u: new()?, distance: new()?, solved: BrickArray::new(engine.scratch(), set)?, voxels: 0 };
+    for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
+        band.u.set_absent(id, start::value(u8::from(shape.absent(id) < 0.0)));
+        band.distance.set_absent(id, range);
+    }
+    let counts = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+        let valid = set.grid().brick_box(set.id(slot)).shape().map(|n| n as usize);
+        let count = shape.read(slot, |shape| {
+            band.u.write(slot, |u| u.iter_mut().zip(shape).for_each(|(u, &s)| *u = start::value(u8::from(s < 0.0))));
+            band.solved.write(slot, |solved| near_surface(shape, set.grid().edge() as usize, valid, reach, solved))
+        });
+        distance.read(slot, |d| {
+            band.distance.write(slot, |out| {
+                out.iter_mut().zip(d).for_each(|(out, d)| *out = range * (1.0 - (-d / range).exp()));
+            });
+        });
+        band.u.refresh_faces(slot);
+        band.distance.refresh_faces(slot);
+        Ok(count)
+    })?;
+    band.voxels = counts.iter().sum();
+    stage.voxels(band.voxels);
+    Ok(band)
+}
+
+/// Widths of the smoothing before levels and walls are looked for, in smallest spacings.
+const LEVEL_SIGMA: f64 = 1.0;
+const WALL_SIGMA: f64 = 1.5;
+
+fn smooth<T: Element>(
+    engine: &Engine,
+    picture: &Picture<'_, T>,
+    marks: &ObjectMarks,
+    field: &ShapeField<'_>,
+    set: &Arc<BrickSet>,
+    settings: &SegmentSettings,
+    model: BorderModel,
+) -> Result<BrickArray<f32>> {
+    let h = field.geometry.min_spacing();
+    let usual = if model == BorderModel::Level { LEVEL_SIGMA } else { WALL_SIGMA };
+    let sigma = settings.sigma.unwrap_or(usual * h);
+    let image = Normalised::new(picture.voxels, picture.range, field.window);
+    let stage = engine.stage(&name("presmoothing", marks), 0);
+    let how = EdgeSettings { smoothing: settings.smoothing, sigma, k: settings.k as f32 };
+    let smoothed = presmooth(&stage, engine, &image, set, field.geometry.spacing, &how)?;
+    stage.finish();
+    Ok(smoothed)
+}

@@ -1,0 +1,224 @@
+//! What the outlines and the image say before anything is solved: which border the image shows under the marks, how
+//! well it tells where that is, and how sure the shape is between the outlines.
+
+use super::object::{Picture, name};
+use super::outlines;
+use crate::error::Result;
+use crate::exec::{Engine, Workers};
+use crate::grid::{Box3, Geometry};
+use crate::kernel::image::border_model::{BorderModel, Reading, median};
+use crate::kernel::image::profiles::{LEN, Profile, REACH, STEP, interpolate};
+use crate::kernel::outline::cross_validation::{HeldOut, leave_out};
+use crate::kernel::outline::curve::Scatter;
+use crate::kernel::outline::section::Section;
+use crate::kernel::outline::shape::Fitted;
+use crate::kernel::vector::{dot, sub};
+use crate::pipeline::intensity::Normalised;
+use crate::pipeline::marks::ObjectMarks;
+use crate::pipeline::smoothing::smoothed;
+use crate::pipeline::vicinity::Vicinity;
+use crate::store::{BoxSource, Element};
+
+/// Points beside outlines lie at least so many smallest spacings away.
+pub(super) const LEAST_BESIDE: f64 = 0.75;
+/// Profiles are taken so many smallest spacings apart, and so many at most for an object.
+const APART: f64 = 1.5;
+const MOST_PROFILES: usize = 3000;
+/// The image is smoothed by so many smallest spacings before profiles are taken.
+const SIGMA: f64 = 1.0;
+/// Sections of an object that are left out in turn, at most.
+const MOST_LEFT_OUT: usize = 8;
+/// With fewer profiles an object is read together with the others.
+const ENOUGH_PROFILES: usize = 36;
+/// How far a shape is off a smallest spacing from the outlines, of it, where nothing could be left out.
+const DEFAULT_GROWTH: f64 = 0.015;
+
+/// An object whose marks are outlines.
+pub(super) struct Outlined {
+    pub sections: Vec<Section>,
+    pub fitted: Fitted,
+    pub profiles: Vec<Sampled>,
+    /// Marks of sections that were left out.
+    pub held_out: Vec<HeldOut>,
+}
+
+/// A profile, and where it was taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sampled {
+    pub point: [f64; 3],
+    /// The section that it belongs to.
+    pub section: usize,
+    pub profile: Profile,
+}
+
+/// What is taken from the image and how far it is trusted; lengths in smallest spacings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Trust {
+    pub reading: Reading,
+    /// Standard deviation of where the image shows the border.
+    pub image: f64,
+    /// Standard deviation of the shape at an outline.
+    pub shape: f64,
+    /// How much that grows with the square of the distance from outlines.
+    pub growth: f64,
+}
+
+impl Outlined {
+    /// Looks at an object; none where its marks are no outlines or tell no shape.
+    pub(super) fn new<T: Element>(
+        engine: &Engine,
+        picture: &Picture<'_, T>,
+        marks: &ObjectMarks,
+        scatter: Scatter,
+        looks: bool,
+    ) -> Result<Option<Self>> {
+        let image = picture.geometry;
+        let Some(sections) = outlines::sections_of(marks, image, scatter) else { return Ok(None) };
+        let all: Vec<&Section> = sections.iter().collect();
+        let least = LEAST_BESIDE * image.min_spacing();
+        let Some(fitted) = Fitted::new(&all, least) else { return Ok(None) };
+        let stage = engine.stage(&name("marks", marks), 0);
+        let every = sections.len().div_ceil(MOST_LEFT_OUT);
+        let left_out: Vec<usize> = (0..sections.len()).step_by(every).filter(|_| sections.len() > 2).collect();
+        let held_out = stage.run(&left_out, &Workers::none(), |(), &n| Ok(leave_out(&all, n, least)))?;
+        stage.finish();
+        let held_out = held_out.into_iter().flatten().flatten().collect();
+        let profiles = if looks { profiles(engine, picture, marks, &sections, &fitted)? } else { Vec::new() };
+        Ok(Some(Self { sections, fitted, profiles, held_out }))
+    }
+
+    fn deviation(&self) -> f64 {
+        let curves = || self.sections.iter().flat_map(|section| &section.curves);
+        curves().map(|curve| curve.deviation).sum::<f64>() / curves().count().max(1) as f64
+    }
+}
+
+/// Grey values along the normals of the shape at points of its outlines.
+fn profiles<T: Element>(
+    engine: &Engine,
+    picture: &Picture<'_, T>,
+    marks: &ObjectMarks,
+    sections: &[Section],
+    fitted: &Fitted,
+) -> Result<Vec<Sampled>> {
+    let h = picture.geometry.min_spacing();
+    let mut places: Vec<(usize, [f64; 3])> = Vec::new();
+    for (number, section) in sections.iter().enumerate() {
+        for curve in &section.curves {
+            // Points of a curve are about half a spacing apart.
+            let every = ((APART / 0.5) as usize).min(curve.points.len() / 6).max(1);
+            places.extend(curve.points.iter().step_by(every).map(|&p| (number, section.plane.lift(p, 0.0))));
+        }
+    }
+    let every = places.len().div_ceil(MOST_PROFILES).max(1);
+    let places: Vec<(usize, [f64; 3])> = places.into_iter().step_by(every).collect();
+    let points: Vec<[f64; 3]> = places.iter().map(|place| place.1).collect();
+    let Vicinity { geometry, window, cells, .. } =
+        Vicinity::new(picture.geometry, &points, (REACH as f64 * STEP + 1.5) * h);
+    let stage = engine.stage(&name("profiles", marks), 0);
+    let image = Normalised::new(picture.voxels, picture.range, window);
+    let grey = smoothed(&stage, engine, &image, &std::sync::Arc::new(cells), geometry.spacing, [SIGMA * h; 3])?;
+    let found = stage.run(&places, &Workers::new(Vec::new), |values, &(section, point)| {
+        let profile = profile_at(&grey, &geometry, point, fitted.distance(point).1, values)?;
+        Ok(Sampled { point, section, profile })
+    })?;
+    stage.finish();
+    Ok(found)
+}
+
+fn profile_at(
+    grey: &dyn BoxSource<f32>,
+    geometry: &Geometry,
+    point: [f64; 3],
+    normal: [f64; 3],
+    values: &mut Vec<f32>,
+) -> Result<Profile> {
+    let h = geometry.min_spacing();
+    let place = |n: usize| {
+        let by = (n as f64 - REACH as f64) * STEP * h;
+        geometry.to_voxels(std::array::from_fn(|a| point[a] + by * normal[a]))
+    };
+    let (first, last) = (place(0), place(LEN - 1));
+    let part = Box3::new(
+        std::array::from_fn(|a| first[a].min(last[a]).floor() as i64),
+        std::array::from_fn(|a| first[a].max(last[a]).floor() as i64 + 2),
+    );
+    let part = part.intersect(&geometry.domain());
+    values.resize(part.len(), 0.0);
+    grey.read_box(&part, values)?;
+    Ok(Profile(std::array::from_fn(|n| interpolate(values, &part, place(n)))))
+}
+
+/// How far each object's image and shape are trusted.
+pub(super) fn trust(objects: &[Option<Outlined>], image: &Geometry, scatter: Scatter) -> Vec<Option<Trust>> {
+    let h = image.min_spacing();
+    let all: Vec<Profile> = objects.iter().flatten().flat_map(|o| &o.profiles).map(|s| s.profile).collect();
+    let growth = h * growth(objects.iter().flatten().flat_map(|o| &o.held_out), scatter).unwrap_or(DEFAULT_GROWTH / h);
+    let trust = |object: &Outlined| {
+        let own: Vec<Profile> = object.profiles.iter().map(|s| s.profile).collect();
+        let reading = Reading::of(if own.len() < ENOUGH_PROFILES { &all } else { &own });
+        Trust {
+            reading,
+            image: image_deviation(&object.profiles, &reading, object.deviation(), h),
+            shape: (object.deviation() / h).hypot(0.2).hypot(reading.bias),
+            growth,
+        }
+    };
+    objects.iter().map(|object| object.as_ref().map(trust)).collect()
+}
+
+/// How the shape's error grows with the square of the distance from outlines: marks that were left out lie that far from it, their own
+/// scatter apart. The worst tenth is left aside.
+fn growth<'a>(held_out: impl Iterator<Item = &'a HeldOut>, scatter: Scatter) -> Option<f64> {
+    let share = |held: &HeldOut| (held.off.powi(2) - scatter.sigma.powi(2)).max(0.0) / held.away.powi(4).max(1e-12);
+    let mut shares: Vec<f64> = held_out.map(share).collect();
+    shares.sort_by(f64::total_cmp);
+    shares.truncate(shares.len() * 9 / 10);
+    (!shares.is_empty()).then(|| (shares.iter().sum::<f64>() / shares.len() as f64).sqrt())
+}
+
+/// Of where the image shows the border beside an outline so much is the outlines' own variance: that of the one, and of
+/// those beside it.
+const OUTLINES_OWN: f64 = 1.5;
+
+/// How well the image tells a border, in smallest spacings: of a step how far a section's own outlines lie from where
+/// the grey values under the others' would put them; of a wall how far its crest is from where it mostly is.
+fn image_deviation(profiles: &[Sampled], reading: &Reading, deviation: f64, h: f64) -> f64 {
+    const LEAST: f64 = 0.3;
+    let apart = |off: f64| (off.powi(2) - OUTLINES_OWN * (deviation / h).powi(2)).max(LEAST.powi(2)).sqrt();
+    match reading.model {
+        BorderModel::None => f64::INFINITY,
+        BorderModel::Wall(sign) => {
+            let off = profiles.iter().map(|s| (s.profile.crest(sign) - reading.bias).abs());
+            apart(1.4826 * median(off.collect()))
+        }
+        BorderModel::Level => {
+            let fall = profiles.iter().map(|s| s.profile.fall()).sum::<f64>() / profiles.len().max(1) as f64;
+            let off = profiles.iter().filter_map(|s| {
+                let grey = grey_of_others(profiles, s, h)?;
+                Some(((s.profile.here() - grey) / fall).clamp(-MOST_OFF, MOST_OFF).powi(2))
+            });
+            let (sum, count) = off.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1));
+            if count == 0 { 1.0 } else { apart((sum / f64::from(count)).sqrt()) }
+        }
+    }
+}
+
+/// The image moves the border by so many smallest spacings at most.
+pub(super) const MOST_OFF: f64 = 3.0;
+/// Grey values are carried over from the nearest outlines; others fade over so many smallest spacings more.
+pub(super) const FADE: f64 = 3.0;
+
+/// The grey value under the border that the outlines of other sections tell for a point.
+fn grey_of_others(profiles: &[Sampled], of: &Sampled, h: f64) -> Option<f64> {
+    let square = |s: &Sampled| {
+        let by = sub(s.point, of.point);
+        dot(by, by)
+    };
+    let others = || profiles.iter().filter(|s| s.section != of.section);
+    let nearest = others().map(square).fold(f64::INFINITY, f64::min);
+    let fade = 2.0 * (FADE * h).powi(2);
+    let weighted = others().map(|s| ((nearest - square(s)) / fade).exp()).zip(others().map(|s| s.profile.here()));
+    let (sum, weights) = weighted.fold((0.0, 0.0), |(sum, all), (w, grey)| (sum + w * grey, all + w));
+    (weights > 0.0).then(|| sum / weights)
+}
