@@ -265,7 +265,8 @@ mod tests {
             for (k, w) in (1_u32..).zip(side) {
                 let k = f64::from(k);
                 let exact = (-0.5 * k * k / (sigma * sigma)).exp() / (sigma * (2.0 * std::f64::consts::PI).sqrt());
-                assert!((f64::from(w) - exact).abs() < 2e-7, "sigma {sigma}, {k}: {w} for {exact}");
+                // What lies beyond four widths, 6e-5, is shared out among the weights.
+                assert!((f64::from(w) / exact - 1.0).abs() < 7e-5, "sigma {sigma}, {k}: {w} for {exact}");
             }
         }
     }
