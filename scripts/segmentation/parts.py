@@ -1,0 +1,105 @@
+"""The three parts of the page: objects, made surfaces, touching cells. Each runs its stacks and returns Markdown."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import foam, scores
+from .marks import kind, mark
+from .report import Table, dice_cell, radial_cell, seconds_cell, share_cell, worst_cell
+from .volume import write_outlines
+
+
+@dataclass
+class Setting:
+    """One run of the script: `methods[name](volume, outlines, folder)` gives an Answer, or None where it cannot do such marks."""
+
+    methods: dict
+    marks: list | None
+    seeds: int
+    scratch: Path
+
+
+def answers(setting, volume, standard):
+    """(marks, method, answer) of all runs on a volume; `standard` are the marks of volumes without marks of their own."""
+    place = setting.scratch / volume.name
+    place.mkdir(parents=True, exist_ok=True)
+    volume.write(place / "stack.tif")
+    names = setting.marks or list(volume.given) or standard
+    for name in names:
+        if name not in volume.given and volume.given:
+            print(f"  {volume.name}: no marks {name}, only {', '.join(volume.given)}", flush=True)
+            continue
+        for seed in range(8, 8 + (1 if name in volume.given else setting.seeds)):
+            outlines = volume.given.get(name) or mark(volume, name, seed)
+            for method, solve in setting.methods.items():
+                folder = place / f"{name}-{seed}" / method.replace(" ", "-")
+                folder.mkdir(parents=True, exist_ok=True)
+                write_outlines(folder / "marks.csv", outlines)
+                answer = solve(volume, outlines, folder)
+                if answer is None:
+                    continue
+                note = f": {answer.note}" if answer.note else ""
+                print(f"  {volume.name} {name} {seed}: {method}, {answer.seconds:.1f} s{note}", flush=True)
+                yield name, method, answer
+
+
+def objects(setting, volumes):
+    """Overlap of each object with the truth."""
+    overlap, seconds = Table("stack", "marks"), Table("stack", "marks")
+    for volume in volumes:
+        for name, method, answer in answers(setting, volume, ["every2", "every4", "every8", "three", "planes"]):
+            overlap.add((volume.name, name), method, scores.dice(volume, answer))
+            seconds.add((volume.name, name), method, answer.seconds)
+    return (
+        "## Objects\n\nDice with the truth, mean over the objects that were solved.\n\n"
+        f"{overlap.markdown(dice_cell)}\n\nThe worst object that was solved:\n\n{overlap.markdown(worst_cell)}\n\n"
+        f"Seconds for all objects:\n\n{seconds.markdown(seconds_cell)}"
+    )
+
+
+def surfaces(setting, volumes):
+    """Radial error of made surfaces."""
+    table = Table("stack")
+    for volume in volumes:
+        for _, method, answer in answers(setting, volume, []):
+            mesh = answer.surfaces.get(1)
+            found = scores.radial(volume.surface, mesh) if mesh is not None and len(mesh[1]) else None
+            table.add((volume.name,), method, found)
+    return (
+        "## Surfaces that are known\n\nWhat the surface found lies beyond the true one along its radius, in voxels: root mean square / "
+        f"mean (positive: outside).\n\n{table.markdown(radial_cell)}"
+    )
+
+
+def touching(setting, volumes):
+    """Walls that cells share."""
+    table = Table("stack", "marks", "figure")
+    for volume in volumes:
+        for name, method, answer in answers(setting, volume, ["three-p14", "every4-p14"]):
+            row = (volume.name, name)
+            empty, wrong, twice = foam.between(volume, answer)
+            table.add((*row, "Dice"), method, (dice_cell, scores.dice(volume, answer)))
+            for label, value in (("no label", empty), ("wrong cell", wrong), ("two objects", twice)):
+                table.add((*row, label), method, (share_cell, value))
+            found = foam.read_contacts(answer.store)
+            if found is not None:
+                error, missed, made_up = foam.contact_error(volume, found)
+                table.add((*row, "contact areas off by"), method, (share_cell, error))
+                table.add((*row, "contacts missed"), method, (seconds_cell, missed))
+                table.add((*row, "contacts made up"), method, (seconds_cell, made_up))
+    return (
+        "## Touching cells\n\nOf the voxels of cells that lie within 3 voxels of a wall between two: without a label, with the label of a "
+        "wrong cell, held by two objects' level sets. Contact areas beside those of the true diagram, differences summed.\n\n"
+        f"{table.markdown(lambda runs: runs[0][0]([value for _, value in runs]))}"
+    )
+
+
+PARTS = {"objects": objects, "surfaces": surfaces, "touching": touching}
+
+
+def checked(names):
+    """Names of marks, each known as a kind or as marks that a stack brings."""
+    for name in names:
+        if name not in ("all", "sixth", "exact"):
+            kind(name)
+    return names
