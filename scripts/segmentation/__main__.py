@@ -12,7 +12,7 @@ from pathlib import Path
 from common import page
 from common.program import Program
 
-from . import foam, made, ours, parts, real
+from . import foam, made, nuclei, ours, parts, real, tissue
 
 TITLE = """# Segmentation compared
 
@@ -24,7 +24,7 @@ Objects from border points where the truth is known: this program, and other way
 """
 # What makes each stack, by part of the page.
 STACKS = {
-    "objects": {"mouse": real.mouse, "embryo": real.embryo},
+    "objects": {"mouse": real.mouse, "nuclei": nuclei.make, "tissue": tissue.make, "embryo": real.embryo},
     "surfaces": made.names(),
     "touching": {"foam": foam.make},
 }
@@ -46,14 +46,21 @@ def arguments():
     parser = argparse.ArgumentParser(prog="scripts/compare_segmentation", description=__doc__)
     parser.add_argument("--only", choices=STACKS, action="append", help="only this part; may be repeated (all)")
     parser.add_argument(
-        "--data", type=comma, help="only these stacks, by name or first word of it: mouse,sphere-wall,lobed,made,foam (all)"
+        "--data",
+        type=comma,
+        help="only these stacks, by name or first word of it: mouse,sphere-wall,lobed,made,foam (all)",
     )
     parser.add_argument(
-        "--marks", type=marks, help="only these marks: every2,every4-p20,three-j1.5,planes,every8+planes (each part's own)"
+        "--marks",
+        type=marks,
+        help="only these marks: every2,every4-p20,three-j1.5,planes,every8+planes (each part's own)",
     )
     parser.add_argument("--seeds", type=int, default=1, metavar="N", help="average over N jitters (1)")
     parser.add_argument(
-        "--ours", action="append", metavar="NAME=FLAGS", help=f"a setting of this program; may be repeated ({', '.join(OURS)})"
+        "--ours",
+        action="append",
+        metavar="NAME=FLAGS",
+        help=f"a setting of this program; may be repeated ({', '.join(OURS)})",
     )
     parser.add_argument("--no-peers", action="store_true", help="this program only")
     parser.add_argument("--peers", type=comma, help="only these other methods, e.g. SDF,RBF (all)")
@@ -61,14 +68,27 @@ def arguments():
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep stacks, marks and stores there")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="threads of this program (1)")
     folder = os.environ.get("STRANDLINE_DATA", page.ROOT.parent / "shared" / "data")
-    parser.add_argument("--folder", type=Path, default=Path(folder), help="test data ($STRANDLINE_DATA, ../shared/data)")
-    parser.add_argument("--out", type=Path, default=page.ROOT / "docs" / "segmentation.md", help="page (docs/segmentation.md)")
+    parser.add_argument(
+        "--folder", type=Path, default=Path(folder), help="test data ($STRANDLINE_DATA, ../shared/data)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=page.ROOT / "docs" / "segmentation.md", help="page (docs/segmentation.md)"
+    )
     return parser.parse_args()
 
 
 def methods(settings, program):
     """What to compare, by name."""
     found = {}
+    if not settings.no_peers:
+        # What peers import takes a second that a quick look does not need.
+        from . import peers
+
+        found = {
+            name: partial(peers.solve, peer)
+            for name, peer in peers.PEERS.items()
+            if name in (settings.peers or peers.PEERS)
+        }
     for text in settings.ours or OURS:
         name, _, flags = text.partition("=")
         found[name] = partial(run_ours, program, f"{flags} --threads {settings.jobs}")
@@ -82,9 +102,7 @@ def run_ours(program, flags, volume, _outlines, folder):
 def chosen(stacks, wanted, part):
     """Names of a part's stacks that were asked for."""
     family = {"surfaces": "made"}.get(part)
-    return [
-        name for name in stacks if not wanted or {name, name.partition("-")[0], family} & set(wanted)
-    ]
+    return [name for name in stacks if not wanted or {name, name.partition("-")[0], family} & set(wanted)]
 
 
 def volumes(settings, part):
@@ -105,7 +123,9 @@ def main():
     if not settings.print and not settings.out.exists():
         settings.out.write_text(TITLE + "\n", encoding="utf-8")
     with tempfile.TemporaryDirectory() as scratch:
-        setting = parts.Setting(methods(settings, program), settings.marks, settings.seeds, settings.keep or Path(scratch))
+        setting = parts.Setting(
+            methods(settings, program), settings.marks, settings.seeds, settings.keep or Path(scratch)
+        )
         for name in settings.only or STACKS:
             if not chosen(STACKS[name], settings.data, name):
                 continue

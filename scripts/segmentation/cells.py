@@ -53,11 +53,11 @@ def positions(shape, spacing):
 
 
 def relaxed(count, voxels, rng, rounds):
-    """Seeds in the box of the voxels, each moved to the middle of its cell `rounds` times."""
+    """Seeds among voxels (any shape, then 3), each moved to the middle of its cell `rounds` times."""
     flat = voxels.reshape(-1, 3)
-    seeds = rng.uniform(flat.min(axis=0), flat.max(axis=0), (count, 3))
     # Some hundred thousand places tell the middles well enough.
     places = flat[rng.choice(len(flat), min(len(flat), 200_000), replace=False)]
+    seeds = places[:count]
     for _ in range(rounds):
         owner = spatial.cKDTree(seeds).query(places)[1]
         size = np.maximum(np.bincount(owner, minlength=count), 1)

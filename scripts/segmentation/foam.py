@@ -8,7 +8,7 @@ from . import cells
 from .optics import blurred, photons
 from .volume import Volume
 
-SHAPE, SEEDS, OBJECTS, WALL = (104, 112, 112), 130, 30, 3.0
+SHAPE, SEEDS, OBJECTS, WALL = (120, 120, 120), 130, 30, 3.0
 # Voxels so near to a wall between two objects are the ones that a gap or an overlap would take.
 BETWEEN = 3.0
 

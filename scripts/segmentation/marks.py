@@ -32,7 +32,9 @@ class Kind:
 
 def kind(name):
     """The kind of that name; ValueError where there is none."""
-    found = re.fullmatch(r"((?:every\d+|three|planes)(?:\+(?:every\d+|three|planes))*)(?:-p(\d+))?(?:-j([\d.]+))?", name)
+    found = re.fullmatch(
+        r"((?:every\d+|three|planes)(?:\+(?:every\d+|three|planes))*)(?:-p(\d+))?(?:-j([\d.]+))?", name
+    )
     if not found:
         raise ValueError(f"marks {name!r}: every2, three or planes, joined by +, then -p20 or -j1.5, were expected")
     where, points, jitter = found.groups()

@@ -39,7 +39,7 @@ def segment(program, volume, folder, flags):
     command = [program.path, "segment", folder.parents[1] / "stack.tif", "--points", folder / "marks.csv", "-o", store]
     command += ["--image-spacing", spacing, "--overwrite", "-q", *shlex.split(flags)]
     started = time.monotonic()
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    done = subprocess.run(list(map(str, command)), check=False, capture_output=True, text=True)
     seconds = time.monotonic() - started
     if done.returncode not in (DONE, SOME):
         note = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]

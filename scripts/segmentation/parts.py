@@ -8,6 +8,8 @@ from .marks import kind, mark
 from .report import Table, dice_cell, radial_cell, seconds_cell, share_cell, worst_cell
 from .volume import write_outlines
 
+STANDARD = ["every2", "every4", "every8", "three", "planes", "every2-p8", "every2-p20", "every2-j1.5"]
+
 
 @dataclass
 class Setting:
@@ -47,7 +49,7 @@ def objects(setting, volumes):
     """Overlap of each object with the truth."""
     overlap, seconds = Table("stack", "marks"), Table("stack", "marks")
     for volume in volumes:
-        for name, method, answer in answers(setting, volume, ["every2", "every4", "every8", "three", "planes"]):
+        for name, method, answer in answers(setting, volume, STANDARD):
             overlap.add((volume.name, name), method, scores.dice(volume, answer))
             seconds.add((volume.name, name), method, answer.seconds)
     return (
@@ -75,7 +77,7 @@ def touching(setting, volumes):
     """Walls that cells share."""
     table = Table("stack", "marks", "figure")
     for volume in volumes:
-        for name, method, answer in answers(setting, volume, ["three-p14", "every4-p14"]):
+        for name, method, answer in answers(setting, volume, ["three-p14", "every4-p14", "every2-p14"]):
             row = (volume.name, name)
             empty, wrong, twice = foam.between(volume, answer)
             table.add((*row, "Dice"), method, (dice_cell, scores.dice(volume, answer)))

@@ -26,5 +26,10 @@ def embryo(folder):
     slices = np.unique([outline.contour for outline in marks])[::6]
     sixth = [outline for outline in marks if outline.contour in slices]
     return Volume(
-        "embryo", tifffile.imread(folder / "stack.tif"), spacing, truth, {1: (1,), 2: (1, 2)}, {"all": marks, "sixth": sixth}
+        "embryo",
+        tifffile.imread(folder / "stack.tif"),
+        spacing,
+        truth,
+        {1: (1,), 2: (1, 2)},
+        {"all": marks, "sixth": sixth},
     )

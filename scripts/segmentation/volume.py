@@ -60,5 +60,5 @@ def write_outlines(path, outlines):
     with open(path, "w", newline="\n", encoding="ascii") as out:
         out.write("object,contour,x,y,z\n")
         for outline in outlines:
-            for x, y, z in outline.points:
-                out.write(f"{outline.object},{outline.contour},{x:.3f},{y:.3f},{z:.3f}\n")
+            start = f"{outline.object},{outline.contour}"
+            out.writelines(f"{start},{x:.3f},{y:.3f},{z:.3f}\n" for x, y, z in outline.points)
