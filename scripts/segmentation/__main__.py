@@ -81,14 +81,12 @@ def methods(settings, program):
     """What to compare, by name."""
     found = {}
     if not settings.no_peers:
-        # What peers import takes a second that a quick look does not need.
+        # What peers import takes seconds that a quick look does not need.
         from . import peers
 
-        found = {
-            name: partial(peers.solve, peer)
-            for name, peer in peers.PEERS.items()
-            if name in (settings.peers or peers.PEERS)
-        }
+        wanted = [name for name in peers.PEERS if not settings.peers or name in settings.peers]
+        peers.load(wanted)
+        found = {name: partial(peers.solve, peers.PEERS[name]) for name in wanted}
     for text in settings.ours or OURS:
         name, _, flags = text.partition("=")
         found[name] = partial(run_ours, program, f"{flags} --threads {settings.jobs}")

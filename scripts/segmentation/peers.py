@@ -172,16 +172,26 @@ def geodesic(image, outlines, box):
     level, feature = (itk.image_from_array(values.astype(np.float32)) for values in images)
     for one in (level, feature):
         one.SetSpacing([float(step) for step in box.spacing])
-    moved = itk.geodesic_active_contour_level_set_image_filter(
-        level,
-        feature_image=feature,
-        propagation_scaling=0.0,
-        curvature_scaling=0.3,
-        advection_scaling=1.0,
-        number_of_iterations=100,
-        maximum_rms_error=0.005,
-    )
-    return itk.array_from_image(moved).astype(float)
+    solver = itk.GeodesicActiveContourLevelSetImageFilter[type(level), type(feature), itk.F].New()
+    solver.SetInput(level)
+    solver.SetFeatureImage(feature)
+    solver.SetPropagationScaling(0.0)
+    solver.SetCurvatureScaling(0.3)
+    solver.SetAdvectionScaling(1.0)
+    solver.SetNumberOfIterations(100)
+    solver.SetMaximumRMSError(0.005)
+    solver.Update()
+    return itk.array_from_image(solver.GetOutput()).astype(float)
+
+
+def load(names):
+    """Loads what ITK loads at first use, which takes it longer than any of these stacks."""
+    for name, part in (
+        ("ITK", "MorphologicalContourInterpolator"),
+        ("geodesic", "GeodesicActiveContourLevelSetImageFilter"),
+    ):
+        if name in names:
+            getattr(itk, part)
 
 
 PEERS = {"SDF": sdf, "ITK": itk_morphological, "RBF": rbf, "random walker": random_walker, "geodesic": geodesic}

@@ -29,8 +29,8 @@ def slices(outlines, grid):
 
 
 def reach(places):
-    """How many slices an object goes on beyond its last outlines: half the way to where the next would have been."""
-    return float(np.diff(places).mean()) / 2 if len(places) > 1 else 0.5
+    """How many slices an object goes on beyond its last outlines: half of those up to where the next would have been."""
+    return (float(np.diff(places).mean()) - 1) / 2 if len(places) > 1 else 0.0
 
 
 def interpolated(outlines, grid):
