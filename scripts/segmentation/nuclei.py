@@ -21,15 +21,17 @@ def make(_folder=None):
     voxels = positions(SHAPE, SPACING)
     truth, signal = np.zeros(SHAPE, dtype=np.uint16), np.zeros(SHAPE)
     brightness = rng.permutation(np.geomspace(DIMMEST, BRIGHTEST, NUCLEI))
-    radii = rng.uniform(6.5, 11.0, NUCLEI)
+    radii = rng.uniform(7.5, 11.0, NUCLEI)
     for number, (centre, radius) in enumerate(zip(places(radii, rng), radii), start=1):
-        inside = body(voxels - centre, radius, rng) & (truth == 0)
+        depth = body(voxels - centre, radius, rng)
+        inside = (depth < 1) & (truth == 0)
         truth[inside] = number
-        texture = np.exp(0.4 * smooth_noise(SHAPE, (0.8, 1.4, 1.4), rng) - 0.08)
+        # Brightest in the middle, as the real ones are.
+        texture = (1.4 - 0.8 * depth**2) * np.exp(0.35 * smooth_noise(SHAPE, (1.0, 1.8, 1.8), rng) - 0.06)
         signal[inside] = brightness[number - 1] * texture[inside]
-    uneven = BACKGROUND * (1 + 0.35 * smooth_noise(SHAPE, (12, 30, 30), rng))
+    uneven = BACKGROUND * (1 + 0.25 * smooth_noise(SHAPE, (12, 30, 30), rng))
     # The cells' own haze around the nuclei.
-    haze = 0.05 * blurred(signal, (4, 8, 8))
+    haze = 0.03 * blurred(signal, (4, 8, 8))
     image = photons(blurred(signal, (1.1, 0.9, 0.9)) + uneven + haze, rng, GAIN, OFFSET)
     return Volume("nuclei", image, SPACING, truth)
 
@@ -48,10 +50,10 @@ def places(radii, rng):
 
 
 def body(away, radius, rng):
-    """An ellipsoid with a few low bumps."""
+    """Distance from the middle of an ellipsoid with a few low bumps, as a share of the way to its surface."""
     axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     local = away @ axes / (radius * rng.uniform(0.8, 1.2, 3))
     distance = np.linalg.norm(local, axis=-1)
     towards = local / np.maximum(distance, 1e-9)[..., None]
     waves, phases = rng.normal(size=(4, 3)) * 2.0, rng.uniform(0, 2 * np.pi, 4)
-    return distance < 1 + 0.05 * np.cos(towards @ waves.T + phases).sum(axis=-1)
+    return distance / (1 + 0.05 * np.cos(towards @ waves.T + phases).sum(axis=-1))

@@ -6,6 +6,7 @@ cannot do such marks. Objects are then painted the larger first, so that a small
 
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import itk
 import numpy as np
@@ -15,6 +16,8 @@ from skimage import measure, segmentation
 from .ours import Answer
 from .polygons import interpolated, reach, slices
 
+# With several threads ITK's contour interpolation damages memory, which ends the script with an abort.
+itk.MultiThreaderBase.SetGlobalDefaultNumberOfThreads(1)
 # Voxels around the marks.
 MARGIN = 8
 # Above this, random walker and RBF take minutes or more memory than a small machine has.
@@ -103,7 +106,7 @@ def itk_morphological(_image, outlines, box):
     return 0.5 - found.astype(float)
 
 
-def rbf(_image, outlines, box):
+def rbf(_image, outlines, box, smoothing=1.0):
     """Radial basis functions r^3: 0 on the marks, a distance beside them in the plane of their outline. Lengths in pixels."""
     points, values = [], []
     for outline in outlines:
@@ -120,8 +123,10 @@ def rbf(_image, outlines, box):
     points, where = np.unique(np.round(np.concatenate(points), 6), axis=0, return_index=True)
     if len(points) * np.prod(box.shape) > LARGEST_RBF:
         return None
-    # Smoothing: marks are jittered.
-    fitted = interpolate.RBFInterpolator(points, np.concatenate(values)[where], kernel="cubic", smoothing=1.0)
+    if np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-3) < 3:
+        # All in one plane: nothing says where the object ends.
+        return np.ones(box.shape)
+    fitted = interpolate.RBFInterpolator(points, np.concatenate(values)[where], kernel="cubic", smoothing=smoothing)
     axes = [box.axis(axis) / box.spacing[0] for axis in (2, 1, 0)]
     places = np.stack(np.meshgrid(*axes, indexing="ij")[::-1], axis=-1)
     return np.concatenate([fitted(plane.reshape(-1, 3)) for plane in places]).reshape(box.shape)
@@ -199,4 +204,12 @@ def load(names):
             getattr(itk, part)
 
 
-PEERS = {"SDF": sdf, "ITK": itk_morphological, "RBF": rbf, "random walker": random_walker, "geodesic": geodesic}
+# RBF twice: all but through the marks, and smoothed as does best where they are jittered and the truth is smooth.
+PEERS = {
+    "SDF": sdf,
+    "ITK": itk_morphological,
+    "RBF": rbf,
+    "RBF smooth": partial(rbf, smoothing=500.0),
+    "random walker": random_walker,
+    "geodesic": geodesic,
+}
