@@ -23,11 +23,9 @@ Objects from border points where the truth is known: this program, and other way
     scripts/compare_segmentation --print --data mouse --marks every4 --no-peers   # a quick look, nothing written
 """
 # What makes each stack, by part of the page.
-STACKS = {
-    "objects": {"mouse": real.mouse, "nuclei": nuclei.make, "tissue": tissue.make, "embryo": real.embryo},
-    "surfaces": made.names(),
-    "touching": {"foam": foam.make},
-}
+OBJECTS = {"mouse": real.mouse, "nuclei": nuclei.make, "tissue": tissue.make, "embryo": real.embryo}
+TOUCHING = {"foam": foam.make}
+STACKS = {"objects": OBJECTS, "surfaces": made.names(), "touching": TOUCHING, "pictures": OBJECTS | TOUCHING}
 OURS = ["default=", "image none=--image none"]
 
 
@@ -119,12 +117,15 @@ def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     program = Program()
     if not settings.print and not settings.out.exists():
+        settings.out.parent.mkdir(parents=True, exist_ok=True)
         settings.out.write_text(TITLE + "\n", encoding="utf-8")
     with tempfile.TemporaryDirectory() as scratch:
-        setting = parts.Setting(
-            methods(settings, program), settings.marks, settings.seeds, settings.keep or Path(scratch)
-        )
-        for name in settings.only or STACKS:
+        place = settings.keep or Path(scratch)
+        pictures = settings.out.parent / "pictures"
+        setting = parts.Setting(methods(settings, program), settings.marks, settings.seeds, place, pictures)
+        # A quick look draws nothing unless it is told to.
+        wanted = settings.only or [name for name in STACKS if name != "pictures" or not settings.print]
+        for name in wanted:
             if not chosen(STACKS[name], settings.data, name):
                 continue
             started = time.monotonic()

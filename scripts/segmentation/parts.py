@@ -1,4 +1,4 @@
-"""The three parts of the page: objects, made surfaces, touching cells. Each runs its stacks and returns Markdown."""
+"""The parts of the page: objects, made surfaces, touching cells, pictures. Each runs its stacks and returns Markdown."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,17 @@ from .volume import write_outlines
 
 STANDARD = ["every2", "every4", "every8", "three", "planes", "every2-p8", "every2-p20", "every2-j1.5"]
 
+STACKS_TOLD = """\
+- `mouse`: 8 nuclei of a mouse embryo, 1 : 1 : 2.18, truth by its authors; no part of this project
+- `nuclei`: 16 nuclei, made to look like those
+- `tissue`: 18 cells with walls that fade and gap, made, 0.35 : 0.35 : 0.8
+- `embryo`: two nested tissues, made, marked on all slices or on every sixth
+
+Marks: `every2` is every second slice of an object, `three` three slices of it, `planes` an xz and a yz plane through its middle; 12 points a
+contour (`-p8`: 8) with jitter of half a voxel (`-j1.5`: 1.5). Other ways from the same marks: `SDF`, outlines interpolated by signed distances;
+`ITK`, morphological contour interpolation; `RBF`, r^3 through points beside the outlines too, and smoothed; `random walker` (scikit-image) and
+`geodesic` (ITK's active contour), which look at the image from what SDF gives. Empty: such marks are not for that way."""
+
 
 @dataclass
 class Setting:
@@ -19,6 +30,7 @@ class Setting:
     marks: list | None
     seeds: int
     scratch: Path
+    pictures: Path | None = None
 
 
 def answers(setting, volume, standard):
@@ -53,7 +65,7 @@ def objects(setting, volumes):
             overlap.add((volume.name, name), method, scores.dice(volume, answer))
             seconds.add((volume.name, name), method, answer.seconds)
     return (
-        "## Objects\n\nDice with the truth, mean over the objects that were solved.\n\n"
+        f"## Objects\n\n{STACKS_TOLD}\n\nDice with the truth, mean over the objects that were solved:\n\n"
         f"{overlap.markdown(dice_cell)}\n\nThe worst object that was solved:\n\n{overlap.markdown(worst_cell)}\n\n"
         f"Seconds for all objects:\n\n{seconds.markdown(seconds_cell)}"
     )
@@ -96,7 +108,36 @@ def touching(setting, volumes):
     )
 
 
-PARTS = {"objects": objects, "surfaces": surfaces, "touching": touching}
+# What is drawn: stack, marks, the object's number.
+SHOWN = (
+    ("mouse", "every4", 5),
+    ("nuclei", "three", 3),
+    ("tissue", "every4", 9),
+    ("embryo", "sixth", 2),
+    ("foam", "three-p14", 15),
+)
+
+
+def drawn(setting, volumes):
+    """Pictures of a few objects: truth, marks, the first setting of this program, and interpolation of outlines."""
+    # Only here: what draws takes a second to load.
+    from . import pictures
+
+    shown, lines = {name: (marks, number) for name, marks, number in SHOWN}, []
+    ours = next(name for name, solve in setting.methods.items() if solve.func.__module__ != "segmentation.peers")
+    names = [ours, *(name for name in ("SDF",) if name in setting.methods)]
+    for volume in volumes:
+        marks, number = shown[volume.name]
+        only = Setting({name: setting.methods[name] for name in names}, [marks], 1, setting.scratch)
+        answered = {method: answer for _, method, answer in answers(only, volume, [])}
+        path = setting.pictures / f"segmentation-{volume.name}.png"
+        outlines = volume.given.get(marks) or mark(volume, marks, 8)
+        pictures.draw(path, volume, number, outlines, answered)
+        lines.append(f"`{volume.name}`, marks `{marks}`, object {number}:\n\n![{volume.name}](pictures/{path.name})")
+    return "## Pictures\n\nThree planes through the middle of an object.\n\n" + "\n\n".join(lines)
+
+
+PARTS = {"objects": objects, "surfaces": surfaces, "touching": touching, "pictures": drawn}
 
 
 def checked(names):
