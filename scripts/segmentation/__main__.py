@@ -1,4 +1,4 @@
-"""scripts/compare_segmentation: objects from border points by this program and by others, beside the truth, into docs/segmentation.md."""
+"""scripts/compare_segmentation: objects from border points by this program and by others, into docs/segmentation.md."""
 
 import argparse
 import os

@@ -1,4 +1,4 @@
-"""`foam`: 30 touching cells in a box of more, walls bright, each cell marked by three outlines; how well they share their walls."""
+"""`foam`: 30 touching cells in a box of more, walls bright; how well results share the walls between cells."""
 
 import csv
 
@@ -25,7 +25,7 @@ def make(_folder=None):
 
 
 def between(volume, answer):
-    """Shares of the voxels between cells: without a label, with a wrong one, claimed by two objects (None: cannot be told)."""
+    """Shares of the voxels between cells: without a label, with a wrong one, held by two objects (None: unknown)."""
     near = (volume.truth > 0) & (volume.cells.shared <= BETWEEN)
     labels, truth = answer.labels[near], volume.truth[near]
     empty, wrong = np.mean(labels == 0), np.mean((labels > 0) & (labels != truth))
@@ -33,7 +33,7 @@ def between(volume, answer):
 
 
 def contact_error(volume, found):
-    """Areas found against the true ones, over contacts of a size: sum of differences by sum of areas, count of missed, of made up."""
+    """Sum of the differences of areas by the sum of areas; how many contacts of a size were missed; how many made up."""
     true = volume.cells.contacts()
     difference = sum(abs(found.get(pair, 0.0) - area) for pair, area in true.items())
     difference += sum(area for pair, area in found.items() if pair not in true)
@@ -43,7 +43,7 @@ def contact_error(volume, found):
 
 
 def read_contacts(store):
-    """Areas by pair of objects from the store's contacts CSV (two columns of numbers of objects, one named after area), or None."""
+    """Areas by pair of objects, or None: from the store's contacts CSV, two objects first, a column with `area` in its name."""
     paths = sorted(store.rglob("*contact*.csv")) if store else []
     if not paths:
         return None

@@ -1,7 +1,7 @@
 """Made stacks of one body whose surface is known exactly: a sphere and a lobed body, seen in eight ways.
 
-The surface is a radius by direction. Walls are bright shells 3 voxels thick with the surface in their middle; blobs are brighter inside
-than outside. Marks are exact, 20 a contour on every fifth slice; in the `-outside` stacks they lie two voxels outside.
+The surface is a radius by direction. Walls are bright shells 3 voxels thick with the surface in their middle; blobs are
+brighter inside than outside. Marks are exact, 20 a contour on every fifth slice; in the `-outside` stacks they lie two voxels outside.
 """
 
 import zlib

@@ -1,6 +1,7 @@
 """Marks from a truth: outlines as a person would click them who knew the answer, on slices and on planes across them.
 
-A kind of marks is written `WHERE[-pN][-jX]`: N points a contour (12), normal jitter of X voxels on both axes of the plane (0.5).
+A kind of marks is written `WHERE[-pN][-jX]`: N points a contour (12), normal jitter of X voxels on both axes of the
+plane (0.5).
 WHERE is one of, or several joined by `+`:
 
     every2, every4, ...   every n-th slice of an object, counted from its first, as scripts/mark_nuclei.py does
@@ -70,7 +71,7 @@ def planes(mask, where):
 
 
 def outline(volume, number, mask, plane, wanted, rng):
-    """One outline. Its number is its slice; planes across slices are numbered on, so that no two of an object share one."""
+    """One outline. Its number is its slice; planes across slices are numbered on: no two of an object share one."""
     across, index = plane
     axes = [axis for axis in (1, 0, 2) if axis != across] if across == 2 else [2, 1 - across]
     loop = outer_contour(mask.take(index, axis=2 - across)) * [volume.spacing[axis] for axis in axes]

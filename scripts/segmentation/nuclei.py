@@ -1,7 +1,7 @@
-"""`nuclei`: a second embryo, made: 16 bright, textured nuclei of differing brightness above an uneven, noisy background.
+"""`nuclei`: a second embryo, made: 16 bright, textured nuclei of differing brightness, uneven, noisy background.
 
-Brightness, texture and noise are those of the mouse embryo that is compared too: background 114 with a deviation of 27, nuclei of 300 to
-1200 with a deviation of half their mean, bright ones bleeding along z. Truth is the body of each nucleus before blur.
+Brightness, texture and noise are near those of the mouse embryo that is compared too: background 114 with a deviation of
+27, nuclei of 300 to 1200 with a deviation of up to half their mean, bright ones bleeding along z. Truth is the body of each nucleus before blur.
 """
 
 import numpy as np

@@ -20,8 +20,8 @@ DONE, NOTHING, SOME = 0, 2, 3
 class Answer:
     """Labels that a method gave.
 
-    `surfaces[n]` are vertices (x, y, z) and triangles of object n; `claims` counts the objects that hold each voxel before labels
-    are dealt out. Either is missing where it cannot be told.
+    `surfaces[n]` are vertices (x, y, z) and triangles of object n; `claims` counts the objects that hold each voxel
+    before labels are dealt out. Either is missing where it cannot be told.
     """
 
     labels: np.ndarray

@@ -24,7 +24,7 @@ contour (`-p8`: 8) with jitter of half a voxel (`-j1.5`: 1.5). Other ways from t
 
 @dataclass
 class Setting:
-    """One run of the script: `methods[name](volume, outlines, folder)` gives an Answer, or None where it cannot do such marks."""
+    """One run of the script: `methods[name](volume, outlines, folder)` gives an Answer, or None for marks it cannot use."""
 
     methods: dict
     marks: list | None
@@ -34,7 +34,7 @@ class Setting:
 
 
 def answers(setting, volume, standard):
-    """(marks, method, answer) of all runs on a volume; `standard` are the marks of volumes without marks of their own."""
+    """(marks, method, answer) of all runs on a volume; `standard` are the marks of volumes without their own."""
     place = setting.scratch / volume.name
     place.mkdir(parents=True, exist_ok=True)
     volume.write(place / "stack.tif")
@@ -59,7 +59,7 @@ def answers(setting, volume, standard):
 
 def objects(setting, volumes):
     """Overlap of each object with the truth."""
-    overlap, seconds = Table("stack", "marks"), Table("stack", "marks")
+    overlap, seconds = (Table(setting.methods, "stack", "marks") for _ in range(2))
     for volume in volumes:
         for name, method, answer in answers(setting, volume, STANDARD):
             overlap.add((volume.name, name), method, scores.dice(volume, answer))
@@ -73,7 +73,7 @@ def objects(setting, volumes):
 
 def surfaces(setting, volumes):
     """Radial error of made surfaces."""
-    table = Table("stack")
+    table = Table(setting.methods, "stack")
     for volume in volumes:
         for _, method, answer in answers(setting, volume, []):
             mesh = answer.surfaces.get(1)
@@ -87,7 +87,7 @@ def surfaces(setting, volumes):
 
 def touching(setting, volumes):
     """Walls that cells share."""
-    table = Table("stack", "marks", "figure")
+    table = Table(setting.methods, "stack", "marks", "figure")
     for volume in volumes:
         for name, method, answer in answers(setting, volume, ["three-p14", "every4-p14", "every2-p14"]):
             row = (volume.name, name)

@@ -1,7 +1,8 @@
 """Other ways from the same marks to an object: interpolation of outlines, and methods that then look at the image.
 
-A peer gets an image and the outlines of one object in a box around them, and gives a field that is negative inside the object; None where it
-cannot do such marks. Objects are then painted the larger first, so that a smaller one keeps what both hold, as this program deals out labels.
+A peer gets an image and the outlines of one object in a box around them, and gives a field that is negative inside the
+object; None where it cannot do such marks. Objects are then painted the larger first, so that a smaller one keeps what
+both hold, as this program deals out labels.
 """
 
 import time
@@ -20,8 +21,8 @@ from .polygons import interpolated, reach, slices
 itk.MultiThreaderBase.SetGlobalDefaultNumberOfThreads(1)
 # Voxels around the marks.
 MARGIN = 8
-# Above this, random walker and RBF take minutes or more memory than a small machine has.
-LARGEST_WALK, LARGEST_RBF = 3_000_000, 20_000_000_000
+# Voxels, and voxels times points, above which random walker and RBF take many minutes or more memory than there may be.
+LARGEST_WALK, LARGEST_RBF = 3_000_000, 6_000_000_000
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def itk_morphological(_image, outlines, box):
 
 
 def rbf(_image, outlines, box, smoothing=1.0):
-    """Radial basis functions r^3: 0 on the marks, a distance beside them in the plane of their outline. Lengths in pixels."""
+    """Radial basis functions r^3: 0 on the marks, a distance beside them in their outline's plane. Lengths in pixels."""
     points, values = [], []
     for outline in outlines:
         axes = [axis for axis in range(3) if axis != outline.across]

@@ -34,7 +34,7 @@ def reach(places):
 
 
 def interpolated(outlines, grid):
-    """Shape interpolation: distances of neighbouring outlines mixed linearly, and the last ones kept as far as `reach` beyond."""
+    """Distances of neighbouring outlines mixed linearly, and the last ones kept as far as `reach` beyond."""
     known = slices(outlines, grid)
     places, planes = np.array(list(known)), np.array(list(known.values()))
     field = np.empty(grid.shape)

@@ -1,4 +1,4 @@
-"""Stacks that were not made here: nuclei of a mouse embryo, and the stand-in for the papers' embryo. Absent ones are None."""
+"""Stacks that are read: nuclei of a mouse embryo, and the stand-in for the papers' embryo. Absent ones are None."""
 
 import numpy as np
 import tifffile

@@ -17,11 +17,10 @@ def mean(values):
 class Table:
     """Cells by row (a tuple of names) and method; each holds one list of figures, of all seeds."""
 
-    def __init__(self, *names):
-        self.names, self.cells, self.methods = names, {}, {}
+    def __init__(self, methods, *names):
+        self.names, self.methods, self.cells = names, list(methods), {}
 
     def add(self, row, method, figures):
-        self.methods[method] = None
         self.cells.setdefault(row, {}).setdefault(method, []).append(figures)
 
     def markdown(self, show):

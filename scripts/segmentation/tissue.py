@@ -1,7 +1,7 @@
-"""`tissue`: a young plant embryo, made: 18 cells in one lobed body, thin bright walls that fade and gap, sections farther apart than pixels.
+"""`tissue`: a young plant embryo, made: 18 cells in one lobed body, thin bright walls that fade and gap.
 
-Grey values are near those of the demo's confocal stack: dark outside, faint cytoplasm, outer walls brighter than inner ones. A cell ends in the
-middle of its walls.
+Sections lie farther apart than pixels. Grey values are near those of the demo's confocal stack: dark outside, faint
+cytoplasm, outer walls brighter than inner ones. A cell ends in the middle of its walls.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What a comparison runs on: a stack, its truth, and the marks that come with it. Triples are x, y, z; arrays z, y, x."""
+"""What a comparison runs on: a stack, its truth, marks that come with it. Triples are x, y, z; arrays z, y, x."""
 
 from dataclasses import dataclass, field
 
@@ -8,7 +8,7 @@ import tifffile
 
 @dataclass(frozen=True)
 class Outline:
-    """Marks of one contour of one object: `points` (n x 3, physical) lie in a plane across axis `across` (0 x, 1 y, 2 z)."""
+    """Marks of one contour of one object: `points` (n x 3, physical) in a plane across axis `across` (0 x, 1 y, 2 z)."""
 
     object: int
     contour: int
