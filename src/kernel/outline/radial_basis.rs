@@ -18,9 +18,10 @@ pub struct RadialBasis {
 }
 
 impl RadialBasis {
-    /// The function with these values at these points; none where they do not tell it, as when all lie in one plane.
+    /// The function with these values at these points, or with `smoothing` (a volume) near to them: that much may be lost
+    /// of a value for each unit of its weight. None where they do not tell it, as when all lie in one plane.
     #[must_use]
-    pub fn through(points: &[[f64; 3]], values: &[f64]) -> Option<Self> {
+    pub fn through(points: &[[f64; 3]], values: &[f64], smoothing: f64) -> Option<Self> {
         let n = points.len();
         if n < 5 {
             return None;
@@ -44,6 +45,8 @@ impl RadialBasis {
                 system[(n + m, j)] = value;
             }
         }
+        let nugget = smoothing * scale.powi(3);
+        (0..n).for_each(|i| system[(i, i)] += nugget);
         let right = DVector::from_fn(n + 4, |i, _| values.get(i).copied().unwrap_or(0.0));
         let solved = system.lu().solve(&right)?;
         // A system without a single solution gives numbers that are no solution.
@@ -54,8 +57,8 @@ impl RadialBasis {
         let linear = std::array::from_fn(|m| solved[n + m]);
         let found = Self { centre, scale, nodes, weights, linear };
         let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        let off = points.iter().zip(values).map(|(&p, v)| (found.value(p).0 - v).abs()).fold(0.0, f64::max);
-        (off <= 1e-3 * largest).then_some(found)
+        let off = |n: usize| (found.value(points[n]).0 + nugget * found.weights[n] - values[n]).abs();
+        ((0..n).all(|n| off(n) <= 1e-3 * largest)).then_some(found)
     }
 
     /// Value and gradient at a point.
@@ -106,12 +109,12 @@ mod tests {
         let points: Vec<[f64; 3]> =
             (0..40).map(|n| { let t = f64::from(n); [(t * 0.7).sin() * 9.0, (t * 1.3).cos() * 7.0, t * 0.4] }).collect();
         let of = |p: [f64; 3]| 2.0 + 0.5 * p[0] - p[1] + 3.0 * p[2];
-        let linear = RadialBasis::through(&points, &points.iter().map(|&p| of(p)).collect::<Vec<_>>()).unwrap();
+        let linear = RadialBasis::through(&points, &points.iter().map(|&p| of(p)).collect::<Vec<_>>(), 0.0).unwrap();
         let (value, gradient) = linear.value([20.0, -11.0, 5.0]);
         assert!((value - of([20.0, -11.0, 5.0])).abs() < 1e-6, "{value}");
         assert!((gradient[2] - 3.0).abs() < 1e-6, "{gradient:?}");
         let bumpy: Vec<f64> = points.iter().map(|p| p[0].sin() + p[2]).collect();
-        let function = RadialBasis::through(&points, &bumpy).unwrap();
+        let function = RadialBasis::through(&points, &bumpy, 0.0).unwrap();
         for (&p, &v) in points.iter().zip(&bumpy) {
             assert!((function.value(p).0 - v).abs() < 1e-8);
         }
@@ -123,6 +126,6 @@ mod tests {
     #[test]
     fn points_of_one_plane_tell_no_function() {
         let flat: Vec<[f64; 3]> = (0..20).map(|n| [f64::from(n % 5), f64::from(n / 5), 1.0]).collect();
-        assert!(RadialBasis::through(&flat, &vec![1.0; 20]).is_none());
+        assert!(RadialBasis::through(&flat, &[1.0; 20], 0.0).is_none());
     }
 }

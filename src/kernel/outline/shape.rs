@@ -87,14 +87,15 @@ fn sampled(sections: &[&Section], least: f64) -> Samples {
     samples
 }
 
-/// Where sections of one direction end: half their widest distance beyond the first and last, or a single one's radius.
+/// Where sections of one direction end, at the latest: their widest distance beyond the first and last, where the next
+/// one would have been marked; of a single one its radius.
 fn parallel_ends(sections: &[&Section]) -> Option<Ends> {
     let (first, last) = (sections.first()?, sections.last()?);
     if !sections.iter().all(|section| section.plane.is_parallel_to(&first.plane)) {
         return None;
     }
     let gap = sections.windows(2).map(|w| w[1].plane.offset - w[0].plane.offset).fold(0.0, f64::max);
-    let height = if gap > 0.0 { 0.5 * gap } else { first.radius() };
+    let height = if gap > 0.0 { gap } else { first.radius() };
     Some(Ends { normal: first.plane.normal, low: first.plane.offset - height, high: last.plane.offset + height })
 }
 
