@@ -8,10 +8,12 @@ use super::distance_args::DistanceJobArgs;
 use super::middle_args::MiddleArgs;
 use super::reconstruct_args::ReconstructArgs;
 use super::values::{
-    Crop, Output, parse_crop, parse_method, parse_pair, parse_seed, parse_size, parse_triple, solvers_help,
+    Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
+    solvers_help,
 };
 use crate::pipeline::distance::Method;
 use crate::pipeline::marks::Seed;
+use crate::pipeline::segment::FillGaps;
 
 /// Finds surfaces in 3-D volumes larger than memory.
 #[derive(Debug, Parser)]
@@ -106,6 +108,10 @@ pub(super) struct ImageArgs {
     /// Which object gets the voxels where several overlap
     #[arg(long, value_enum, default_value_t = OverlapArg::Smaller)]
     pub(super) overlap: OverlapArg,
+    /// Share out gaps between objects along the wall's crest: those up to a width, a length, or as wide as they are
+    /// where objects face each other
+    #[arg(long, value_name = "D|auto", value_parser = parse_fill_gaps, allow_hyphen_values = true)]
+    pub(super) fill_gaps: Option<FillGaps>,
 }
 
 /// How the surface moves.
@@ -263,7 +269,8 @@ pub(super) enum Edge {
 /// Which object gets the voxels where several overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum OverlapArg {
-    /// The one with the smaller volume: nested tissues
+    /// The one with the smaller volume where it lies inside the larger: nested tissues; of neighbours the one that the
+    /// voxel lies deeper in
     Smaller,
     /// The one with the larger volume
     Larger,

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::config::Resources;
 use super::console::Console;
+use super::neighbours_report::{Contact, Neighbours, fill_gaps};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, StageReport, peak_resident};
 use crate::grid::Geometry;
@@ -66,6 +67,8 @@ pub(super) struct Solver {
     caps: bool,
     percentiles: [f64; 2],
     overlap: &'static str,
+    /// A width, `auto`, or null.
+    fill_gaps: serde_json::Value,
     brick: i64,
 }
 
@@ -98,6 +101,8 @@ pub(super) struct Found {
     single: Option<Object>,
     label_voxels: BTreeMap<String, u64>,
     objects: Vec<Object>,
+    neighbours: Neighbours,
+    contacts: Vec<Contact>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -211,6 +216,7 @@ impl Solver {
                 Overlap::First => "first",
                 Overlap::Last => "last",
             },
+            fill_gaps: fill_gaps(settings.fill_gaps),
             brick: settings.brick,
         }
     }
@@ -262,7 +268,8 @@ impl Found {
         let objects: Vec<Object> = outcome.objects.iter().map(|o| Object::new(o, voxels(o.label))).collect();
         let single = if let [only] = objects.as_slice() { Some(only.clone()) } else { None };
         let label_voxels = outcome.objects.iter().map(|o| (o.label.to_string(), voxels(o.label))).collect();
-        Self { single, label_voxels, objects }
+        let contacts = outcome.contacts.iter().map(Contact::new).collect();
+        Self { single, label_voxels, objects, neighbours: Neighbours::new(&outcome.neighbours), contacts }
     }
 }
 

@@ -2,9 +2,13 @@
 
 pub mod downsample;
 pub mod edge_detector;
+pub mod gaps;
+pub mod gaussian;
+pub mod geodesic;
 pub mod grey_range;
 pub mod heat;
 pub mod histogram;
 pub mod labels;
+pub mod nearness;
 pub mod palette;
 pub mod panel;

@@ -3,21 +3,24 @@
 //! ```text
 //! stack -> bricks -> root image        marks -> contours -> cloud, object by object, each in a box of its own
 //! cloud -> distance -> flood -> band   image -> presmoothing -> edge detector      band + edges -> time loop -> u
-//! u -> surface -> mesh, measures       u of all objects -> one label volume
+//! u -> surface -> mesh, measures       u of all objects -> neighbours -> one label volume, common faces
 //! ```
 
 mod check;
 mod estimate;
 mod labels;
+mod neighbours;
 mod object;
 mod output;
 mod reach;
 mod seed;
 mod settings;
+mod tissue;
 
 pub use check::{check_marks, check_seed};
 pub use estimate::{Estimate, estimate};
-pub use labels::Overlap;
+pub use labels::{Overlap, Placed};
+pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_faces, join};
 pub use object::ObjectReport;
 pub use output::{Outcome, segment};
 pub use settings::{Guides, SegmentSettings};

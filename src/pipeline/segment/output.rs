@@ -2,15 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use super::labels::{LabelVolume, Placed};
+use super::labels::Placed;
+use super::neighbours::{Found, Joined};
 use super::object::{ObjectReport, Picture, Solution, solve};
 use super::settings::{Guides, SegmentSettings};
+use super::tissue::{join_objects, write_faces};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, Geometry};
 use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
 use crate::kernel::image::labels;
 use crate::kernel::image::palette::label_color;
+use crate::kernel::surface::Contact;
 use crate::pipeline::ingest::{Image, ingest};
 use crate::pipeline::marks::{ObjectMarks, split_and_seed};
 use crate::pipeline::pyramid::{Reduce, write_levels};
@@ -28,6 +31,10 @@ pub struct Outcome {
     pub objects: Vec<ObjectReport>,
     /// Voxels of each label.
     pub label_voxels: BTreeMap<u32, u64>,
+    /// What was found of neighbours.
+    pub neighbours: Found,
+    /// The common faces of labels, where any meet.
+    pub contacts: Vec<Contact>,
 }
 
 /// Segments the part `crop` of a stack; `store` gets the results, none of them when it is absent.
@@ -78,12 +85,20 @@ fn run<T: Sample>(
         let report = draw(engine, &solution, marks, store, objects.len() > 1)?;
         solved.push((solution, report));
     }
-    let label_voxels = write_labels(engine, guides.geometry, &solved, settings, store)?;
+    let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
+    let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, store)?;
+    let contacts = match solved.len() {
+        0 | 1 => Vec::new(),
+        _ => write_faces(engine, guides.geometry, &joined, settings, store)?,
+    };
+    let neighbours = joined.found.clone();
+    drop(joined);
     if let Some(store) = store {
         write_image(engine, guides.geometry, &image, store)?;
     }
     let objects = solved.into_iter().map(|(_, report)| report).collect();
-    Ok(Outcome { geometry: guides.geometry.clone(), element: T::TYPE, objects, label_voxels })
+    let geometry = guides.geometry.clone();
+    Ok(Outcome { geometry, element: T::TYPE, objects, label_voxels, neighbours, contacts })
 }
 
 /// Extracts, measures and writes an object's surface, and writes its segmentation function.
@@ -124,25 +139,28 @@ fn draw(
     })
 }
 
+/// The objects on the image's grid.
+fn placed(solved: &[(Solution, ObjectReport)]) -> Vec<Placed<'_>> {
+    solved
+        .iter()
+        .map(|(s, report)| Placed { label: report.label, window: s.window, u: &s.u, volume: report.measures.volume })
+        .collect()
+}
+
 fn write_labels(
     engine: &Engine,
     geometry: &Geometry,
+    volume: &Joined<'_>,
     solved: &[(Solution, ObjectReport)],
-    settings: &SegmentSettings,
     store: Option<&StoreWriter>,
 ) -> Result<BTreeMap<u32, u64>> {
-    let placed = solved
-        .iter()
-        .map(|(s, report)| Placed { label: report.label, window: s.window, u: &s.u, volume: report.measures.volume })
-        .collect();
-    let volume = LabelVolume::new(geometry.shape, placed, settings.overlap);
     let stage = engine.stage("write labels", 0);
     stage.voxels(geometry.domain().volume());
     let highest = solved.iter().map(|(_, r)| r.label).max().unwrap_or(0);
     let counts = match highest {
-        0..=0xff => write_labels_as::<u8>(&stage, engine, geometry, &volume, solved, store),
-        0x100..=0xffff => write_labels_as::<u16>(&stage, engine, geometry, &volume, solved, store),
-        _ => write_labels_as::<u32>(&stage, engine, geometry, &volume, solved, store),
+        0..=0xff => write_labels_as::<u8>(&stage, engine, geometry, volume, solved, store),
+        0x100..=0xffff => write_labels_as::<u16>(&stage, engine, geometry, volume, solved, store),
+        _ => write_labels_as::<u32>(&stage, engine, geometry, volume, solved, store),
     }?;
     stage.finish();
     Ok(counts)
@@ -152,7 +170,7 @@ fn write_labels_as<T: Element>(
     stage: &Stage<'_>,
     engine: &Engine,
     geometry: &Geometry,
-    volume: &LabelVolume<'_>,
+    volume: &Joined<'_>,
     solved: &[(Solution, ObjectReport)],
     store: Option<&StoreWriter>,
 ) -> Result<BTreeMap<u32, u64>> {
@@ -172,7 +190,7 @@ fn write_labels_as<T: Element>(
 }
 
 /// Voxels of each label.
-fn count_labels(stage: &Stage<'_>, geometry: &Geometry, volume: &LabelVolume<'_>) -> Result<BTreeMap<u32, u64>> {
+fn count_labels(stage: &Stage<'_>, geometry: &Geometry, volume: &Joined<'_>) -> Result<BTreeMap<u32, u64>> {
     let grid = BrickGrid::new(geometry.shape, 64);
     let parts: Vec<Box3> = (0..grid.len()).map(|id| grid.brick_box(id)).collect();
     let counts = stage.run(&parts, &Workers::new(Vec::new), |labels, part| {

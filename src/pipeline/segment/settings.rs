@@ -1,6 +1,7 @@
 //! Settings of `segment`, and what they are when the user gives none. Lengths are physical.
 
 use super::labels::Overlap;
+use super::neighbours::FillGaps;
 use crate::grid::{Geometry, PointCloud};
 use crate::pipeline::distance::Method;
 use crate::pipeline::image_terms::EdgeSettings;
@@ -26,6 +27,8 @@ pub struct SegmentSettings {
     pub percentiles: [f64; 2],
     /// Which object a voxel belongs to where several overlap.
     pub overlap: Overlap,
+    /// How wide a gap between objects is filled; none leaves them.
+    pub fill_gaps: Option<FillGaps>,
     /// Edge of the bricks that hold the image.
     pub brick: i64,
 }
@@ -41,6 +44,7 @@ impl Default for SegmentSettings {
             caps: true,
             percentiles: [0.1, 99.9],
             overlap: Overlap::Smaller,
+            fill_gaps: None,
             brick: 64,
         }
     }
