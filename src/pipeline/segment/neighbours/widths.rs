@@ -1,9 +1,10 @@
 //! How wide gaps between neighbours are: the width that `--fill-gaps auto` fills up to.
 //!
 //! From every voxel at the surface of an object the nearest other object is looked for; most of what faces a neighbour
-//! across a wall finds it one wall away, however the cells are placed. Twice the upper quartile of these widths takes in
-//! the walls where objects fell short, and the hollows where three or four walls meet: a ball between three cells at
-//! 120 degrees is 1.15 walls wide, between four 1.22, before their edges are rounded off by the solution.
+//! across a wall finds it one wall away, however the cells are placed. Three times the upper quartile of these widths takes
+//! in the walls where objects fell short, and the hollows where three or four walls meet: a ball between three cells at
+//! 120 degrees is 1.15 walls wide, between four 1.22, and more by what the solution rounds off their edges. In a foam with
+//! walls of three voxels twice the quartile left 57 voxels of hollows in 326 000, three times 20 and four times one.
 
 use super::fields::{Roots, near_two};
 use super::survey::Survey;
@@ -16,7 +17,7 @@ use crate::kernel::image::gaps::{BINS, Gaps};
 const REACH: [f64; 2] = [12.0, 6.0];
 /// The part of all widths that are not larger than the one that is taken, and how many times that is filled.
 const QUANTILE: f64 = 0.75;
-const TIMES: f64 = 2.0;
+const TIMES: f64 = 3.0;
 
 /// The width to fill up to; 0 where no two objects face each other.
 pub(super) fn width(
