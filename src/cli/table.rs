@@ -56,7 +56,27 @@ pub(super) fn objects(outcome: &Outcome) -> String {
             object.evolution.stopped_by.into(),
         ]);
     }
-    format!("{}\n{}(lengths, areas and volumes in {unit}, squared and cubed)\n", aligned(&surfaces), aligned(&solver))
+    let neighbours = neighbours(outcome);
+    format!(
+        "{}\n{}{neighbours}(lengths, areas and volumes in {unit}, squared and cubed)\n",
+        aligned(&surfaces),
+        aligned(&solver)
+    )
+}
+
+/// What neighbours claimed together, and the gaps between them; nothing of a single object.
+fn neighbours(outcome: &Outcome) -> String {
+    if outcome.objects.len() < 2 {
+        return String::new();
+    }
+    let found = &outcome.neighbours;
+    let contacts = outcome.contacts.iter().filter(|contact| contact.labels[0] > 0).count();
+    let mut text = format!("\n{} voxels claimed by several neighbours, {contacts} contacts", grouped(found.contested));
+    if let Some(width) = found.gap_width {
+        let (filled, moved) = (grouped(found.filled), grouped(found.moved));
+        let _ = write!(text, "; gaps up to {}: {filled} voxels, {moved} moved", number(width));
+    }
+    text + "\n"
 }
 
 /// Columns two blanks apart: the first flush left, the others flush right.

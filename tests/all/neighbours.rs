@@ -171,8 +171,10 @@ fn neighbours_share_an_overlap_evenly_and_nested_objects_keep_theirs() {
         assert_eq!(label, expected, "{v:?}");
     }
     // What is equally deep in both goes to the lower label.
-    let middle = scene.voxels().zip(&tissue.labels).filter(|(v, _)| left(*v) && right(*v) && v[0] == 27.0);
-    assert!(middle.clone().count() > 20 && middle.clone().all(|(_, label)| *label == 1));
+    let is_middle = |v: [f64; 3]| left(v) && right(v) && v[0] == 27.0;
+    let middle: Vec<u32> =
+        scene.voxels().zip(&tissue.labels).filter(|(v, _)| is_middle(*v)).map(|(_, label)| *label).collect();
+    assert!(middle.len() > 20 && middle.iter().all(|label| *label == 1));
     tissue.check_closed();
     let last = scene.join(How { overlap: Overlap::Last, ..PLAIN });
     assert!(scene.voxels().zip(&last.labels).all(|(v, label)| !right(v) || *label == 2), "the user's word");
@@ -215,8 +217,14 @@ fn scene_voxels(shape: [i64; 3]) -> impl Iterator<Item = [f64; 3]> {
 }
 
 /// Places of cells, none near a plane between others.
-const CELLS: [[f64; 3]; 6] =
-    [[14.2, 15.7, 16.1], [35.1, 13.4, 20.3], [20.3, 36.2, 15.2], [36.4, 33.7, 28.8], [15.8, 25.1, 36.9], [31.2, 15.6, 38.4]];
+const CELLS: [[f64; 3]; 6] = [
+    [14.2, 15.7, 16.1],
+    [35.1, 13.4, 20.3],
+    [20.3, 36.2, 15.2],
+    [36.4, 33.7, 28.8],
+    [15.8, 25.1, 36.9],
+    [31.2, 15.6, 38.4],
+];
 const MIDDLE: [f64; 3] = [24.0; 3];
 const RADIUS: f64 = 20.0;
 
@@ -254,9 +262,7 @@ fn true_area(a: usize, b: usize) -> f64 {
 
 #[test]
 fn a_foam_becomes_cells_with_common_faces_to_the_same_bits() {
-    let holds = |n: usize| {
-        move |v: [f64; 3]| distance(v, MIDDLE) < RADIUS && nearest(v).0 == n && nearest(v).1 > 1.5
-    };
+    let holds = |n: usize| move |v: [f64; 3]| distance(v, MIDDLE) < RADIUS && nearest(v).0 == n && nearest(v).1 > 1.5;
     let cells: Vec<_> = (0..6).map(holds).collect();
     let objects = cells.iter().enumerate().map(|(n, cell)| (n as u32 + 1, cell as &dyn Fn([f64; 3]) -> bool)).collect();
     let shape = [49; 3];
@@ -283,10 +289,7 @@ fn a_foam_becomes_cells_with_common_faces_to_the_same_bits() {
     let ball = 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
     let outside: f64 = tissue.contacts.iter().filter(|c| c.labels[0] == 0).map(|contact| contact.area).sum();
     assert!((outside / ball - 1.0).abs() < 0.05, "{outside} of {ball}");
-    for other in [
-        How { brick: 32, threads: 1, ..how },
-        How { brick: 64, threads: 3, window: 1 << 20, ..how },
-    ] {
+    for other in [How { brick: 32, threads: 1, ..how }, How { brick: 64, threads: 3, window: 1 << 20, ..how }] {
         let again = scene.join(other);
         assert!(again == tissue, "brick {} threads {}", other.brick, other.threads);
     }

@@ -1,12 +1,10 @@
-//! A Gaussian of one voxel along each axis on one dense box, cut at three voxels: one pass along each axis.
+//! A Gaussian of up to one voxel along each axis on one dense box, cut at three voxels: one pass along each axis.
 //!
 //! In: values over a box that reaches [`RADIUS`] voxels around the part that is wanted. The part's values do not depend
 //! on the box otherwise: every sum has the same terms in the same order.
 
 use crate::grid::Box3;
 
-/// Width, voxels.
-pub const SIGMA: f64 = 1.0;
 /// How far it reaches, voxels.
 pub const RADIUS: i64 = 3;
 
@@ -18,16 +16,16 @@ pub struct Gaussian {
     passes: [Vec<f32>; 2],
 }
 
-impl Default for Gaussian {
-    fn default() -> Self {
-        let value = |n: usize| (-0.5 * (n as f64 / SIGMA).powi(2)).exp();
+impl Gaussian {
+    /// A Gaussian of a width in voxels.
+    #[must_use]
+    pub fn new(sigma: f64) -> Self {
+        let value = |n: usize| (-0.5 * (n as f64 / sigma).powi(2)).exp();
         let sum: f64 = value(0) + 2.0 * (1..=RADIUS as usize).map(value).sum::<f64>();
         let weight = |n: usize| value(n) / sum * if n == 0 { 0.5 } else { 1.0 };
         Self { weights: std::array::from_fn(|n| weight(n) as f32), passes: Default::default() }
     }
-}
 
-impl Gaussian {
     /// Fills `out` with the smoothed values on `part`; `values` are dense over `around`.
     pub fn smooth(&mut self, values: impl Iterator<Item = f32>, around: &Box3, part: &Box3, out: &mut Vec<f32>) {
         let [first, second] = &mut self.passes;
@@ -74,14 +72,14 @@ mod tests {
         let around = part.grow(RADIUS);
         let voxels = || around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
         let mut out = Vec::new();
-        Gaussian::default().smooth(voxels().map(|v| f32::from(u8::from(v == [5, 5, 6]))), &around, &part, &mut out);
+        Gaussian::new(1.0).smooth(voxels().map(|v| f32::from(u8::from(v == [5, 5, 6]))), &around, &part, &mut out);
         let at = |v| f64::from(out[part.offset_of(v)]);
         let middle = at([5, 5, 6]);
         for (voxel, squared) in [([6, 5, 6], 1.0), ([5, 4, 6], 1.0), ([5, 5, 8], 4.0), ([4, 6, 7], 3.0)] {
             assert!((at(voxel) / middle - (-0.5 * squared as f64).exp()).abs() < 1e-6, "{voxel:?}");
         }
         assert_eq!(at([5, 7, 4]), at([5, 3, 8]));
-        Gaussian::default().smooth(voxels().map(|_| 0.75), &around, &part, &mut out);
+        Gaussian::new(1.0).smooth(voxels().map(|_| 0.75), &around, &part, &mut out);
         assert!(out.iter().all(|v| (v - 0.75).abs() < 1e-6));
     }
 }

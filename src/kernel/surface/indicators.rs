@@ -6,13 +6,15 @@
 //! taken through the inverse, so that they are straight there and crossings are found where the surface is.
 
 use crate::grid::Box3;
-use crate::kernel::image::gaussian::{Gaussian, SIGMA};
+use crate::kernel::image::gaussian::Gaussian;
 
+/// Width of the smoothing, voxels.
+const SIGMA: f64 = 1.0;
 /// Values as near to 0 or 1 as this are that far from the surface that they tell nothing of it.
 const LEAST: f64 = 1e-4;
 
 /// The smoothed indicator functions of the labels in a box.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Indicators {
     names: Vec<u32>,
     /// By label, dense over the box.
@@ -20,6 +22,13 @@ pub(super) struct Indicators {
     gaussian: Gaussian,
     /// The label of the largest at each voxel, as a place in `names`.
     largest: Vec<u32>,
+}
+
+impl Default for Indicators {
+    fn default() -> Self {
+        let gaussian = Gaussian::new(SIGMA);
+        Self { names: Vec::new(), values: Vec::new(), gaussian, largest: Vec::new() }
+    }
 }
 
 impl Indicators {

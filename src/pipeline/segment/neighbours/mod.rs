@@ -13,6 +13,7 @@ mod faces;
 mod fields;
 mod gaps;
 mod join;
+mod needs;
 mod nesting;
 mod overlaps;
 mod sharing;
@@ -24,6 +25,7 @@ mod widths;
 pub use faces::draw as draw_faces;
 pub(super) use faces::touch;
 pub use join::{FillGaps, Found, Joined, Joining, join};
+pub(super) use needs::needs;
 pub(super) use table::csv;
 
 /// Edge of the boxes that everything here is computed in.

@@ -8,7 +8,6 @@ use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
 use crate::grid::{BrickSet, Geometry, NEIGHBOURS_26, Slot};
 use crate::kernel::image::gaps::SEED;
-use crate::kernel::image::gaussian::Gaussian;
 use crate::kernel::image::geodesic::{Lengths, UNREACHED, relax};
 use crate::store::{BoxSink, BoxSource, BrickArray};
 use crate::tile::HaloTile;
@@ -49,7 +48,7 @@ fn begin(
     fields: &Fields,
 ) -> Result<()> {
     let set = states.set();
-    let make = || (Vec::new(), Vec::new(), Vec::new(), Gaussian::default());
+    let make = || (Vec::new(), Vec::new(), Vec::new(), Walls::gaussian());
     stage.run(&one_wave(set), &Workers::new(make), |(labels, state, weights, gaussian), &slot| {
         let part = set.grid().brick_box(set.id(slot));
         roots.around(&part, [0; 3], labels)?;

@@ -12,13 +12,16 @@ use crate::store::BoxSource;
 
 /// Less contrast than this, of an image in [0, 1], tells of no wall.
 const LEAST_CONTRAST: f64 = 0.01;
-/// What a voxel as bright as the middle of walls costs, beside one that is even: a wall of three voxels outweighs what
-/// objects fall short of it by some ten.
-const COST: f64 = 60.0;
-/// The power of the brightness: only the crest counts.
-const POWER: i32 = 3;
-/// Crests are brighter than walls are in the middle of their widths, by so much at the most.
-const BRIGHTEST: f64 = 2.0;
+/// What a voxel as bright as the mean between objects costs, beside one that is even, and the power of the brightness
+/// that it grows with. In a foam of 30 cells with walls of three voxels and Poisson noise, 1.53 % of the voxels within
+/// three of a wall came to the wrong cell with a cost of 60 and a power of 3, 1.50 % with these; contact areas were off
+/// by 3.0 % in the mean with either. A Gaussian of 0.7 voxels in place of 1 gave 1.47 % and 2.75 %, one of 1.5 gave
+/// 1.9 %: where three walls meet it makes one wide place of them.
+const COST: f64 = 1000.0;
+const POWER: i32 = 6;
+const SIGMA: f64 = 0.7;
+/// Crests are brighter than the mean between objects, by so much at the most.
+const BRIGHTEST: f64 = 1.5;
 
 /// Sums of the brightness within objects, and between them, each with the number of voxels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,7 +44,7 @@ impl Brightness {
             return Ok(sums);
         }
         let mut values = Vec::new();
-        smoothed(image, part, &mut Gaussian::default(), &mut values)?;
+        smoothed(image, part, &mut Gaussian::new(SIGMA), &mut values)?;
         let voxels = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
         for ((voxel, &state), &value) in voxels.zip(states).zip(&values) {
             let own = labels[around.offset_of(voxel)];
@@ -89,6 +92,11 @@ impl<'a> Walls<'a> {
     /// The brightness within objects and between them, where walls are seen.
     pub(super) fn contrast(&self) -> Option<[f64; 2]> {
         self.image.map(|(_, levels)| levels)
+    }
+
+    /// The smoothing of the image.
+    pub(super) fn gaussian() -> Gaussian {
+        Gaussian::new(SIGMA)
     }
 
     /// The weights of the voxels of a box; 0 for those that belong to nobody.

@@ -19,6 +19,16 @@ const REACH: [f64; 2] = [12.0, 6.0];
 const QUANTILE: f64 = 0.75;
 const TIMES: f64 = 3.0;
 
+/// As far as other objects are looked for.
+fn reach(geometry: &Geometry) -> f64 {
+    (REACH[0] * geometry.min_spacing()).max(REACH[1] * geometry.max_spacing())
+}
+
+/// The largest width that can be found.
+pub(super) fn widest(geometry: &Geometry) -> f64 {
+    TIMES * reach(geometry)
+}
+
 /// The width to fill up to; 0 where no two objects face each other.
 pub(super) fn width(
     stage: &Stage<'_>,
@@ -28,8 +38,7 @@ pub(super) fn width(
     labels: &[u32],
 ) -> Result<f64> {
     let least = geometry.min_spacing();
-    let reach = (REACH[0] * least).max(REACH[1] * geometry.max_spacing());
-    let spacing = geometry.spacing;
+    let (reach, spacing) = (reach(geometry), geometry.spacing);
     let make = move || (Gaps::new(spacing, reach, 0.0), Vec::new());
     let halo = Gaps::new(spacing, reach, 0.0).across();
     let set = near_two(survey, roots, labels, halo);
