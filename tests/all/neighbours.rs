@@ -190,7 +190,7 @@ fn a_gap_is_shared_in_the_middle_without_an_image_and_on_the_crest_with_one() {
     let (shape, disc) = ([49; 3], std::f64::consts::PI * 400.0);
     let objects: Vec<Object<'_>> = vec![(1, &left), (2, &right)];
     let mut scene = Scene { geometry: grid(shape), objects, image: None };
-    let how = How { fill: Some(FillGaps::Width(6.0)), ..PLAIN };
+    let how = How { fill: Some(FillGaps::Width(12.0)), ..PLAIN };
     let split = |tissue: &Tissue, at: f64| {
         let wrong = |(v, label): &([f64; 3], &u32)| {
             ball(*v) && distance(*v, [24.0; 3]) < 17.0 && (v[0] - at).abs() > 0.6 && **label != 1 + u32::from(v[0] > at)

@@ -1,6 +1,8 @@
-//! The gaps between labelled objects on one box: background that no ball as wide as a given width reaches, with two
-//! objects near. That is the morphological closing of all objects (Serra 1982), held to places between two of them: it
-//! fills walls and the small hollows that they enclose, and leaves the outer surface and each object's own folds alone.
+//! The gaps between labelled objects on one box: background from which the distances to the nearest object and to the
+//! nearest other one are together no more than a width, and that a ball in the background with this radius does not
+//! reach. The first tells places between two objects, the second keeps the outer surface (the morphological closing of
+//! Serra 1982): across a gap that opens to the outside the ball hangs through by an eighth of the gap's width at most,
+//! where this is no wider than the radius.
 //!
 //! Where a wall's place is to be found in the image, objects also give back what lies within a small depth of their
 //! surface beside another object. Of each object the voxels farthest within stay, so none vanishes.
@@ -31,6 +33,7 @@ pub struct Gaps {
     across: Nearness,
     /// As far as objects give back; none where they keep all.
     depth: Option<Nearness>,
+    width: f64,
     least: f64,
     reached: Vec<f32>,
     found: Vec<f32>,
@@ -44,10 +47,12 @@ impl Gaps {
     pub fn new(spacing: [f64; 3], width: f64, depth: f64) -> Self {
         let least = spacing.iter().copied().fold(f64::INFINITY, f64::min);
         Self {
-            // Between the faces of two voxels there is one spacing less than between their centres.
-            ball: Nearness::new(spacing, 0.5 * (width + least)),
-            across: Nearness::new(spacing, width + 0.5 * least),
+            // From a voxel's centre to its face is half a spacing.
+            ball: Nearness::new(spacing, width + 0.5 * least),
+            // From the deepest voxel that is given back to the other object.
+            across: Nearness::new(spacing, width + (depth + 0.5) * least),
             depth: (depth > 0.0).then(|| Nearness::new(spacing, (depth + 0.5) * least)),
+            width,
             least,
             reached: Vec::new(),
             found: Vec::new(),
@@ -81,7 +86,7 @@ impl Gaps {
         for (at, out) in places(around, part).zip(out) {
             let is_between = roots.len() > 1 && self.nearest[1][at].is_finite();
             *out = match labels[at] {
-                0 if is_between && self.reached[at].is_infinite() => GAP,
+                0 if is_between && self.is_narrow(at) && self.reached[at].is_infinite() => GAP,
                 0 => OUTSIDE,
                 _ if is_between && self.is_shallow(labels, around, at) => GIVEN,
                 _ => SEED,
@@ -130,6 +135,13 @@ impl Gaps {
                 *first = first.min(d);
             }
         }
+    }
+
+    /// Whether two objects are near enough on either side of a voxel.
+    fn is_narrow(&self, at: usize) -> bool {
+        let [first, second] = [0, 1].map(|n| f64::from(self.nearest[n][at]).sqrt());
+        // Between the faces of two voxels there is one spacing less than between their centres.
+        first + second <= self.width + self.least * (1.0 + 1e-6)
     }
 
     /// Which voxels a ball in the background reaches: finite where it does.

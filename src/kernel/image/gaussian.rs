@@ -1,18 +1,19 @@
-//! A Gaussian of up to one voxel along each axis on one dense box, cut at three voxels: one pass along each axis.
+//! A Gaussian of the same width in voxels along each axis, on one dense box, cut at three widths: one pass along each
+//! axis.
 //!
-//! In: values over a box that reaches [`RADIUS`] voxels around the part that is wanted. The part's values do not depend
+//! In: values over a box that reaches [`Gaussian::radius`] voxels around the part that is wanted. The part's values do not depend
 //! on the box otherwise: every sum has the same terms in the same order.
 
 use crate::grid::Box3;
 
-/// How far it reaches, voxels.
-pub const RADIUS: i64 = 3;
+/// Where it is cut, in widths.
+const CUT: f64 = 3.0;
 
 /// Smooths box by box; keeps its working memory between boxes.
 #[derive(Clone, Debug)]
 pub struct Gaussian {
     /// Weights from the middle on; the middle counts from either side.
-    weights: [f32; RADIUS as usize + 1],
+    weights: Vec<f32>,
     passes: [Vec<f32>; 2],
 }
 
@@ -21,9 +22,16 @@ impl Gaussian {
     #[must_use]
     pub fn new(sigma: f64) -> Self {
         let value = |n: usize| (-0.5 * (n as f64 / sigma).powi(2)).exp();
-        let sum: f64 = value(0) + 2.0 * (1..=RADIUS as usize).map(value).sum::<f64>();
+        let radius = (CUT * sigma).ceil() as usize;
+        let sum: f64 = value(0) + 2.0 * (1..=radius).map(value).sum::<f64>();
         let weight = |n: usize| value(n) / sum * if n == 0 { 0.5 } else { 1.0 };
-        Self { weights: std::array::from_fn(|n| weight(n) as f32), passes: Default::default() }
+        Self { weights: (0..=radius).map(|n| weight(n) as f32).collect(), passes: Default::default() }
+    }
+
+    /// How far it reaches, voxels.
+    #[must_use]
+    pub fn radius(&self) -> i64 {
+        self.weights.len() as i64 - 1
     }
 
     /// Fills `out` with the smoothed values on `part`; `values` are dense over `around`.
@@ -69,7 +77,7 @@ mod tests {
     #[test]
     fn a_point_becomes_a_gaussian_and_what_is_level_stays() {
         let part = Box3::new([2, 3, 4], [9, 8, 9]);
-        let around = part.grow(RADIUS);
+        let around = part.grow(3);
         let voxels = || around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
         let mut out = Vec::new();
         Gaussian::new(1.0).smooth(voxels().map(|v| f32::from(u8::from(v == [5, 5, 6]))), &around, &part, &mut out);

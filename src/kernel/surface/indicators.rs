@@ -1,33 +1,46 @@
 //! Indicator functions of the labels in one box, each 1 in its label and 0 elsewhere, smoothed: surfaces between labels
-//! that lie where two of them are equal have no staircases. The label of a voxel is then that of the largest.
+//! told from these have no staircases. A voxel of which another label has more than half takes that.
 //!
-//! Smoothing is a Gaussian of one voxel along each axis (`kernel::image::gaussian`); spacing has no part in it, as stairs are made of
-//! voxels. Where a flat surface crosses an edge between voxels the smoothed step is an error function; its values are
-//! taken through the inverse, so that they are straight there and crossings are found where the surface is.
+//! Between two labels the surface lies where they are equal. Across a flat one the smoothed step is an error function;
+//! taken through its inverse it is straight, and crossings are found where the surface is. At a line where three labels
+//! meet equality would not do: each has the part of its angle there, and the larger advances, by 0.43 of the Gaussian's
+//! width at the rim of a face. But a Gaussian of twice the width sees the same parts at the line. So where there are
+//! others, two labels are equal where what the narrow one sees of them, over what the wide one does, is the same. On
+//! curved surfaces that is off, as the wide one sees less of what bulges; equality alone is not.
+//!
+//! Widths are in voxels along each axis (`kernel::image::gaussian`); spacing has no part in it, as stairs are made of
+//! voxels.
 
 use crate::grid::Box3;
 use crate::kernel::image::gaussian::Gaussian;
 
-/// Width of the smoothing, voxels.
-const SIGMA: f64 = 1.0;
-/// Values as near to 0 or 1 as this are that far from the surface that they tell nothing of it.
-const LEAST: f64 = 1e-4;
+/// Widths of the two Gaussians, voxels.
+const SIGMAS: [f64; 2] = [1.0, 2.0];
+/// How far the wider one reaches, voxels.
+pub(super) const RADIUS: i64 = 6;
+/// What the excess of one label over another grows by in one width of the narrow Gaussian, on a flat surface.
+const SLOPE: f64 = 0.85;
+/// With so much of other labels two are told apart by their excess alone.
+const THIRDS: f64 = 0.2;
+/// Less of a label is not told from nothing.
+const LEAST: f32 = 1e-4;
 
 /// The smoothed indicator functions of the labels in a box.
 #[derive(Clone, Debug)]
 pub(super) struct Indicators {
     names: Vec<u32>,
-    /// By label, dense over the box.
-    values: Vec<Vec<f32>>,
-    gaussian: Gaussian,
-    /// The label of the largest at each voxel, as a place in `names`.
-    largest: Vec<u32>,
+    /// By label, dense over the box: what the narrow Gaussian sees, and the logarithm of it over what the wide one does.
+    narrow: Vec<Vec<f32>>,
+    excess: Vec<Vec<f32>>,
+    gaussians: [Gaussian; 2],
+    /// The label of each voxel.
+    labels: Vec<u32>,
 }
 
 impl Default for Indicators {
     fn default() -> Self {
-        let gaussian = Gaussian::new(SIGMA);
-        Self { names: Vec::new(), values: Vec::new(), gaussian, largest: Vec::new() }
+        let gaussians = SIGMAS.map(Gaussian::new);
+        Self { names: Vec::new(), narrow: Vec::new(), excess: Vec::new(), gaussians, labels: Vec::new() }
     }
 }
 
@@ -38,17 +51,30 @@ impl Indicators {
         self.names.extend(labels.chunk_by(|a, b| a == b).map(|run| run[0]));
         self.names.sort_unstable();
         self.names.dedup();
-        self.values.resize(self.names.len(), Vec::new());
-        for (&name, values) in self.names.iter().zip(&mut self.values) {
-            let indicator = labels.iter().map(|&label| f32::from(u8::from(label == name)));
-            self.gaussian.smooth(indicator, around, part, values);
+        self.narrow.resize(self.names.len(), Vec::new());
+        self.excess.resize(self.names.len(), Vec::new());
+        self.labels.clear();
+        for (y, z) in part.rows() {
+            let row = &labels[around.offset_of([part.lo[0], y, z])..][..part.shape()[0] as usize];
+            self.labels.extend_from_slice(row);
         }
-        self.largest.clear();
-        self.largest.resize(part.len(), 0);
-        for n in 1..self.names.len() {
-            for (at, largest) in self.largest.iter_mut().enumerate() {
-                if self.values[n][at] > self.values[*largest as usize][at] {
-                    *largest = n as u32;
+        if self.is_one() {
+            return;
+        }
+        let [narrow, wide] = &mut self.gaussians;
+        let near = part.grow(narrow.radius());
+        for (n, &name) in self.names.iter().enumerate() {
+            let (seen, excess) = (&mut self.narrow[n], &mut self.excess[n]);
+            let indicator = |label: u32| f32::from(u8::from(label == name));
+            let rows = near
+                .rows()
+                .flat_map(|(y, z)| labels[around.offset_of([near.lo[0], y, z])..][..near.shape()[0] as usize].iter());
+            narrow.smooth(rows.map(|&label| indicator(label)), &near, part, seen);
+            wide.smooth(labels.iter().map(|&label| indicator(label)), around, part, excess);
+            for ((excess, &narrow), label) in excess.iter_mut().zip(&*seen).zip(&mut self.labels) {
+                *excess = (narrow.max(LEAST) / excess.max(LEAST)).ln();
+                if narrow > 0.5 {
+                    *label = name;
                 }
             }
         }
@@ -59,18 +85,23 @@ impl Indicators {
         self.names.len() < 2
     }
 
-    /// The label of the largest function at a place in the box.
+    /// The label at a place in the box.
     pub(super) fn label(&self, at: usize) -> u32 {
-        self.names[self.largest[at] as usize]
+        self.labels[at]
     }
 
     /// How far a place lies on the side of one label, as seen from another, in voxels where the surface is flat.
     pub(super) fn lead(&self, at: usize, label: u32, other: u32) -> f64 {
-        let value = |name: u32| self.names.binary_search(&name).map_or(0.0, |n| f64::from(self.values[n][at]));
-        let (own, its) = (value(label), value(other));
-        // Of both together, so that a third label near takes nothing from either.
-        let part = if own + its > 0.0 { own / (own + its) } else { 0.5 };
-        SIGMA * normal_quantile(part.clamp(LEAST, 1.0 - LEAST))
+        let [own, its] = [label, other].map(|name| {
+            let found = self.names.binary_search(&name);
+            found.map_or((0.0, 0.0), |n| (f64::from(self.narrow[n][at]), f64::from(self.excess[n][at])))
+        });
+        let both = own.0 + its.0;
+        let part = if both > 0.0 { own.0 / both } else { 0.5 };
+        let plain = SIGMAS[0] * normal_quantile(part.clamp(f64::from(LEAST), 1.0 - f64::from(LEAST)));
+        let by_excess = (own.1 - its.1) * SIGMAS[0] / SLOPE;
+        let thirds = ((1.0 - both) / THIRDS).clamp(0.0, 1.0);
+        plain + thirds * (by_excess - plain)
     }
 }
 
@@ -92,7 +123,7 @@ mod tests {
     #[test]
     fn a_flat_step_is_straight_across_the_surface() {
         let part = Box3::new([-3, 0, 0], [4, 1, 1]);
-        let around = part.grow(3);
+        let around = part.grow(RADIUS);
         let voxels = around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
         let labels: Vec<u32> = voxels.map(|v| if v[0] < 1 { 4 } else { 2 }).collect();
         let mut indicators = Indicators::default();
@@ -111,5 +142,10 @@ mod tests {
         for (value, argument) in [(0.5, 0.0), (0.841_345, 1.0), (0.022_75, -2.0), (0.308_538, -0.5)] {
             assert!((normal_quantile(value) - argument).abs() < 1e-3, "{value}");
         }
+    }
+
+    #[test]
+    fn reaches_as_far_as_it_says() {
+        assert_eq!(Indicators::default().gaussians.map(|gaussian| gaussian.radius()), [3, RADIUS]);
     }
 }

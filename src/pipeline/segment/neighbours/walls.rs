@@ -7,7 +7,7 @@
 use crate::error::Result;
 use crate::grid::{Box3, FACES};
 use crate::kernel::image::gaps::{GAP, OUTSIDE, SEED};
-use crate::kernel::image::gaussian::{Gaussian, RADIUS};
+use crate::kernel::image::gaussian::Gaussian;
 use crate::store::BoxSource;
 
 /// Less contrast than this, of an image in [0, 1], tells of no wall.
@@ -125,7 +125,7 @@ impl<'a> Walls<'a> {
 
 /// The smoothed image on a box.
 fn smoothed(image: &dyn BoxSource<f32>, part: &Box3, gaussian: &mut Gaussian, out: &mut Vec<f32>) -> Result<()> {
-    let around = part.grow(RADIUS);
+    let around = part.grow(gaussian.radius());
     let mut values = vec![0.0; around.len()];
     image.read_box(&around, &mut values)?;
     gaussian.smooth(values.into_iter(), &around, part, out);
