@@ -281,11 +281,15 @@ fn a_foam_becomes_cells_with_common_faces_to_the_same_bits() {
     assert_eq!(left, 0, "{:?}", tissue.found);
     assert!(wrong * 100 < 3 * near, "{wrong} of {near}");
     tissue.check_closed();
+    // Faces 10 to 20 voxels wide: a line that is off by a third of a voxel all around is 5 % of them.
+    let (mut sum, mut off) = (0.0, 0.0);
     for contact in tissue.contacts.iter().filter(|contact| contact.labels[0] > 0 && contact.area > 100.0) {
         let [a, b] = contact.labels.map(|label| label as usize - 1);
         let expected = true_area(a, b);
-        assert!((contact.area / expected - 1.0).abs() < 0.05, "{contact:?}: {expected}");
+        assert!((contact.area / expected - 1.0).abs() < 0.1, "{contact:?}: {expected}");
+        (sum, off) = (sum + expected, off + (contact.area - expected).abs());
     }
+    assert!(sum > 1000.0 && off < 0.05 * sum, "{off} of {sum}");
     let ball = 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
     let outside: f64 = tissue.contacts.iter().filter(|c| c.labels[0] == 0).map(|contact| contact.area).sum();
     assert!((outside / ball - 1.0).abs() < 0.05, "{outside} of {ball}");

@@ -77,20 +77,32 @@ impl Gaps {
 
     /// Tells what each voxel of `part` is, into `out`; `labels` is dense over `around`, which reaches the halo around.
     pub fn tell(&mut self, labels: &[u32], around: &Box3, part: &Box3, out: &mut [u8]) {
-        let roots = distinct(labels);
-        self.two_nearest(labels, &roots, around);
-        if roots.len() > 1 {
-            self.roll_ball(labels, around);
-            self.measure_depths(labels, &roots, around);
+        // What lies between two objects, and how deep, is seen from less far than the ball comes from.
+        let depth = self.depth.as_ref().map_or([0; 3], Nearness::halo);
+        let reach: [i64; 3] = std::array::from_fn(|a| self.across.halo()[a].max(depth[a] + 1));
+        let near =
+            Box3::new(std::array::from_fn(|a| part.lo[a] - reach[a]), std::array::from_fn(|a| part.hi[a] + reach[a]));
+        let labels_near: Vec<u32> = places(around, &near).map(|at| labels[at]).collect();
+        let roots = distinct(&labels_near);
+        if roots.len() < 2 {
+            let own = places(around, part).map(|at| if labels[at] > 0 { SEED } else { OUTSIDE });
+            out.iter_mut().zip(own).for_each(|(out, own)| *out = own);
+            return;
         }
-        for (at, out) in places(around, part).zip(out) {
-            let is_between = roots.len() > 1 && self.nearest[1][at].is_finite();
-            *out = match labels[at] {
-                0 if is_between && self.is_narrow(at) && self.reached[at].is_infinite() => GAP,
+        self.two_nearest(&labels_near, &roots, &near);
+        self.measure_depths(&labels_near, &roots, &near);
+        for (at, out) in places(&near, part).zip(out.iter_mut()) {
+            *out = match labels_near[at] {
+                0 if self.is_narrow(at) => GAP,
                 0 => OUTSIDE,
-                _ if is_between && self.is_shallow(labels, around, at) => GIVEN,
+                _ if self.nearest[1][at].is_finite() && self.is_shallow(&labels_near, &near, at) => GIVEN,
                 _ => SEED,
             };
+        }
+        if out.contains(&GAP) {
+            self.roll_ball(labels, around);
+            let is_reached = |(at, state): &(usize, &mut u8)| **state == GAP && self.reached[*at].is_finite();
+            places(around, part).zip(out).filter(is_reached).for_each(|(_, state)| *state = OUTSIDE);
         }
     }
 

@@ -41,8 +41,8 @@ impl Nearness {
         rows.clear();
         rows.extend((0..width * height * depth).map(|n| if is_source(n) { 0.0 } else { f32::INFINITY }));
         rows.chunks_exact_mut(width.max(1)).for_each(|row| along_row(row, &self.squares[0]));
-        along(rows, planes, [width, height], &self.squares[1]);
-        along(planes, out, [width * height, depth], &self.squares[2]);
+        along(rows, planes, [width, height, depth], 1, &self.squares[1]);
+        along(planes, out, [width, height, depth], 2, &self.squares[2]);
         out.iter_mut().filter(|d| **d > self.limit).for_each(|d| *d = f32::INFINITY);
     }
 }
@@ -62,22 +62,26 @@ fn along_row(row: &mut [f32], squares: &[f32]) {
     }
 }
 
-/// The least of what lies up to so many lines before and behind, and the square of the way there. Lines of `width`
-/// values follow each other, `count` of them belong together.
-fn along(from: &[f32], to: &mut Vec<f32>, [width, count]: [usize; 2], squares: &[f32]) {
+/// The least of what lies up to so many rows before and behind along y (1) or z (2), and the square of the way there.
+fn along(from: &[f32], to: &mut Vec<f32>, shape: [usize; 3], axis: usize, squares: &[f32]) {
+    let [width, height, depth] = shape;
+    let count = shape[axis];
     to.clear();
     to.extend_from_slice(from);
-    for (from, to) in from.chunks_exact(width * count).zip(to.chunks_exact_mut(width * count)) {
-        for (n, line) in to.chunks_exact_mut(width).enumerate() {
-            for (steps, &square) in squares.iter().enumerate().skip(1) {
-                let others = [n.checked_sub(steps), Some(n + steps).filter(|m| *m < count)];
-                for other in others.into_iter().flatten() {
-                    let source = &from[other * width..][..width];
-                    line.iter_mut().zip(source).for_each(|(d, s)| *d = d.min(s + square));
-                }
+    // Most rows of a set that is small in its box have nothing to give.
+    let is_near: Vec<bool> = from.chunks_exact(width).map(|row| row.iter().any(|d| d.is_finite())).collect();
+    for (row, to) in to.chunks_exact_mut(width).enumerate() {
+        let (n, stride) = if axis == 1 { (row % height, 1) } else { (row / height, height) };
+        for (steps, &square) in squares.iter().enumerate().skip(1).take(count) {
+            let before = (n >= steps).then(|| row - steps * stride);
+            let behind = (n + steps < count).then(|| row + steps * stride);
+            for other in [before, behind].into_iter().flatten().filter(|&other| is_near[other]) {
+                let source = &from[other * width..][..width];
+                to.iter_mut().zip(source).for_each(|(d, s)| *d = d.min(s + square));
             }
         }
     }
+    debug_assert_eq!(from.len(), width * height * depth, "rows fill the box");
 }
 
 #[cfg(test)]
