@@ -9,8 +9,9 @@ use crate::kernel::image::gaps::Gaps;
 /// Bytes of scratch for a voxel: labels of contested voxels; with gaps also states, weights, costs, labels twice, faces.
 const SETTLED_BYTES: u64 = 4;
 const GAP_BYTES: u64 = 21;
-/// Bytes for a voxel of the box around a brick in which gaps are looked for: labels, distances and passes of these.
-const BOX_BYTES: u64 = 40;
+/// Bytes for a voxel of the box around a brick in which gaps are looked for: labels, distances and passes of these, and
+/// again for the part of it that tells what lies between two objects.
+const BOX_BYTES: u64 = 36;
 /// Bytes of a patch of the faces for each voxel of one side of its box, and patches that are held at a time.
 const PATCH_BYTES: u64 = 600;
 const PATCHES: u64 = 64;

@@ -13,7 +13,7 @@ use crate::exec::{Stage, Workers, one_wave};
 use crate::grid::Geometry;
 use crate::kernel::image::gaps::{BINS, Gaps};
 
-/// Gaps wider than so many smallest spacings, or so many largest ones, are not walls.
+/// Gaps wider than so many smallest spacings, or so many largest ones, are not looked for, nor filled.
 const REACH: [f64; 2] = [12.0, 6.0];
 /// The part of all widths that are not larger than the one that is taken, and how many times that is filled.
 const QUANTILE: f64 = 0.75;
@@ -26,7 +26,7 @@ fn reach(geometry: &Geometry) -> f64 {
 
 /// The largest width that can be found.
 pub(super) fn widest(geometry: &Geometry) -> f64 {
-    TIMES * reach(geometry)
+    reach(geometry)
 }
 
 /// The width to fill up to; 0 where no two objects face each other.
@@ -52,7 +52,7 @@ pub(super) fn width(
         bins.resize(bins.len().max(counts.len()), 0);
         bins.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
     }
-    Ok(TIMES * quantile(&bins, QUANTILE) as f64 / BINS * least)
+    Ok((TIMES * quantile(&bins, QUANTILE) as f64 / BINS * least).min(widest(geometry)))
 }
 
 /// The lowest bin up to which lie so many parts of all that was counted.
