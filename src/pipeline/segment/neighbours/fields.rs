@@ -37,7 +37,9 @@ impl<'a> Roots<'a> {
         let mut labels = vec![0; inside.len()];
         self.labels.read_box(&inside, &mut labels)?;
         if !self.roots.is_empty() {
-            labels.iter_mut().for_each(|label| *label = self.of(*label));
+            for label in &mut labels {
+                *label = self.of(*label);
+            }
         }
         out.clear();
         out.reserve(around.len());

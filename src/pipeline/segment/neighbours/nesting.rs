@@ -34,7 +34,9 @@ impl Nesting {
                 containers[inner].push(outer);
             }
         }
-        containers.iter_mut().for_each(|outer| outer.sort_by_key(|&n| (voxels[n], n)));
+        for outer in &mut containers {
+            outer.sort_by_key(|&n| (voxels[n], n));
+        }
         Self { labels, containers }
     }
 

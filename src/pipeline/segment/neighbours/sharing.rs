@@ -79,7 +79,9 @@ fn flood(stage: &Stage<'_>, geometry: &Geometry, set: &BrickSet, fields: &Fields
     let mut rounds = 0;
     while dirty.iter().any(|&d| d) {
         for wave in eight_waves(set, |slot| dirty[slot as usize]) {
-            wave.iter().for_each(|&slot| dirty[slot as usize] = false);
+            for &slot in &wave {
+                dirty[slot as usize] = false;
+            }
             let fell = stage.run(&wave, &workers, |(cost, label, weight), &slot| {
                 plan.gather(&fields.cost, slot, Boundary::Constant(UNREACHED), cost);
                 plan.gather(&fields.label, slot, Boundary::Constant(0), label);
