@@ -14,8 +14,8 @@ use crate::store::BoxSource;
 const LEAST_CONTRAST: f64 = 0.01;
 /// What a voxel as bright as the mean between objects costs, beside one that is even, and the power of the brightness
 /// that it grows with. In a foam of 30 cells with walls of three voxels and Poisson noise, 1.53 % of the voxels within
-/// three of a wall came to the wrong cell with a cost of 60 and a power of 3, 1.50 % with these; contact areas were off
-/// by 3.0 % in the mean with either. A Gaussian of 0.7 voxels in place of 1 gave 1.47 % and 2.75 %, one of 1.5 gave
+/// three of a wall came to the wrong cell with a cost of 60 and a power of 3, 1.50 % with these; contact areas, counted
+/// on the labels, were off by 3.0 % in the mean with either. A Gaussian of 0.7 voxels in place of 1 gave 1.47 % and 2.75 %, one of 1.5 gave
 /// 1.9 %: where three walls meet it makes one wide place of them.
 const COST: f64 = 1000.0;
 const POWER: i32 = 6;

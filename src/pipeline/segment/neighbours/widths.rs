@@ -3,8 +3,8 @@
 //! From every voxel at the surface of an object the nearest other object is looked for; most of what faces a neighbour
 //! across a wall finds it one wall away, however the cells are placed. Three times the upper quartile of these widths takes
 //! in the walls where objects fell short, and the hollows where three or four walls meet: a ball between three cells at
-//! 120 degrees is 1.15 walls wide, between four 1.22, and more by what the solution rounds off their edges. In a foam with
-//! walls of three voxels twice the quartile left 57 voxels of hollows in 326 000, three times 20 and four times one.
+//! 120 degrees is 1.15 walls wide, between four 1.22, and more by what the solution rounds off their edges. In a foam of 30
+//! cells with walls of three voxels twice the quartile left one voxel of 326 000 near walls, three times none.
 
 use super::fields::{Roots, near_two};
 use super::survey::Survey;
