@@ -15,7 +15,8 @@ fn level_set(c: &mut Criterion) {
     let g: Vec<f32> = (0..n).map(|i| ((i * 7919) % 1000) as f32 / 1000.0).collect();
     let mut mask = CellMask::new();
     mask.set(&[1; CELL_LEN], [16; 3], [[false; 2]; 3]);
-    let velocity = Velocity { theta: 1.0, rho: 0.5, delta: 0.1, epsilon: 0.01, tau: 1.0, normalised: true, speed: false };
+    let velocity =
+        Velocity { theta: 1.0, rho: 0.5, delta: 0.1, epsilon: 0.01, tau: 1.0, normalised: true, speed: false };
     let (mut work, mut scheme) = (Planes::new(), vec![0.0; SCHEME_LEN]);
     let mut group = c.benchmark_group("level_set");
     group.throughput(Throughput::Elements(CELL_LEN as u64));

@@ -20,6 +20,8 @@ pub enum ErrorKind {
     Input,
     /// The run failed: disk full, unwritable output, too small a budget (exit code 1).
     Failed,
+    /// Some of several parts of a run failed, and the others are done (exit code 3).
+    Partly,
     /// SIGINT or SIGTERM asked the run to end (exit code 130 or 143).
     Interrupted {
         /// The signal's number: 2 or 15.
@@ -49,6 +51,11 @@ impl Error {
     /// A run that cannot go on.
     pub fn failed(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Failed, message)
+    }
+
+    /// A run some of whose parts failed.
+    pub fn partly(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Partly, message)
     }
 
     /// A run that a signal ended.
@@ -86,12 +93,13 @@ impl Error {
         self.path.as_deref()
     }
 
-    /// The exit code of the design: 1 the run failed, 2 unusable input or usage, 130 and 143 interrupted.
+    /// The exit code of the design: 1 the run failed, 2 unusable input or usage, 3 a part of it failed, 130 and 143 interrupted.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self.kind {
             ErrorKind::Usage | ErrorKind::Input => 2,
             ErrorKind::Failed => 1,
+            ErrorKind::Partly => 3,
             ErrorKind::Interrupted { signal } => u8::try_from(128 + signal).unwrap_or(130),
         }
     }

@@ -8,10 +8,12 @@ use super::distance_args::DistanceJobArgs;
 use super::middle_args::MiddleArgs;
 use super::reconstruct_args::ReconstructArgs;
 use super::values::{
-    Crop, Output, parse_crop, parse_method, parse_pair, parse_seed, parse_size, parse_triple, solvers_help,
+    Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
+    solvers_help,
 };
 use crate::pipeline::distance::Method;
 use crate::pipeline::marks::Seed;
+use crate::pipeline::segment::FillGaps;
 
 /// Finds surfaces in 3-D volumes larger than memory.
 #[derive(Debug, Parser)]
@@ -45,7 +47,7 @@ pub(super) enum Command {
 
 const HELP_ON_SEGMENT: &str = "\
 Lengths are physical, in the unit of the image; triples are x,y,z; the centre of the first voxel is 0,0,0.
-Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 130 interrupted, 143 terminated.";
+Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 3 some\nobjects could not be solved, 130 interrupted, 143 terminated.";
 
 const HELP_ON_DISTANCE: &str = "\
 Lengths are those of the files; triples are x,y,z.
@@ -103,6 +105,9 @@ pub(super) struct ImageArgs {
     /// flood from outside ends, as in the papers
     #[arg(long, value_enum, default_value_t = StartArg::Auto)]
     pub(super) start: StartArg,
+    /// Leave out each outline in turn and tell how far its marks then lie from the shape, and which slice to mark next
+    #[arg(long)]
+    pub(super) cross_validate: bool,
     /// Pull of the image's edges: the same at strong and weak ones, or as strong as they are
     #[arg(long, value_enum, default_value_t = Edge::Normalised)]
     pub(super) edge: Edge,
@@ -118,6 +123,10 @@ pub(super) struct ImageArgs {
     /// Which object gets the voxels where several overlap
     #[arg(long, value_enum, default_value_t = OverlapArg::Smaller)]
     pub(super) overlap: OverlapArg,
+    /// Share out gaps between objects along the wall's crest: those up to a width, a length, or as wide as they are
+    /// where objects face each other
+    #[arg(long, value_name = "D|auto", value_parser = parse_fill_gaps, allow_hyphen_values = true)]
+    pub(super) fill_gaps: Option<FillGaps>,
 }
 
 /// How the surface moves.
@@ -299,7 +308,8 @@ pub(super) enum StartArg {
 /// Which object gets the voxels where several overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum OverlapArg {
-    /// The one with the smaller volume: nested tissues
+    /// The one with the smaller volume where it lies inside the larger: nested tissues; of neighbours the one that the
+    /// voxel lies deeper in
     Smaller,
     /// The one with the larger volume
     Larger,

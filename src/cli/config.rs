@@ -15,7 +15,7 @@ use crate::pipeline::evolve::Stop;
 use crate::pipeline::image_terms::Smoothing;
 use crate::pipeline::motion::Motion;
 use crate::pipeline::reconstruct::ReconstructSettings;
-use crate::pipeline::segment::{ImageModel, Overlap, SegmentSettings, Start};
+use crate::pipeline::segment::{FillGaps, ImageModel, Overlap, SegmentSettings, Start};
 use crate::store::Scratch;
 
 /// What a run may use.
@@ -59,9 +59,11 @@ pub(super) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
             ImageArg::None => ImageModel::None,
         },
         start: match image.start {
-            StartArg::Auto => Start::Auto,
-            StartArg::Flood => Start::Flood,
+            // Where the start lies is what a beta tells the flood.
+            StartArg::Auto if args.motion.beta.is_none() => Start::Auto,
+            StartArg::Auto | StartArg::Flood => Start::Flood,
         },
+        cross_validate: image.cross_validate,
         motion: motion(&args.motion, edges)?,
         theta: args.motion.theta,
         rho: pull.rho,
@@ -80,8 +82,16 @@ pub(super) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
             OverlapArg::First => Overlap::First,
             OverlapArg::Last => Overlap::Last,
         },
+        fill_gaps: image.fill_gaps.map(fill_gaps).transpose()?,
         brick: brick(args.resources.brick.unwrap_or(defaults.brick))?,
     })
+}
+
+fn fill_gaps(given: FillGaps) -> Result<FillGaps> {
+    match given {
+        FillGaps::Width(width) => checked("--fill-gaps", width, ABOVE_ZERO).map(FillGaps::Width),
+        FillGaps::Auto => Ok(FillGaps::Auto),
+    }
 }
 
 /// The settings of a reconstruction.
@@ -282,7 +292,8 @@ mod tests {
     fn every_flag_arrives() {
         let settings = meant(
             "--delta 1 --theta 2 --rho 3 --k 4 --sigma 5 --beta 6 --tau 7 --epsilon 8 --omega 1.5 --stop l2 --tol 9 \
-             --max-steps 10 --method fsm --edge plain --smoothing heat --percentiles 1,99 --no-caps --overlap last --brick 32",
+             --max-steps 10 --method fsm --edge plain --smoothing heat --percentiles 1,99 --no-caps --overlap last \
+              --fill-gaps 2.5 --brick 32",
         );
         let expected = SegmentSettings {
             method: Method::FSM,
@@ -304,9 +315,11 @@ mod tests {
             caps: false,
             percentiles: [1.0, 99.0],
             overlap: Overlap::Last,
+            fill_gaps: Some(FillGaps::Width(2.5)),
             brick: 32,
         };
         assert_eq!(settings.unwrap(), expected);
+        assert_eq!(meant("--fill-gaps auto").unwrap().fill_gaps, Some(FillGaps::Auto));
         assert_eq!(meant("--stop l2").unwrap().motion.stop, Stop::L2(L2_TOLERANCE));
     }
 
@@ -326,6 +339,9 @@ mod tests {
             "--omega 2",
             "--omega 0",
             "--tol 0",
+            "--fill-gaps 0",
+            "--fill-gaps -2",
+            "--fill-gaps nan",
             "--percentiles 99,1",
             "--percentiles -1,50",
             "--percentiles nan,50",

@@ -18,6 +18,7 @@ mod input;
 mod measure;
 mod middle;
 mod middle_args;
+mod neighbours_report;
 mod picture;
 mod reconstruct;
 mod reconstruct_args;

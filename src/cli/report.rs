@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::config::Resources;
 use super::console::Console;
+use super::neighbours_report::{Contact, Neighbours, fill_gaps};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, StageReport, peak_resident};
 use crate::grid::Geometry;
@@ -68,6 +69,8 @@ pub(super) struct Solver {
     caps: bool,
     percentiles: [f64; 2],
     overlap: &'static str,
+    /// A width, `auto`, or null.
+    fill_gaps: serde_json::Value,
     brick: i64,
 }
 
@@ -100,6 +103,9 @@ pub(super) struct Found {
     single: Option<Object>,
     label_voxels: BTreeMap<String, u64>,
     objects: Vec<Object>,
+    refused: Vec<Refused>,
+    neighbours: Neighbours,
+    contacts: Vec<Contact>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -120,6 +126,41 @@ struct Object {
     sor_iterations: u64,
     stopped_by: &'static str,
     residual: f64,
+    /// What was taken from the image, and how much marks and image weighed.
+    image_model: &'static str,
+    theta: f64,
+    rho: f64,
+    /// Marks farther than a voxel from the surface.
+    marks_off: u64,
+    cross_validation: Option<CrossValidation>,
+}
+
+/// What leaving out each outline tells; the slice is that across its axis, counted from 0.
+#[derive(Clone, Debug, Serialize)]
+struct CrossValidation {
+    mean: f64,
+    p90: f64,
+    next_slice: Option<NextSlice>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct NextSlice {
+    axis: &'static str,
+    slice: i64,
+}
+
+impl From<crate::pipeline::segment::CrossValidation> for CrossValidation {
+    fn from(found: crate::pipeline::segment::CrossValidation) -> Self {
+        let next = found.next_slice.map(|(axis, slice)| NextSlice { axis: ["x", "y", "z"][axis], slice });
+        Self { mean: found.mean, p90: found.p90, next_slice: next }
+    }
+}
+
+/// An object that could not be solved.
+#[derive(Debug, Serialize)]
+struct Refused {
+    label: u32,
+    reason: String,
 }
 
 /// Distances of the marks from the surface.
@@ -217,6 +258,7 @@ impl Solver {
                 Overlap::First => "first",
                 Overlap::Last => "last",
             },
+            fill_gaps: fill_gaps(settings.fill_gaps),
             brick: settings.brick,
         }
     }
@@ -258,6 +300,11 @@ impl Object {
             sor_iterations: object.evolution.sor_iterations,
             stopped_by: object.evolution.stopped_by,
             residual: object.evolution.residual,
+            image_model: object.image_model,
+            theta: object.theta,
+            rho: object.rho,
+            marks_off: object.marks_off,
+            cross_validation: object.cross_validation.map(Into::into),
         }
     }
 }
@@ -268,7 +315,9 @@ impl Found {
         let objects: Vec<Object> = outcome.objects.iter().map(|o| Object::new(o, voxels(o.label))).collect();
         let single = if let [only] = objects.as_slice() { Some(only.clone()) } else { None };
         let label_voxels = outcome.objects.iter().map(|o| (o.label.to_string(), voxels(o.label))).collect();
-        Self { single, label_voxels, objects }
+        let contacts = outcome.contacts.iter().map(Contact::new).collect();
+        let refused = outcome.refused.iter().map(|r| Refused { label: r.label, reason: r.reason.clone() }).collect();
+        Self { single, label_voxels, objects, refused, neighbours: Neighbours::new(&outcome.neighbours), contacts }
     }
 }
 

@@ -19,7 +19,8 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::io::stacks::{Select, Stack};
 use crate::pipeline::marks::split;
 use crate::pipeline::segment::{
-    Estimate, Guides, Outcome, SegmentSettings, check_marks, check_seed, check_smoothing, estimate, segment,
+    Estimate, Guides, Outcome, Refused, SegmentSettings, check_marks, check_seed, check_smoothing, crossed, estimate,
+    segment,
 };
 use crate::store::free_space;
 
@@ -86,6 +87,10 @@ impl Job {
             let checked = check_marks(&object, &geometry);
             let file = &marks.files[&object.object];
             checked.map_err(|error| error.at(file))?.iter().for_each(|note| console.note(note));
+            for number in crossed(&object, &geometry) {
+                let label = object.object;
+                console.note(&format!("outline {number} of object {label} crosses itself: are its marks in order?"));
+            }
         }
         check_smoothing(&settings, &geometry)?;
         args.seed.iter().try_for_each(|seed| check_seed(seed, &geometry))?;
@@ -176,7 +181,10 @@ impl Job {
         if !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome)));
         }
-        Ok(outcome)
+        match outcome.refused.as_slice() {
+            [] => Ok(outcome),
+            refused => Err(refusal(refused, outcome.objects.len())),
+        }
     }
 
     fn solve_and_write(&self, engine: &Engine) -> Result<Outcome> {
@@ -190,6 +198,7 @@ impl Job {
             None => None,
         };
         let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())?;
+        self.tell(&outcome);
         if let Some(store) = &store {
             if self.command == "demo" {
                 picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;
@@ -211,6 +220,26 @@ impl Job {
         };
         self.write_copies(engine, &outcome, &folder)?;
         Ok(outcome)
+    }
+
+    /// Says what deserves a second look.
+    fn tell(&self, outcome: &Outcome) {
+        for object in outcome.objects.iter().filter(|object| object.marks_off > 0) {
+            let verb = if object.marks_off == 1 { "mark lies" } else { "marks lie" };
+            let (label, off) = (object.label, object.marks_off);
+            self.console.note(&format!("object {label}: {off} {verb} more than a voxel from the surface"));
+        }
+        for object in &outcome.objects {
+            let Some(found) = object.cross_validation else { continue };
+            let next = found.next_slice.map_or(String::new(), |(axis, slice)| {
+                format!("; the next outline helps most on slice {slice} across {}", ["x", "y", "z"][axis])
+            });
+            let (label, mean, p90) = (object.label, number(found.mean), number(found.p90));
+            self.console.say(&format!(
+                "object {label}: marks of an outline that is left out lie {mean} off in the mean, nine of ten within \
+                 {p90}{next}"
+            ));
+        }
     }
 
     /// The files beside the store.
@@ -314,6 +343,13 @@ impl Job {
         lines.push(format!("time: very roughly {}\n", duration(estimate.seconds)));
         print(&lines.join("\n"));
     }
+}
+
+/// A line for each object that could not be solved.
+fn refusal(refused: &[Refused], solved: usize) -> Error {
+    let all = refused.len() + solved;
+    let reasons: Vec<String> = refused.iter().map(|refused| refused.reason.clone()).collect();
+    Error::partly(format!("{} of {all} objects could not be solved: {}", refused.len(), reasons.join("\n")))
 }
 
 /// `FILE.ply` as `FILE-3.ply`.

@@ -30,8 +30,9 @@ pub(super) fn objects(outcome: &Outcome) -> String {
         ["object", "label voxels", "volume", "area", "surface", "pieces", "marks off, mean", "largest"]
             .map(String::from),
     ];
-    let mut solver =
-        vec![["object", "points", "beta", "largest hole", "at x, y, z", "steps", "ended by"].map(String::from)];
+    let mut solver = vec![
+        ["object", "points", "beta", "largest hole", "at x, y, z", "image", "steps", "ended by"].map(String::from),
+    ];
     for object in &outcome.objects {
         let distance = |of: fn(&crate::kernel::surface::Hausdorff) -> f64| {
             object.hausdorff.as_ref().map_or("-".into(), |h| number(of(h)))
@@ -52,11 +53,32 @@ pub(super) fn objects(outcome: &Outcome) -> String {
             number(object.beta),
             object.hole.map_or("-".into(), |hole| number(hole.width)),
             object.hole.map_or("-".into(), |hole| triple(hole.place)),
+            object.image_model.into(),
             object.evolution.steps.to_string(),
             object.evolution.stopped_by.into(),
         ]);
     }
-    format!("{}\n{}(lengths, areas and volumes in {unit}, squared and cubed)\n", aligned(&surfaces), aligned(&solver))
+    let neighbours = neighbours(outcome);
+    format!(
+        "{}\n{}{neighbours}(lengths, areas and volumes in {unit}, squared and cubed)\n",
+        aligned(&surfaces),
+        aligned(&solver)
+    )
+}
+
+/// What neighbours claimed together, and the gaps between them; nothing of a single object.
+fn neighbours(outcome: &Outcome) -> String {
+    if outcome.objects.len() < 2 {
+        return String::new();
+    }
+    let found = &outcome.neighbours;
+    let contacts = outcome.contacts.iter().filter(|contact| contact.labels[0] > 0).count();
+    let mut text = format!("\n{} voxels claimed by several neighbours, {contacts} contacts", grouped(found.contested));
+    if let Some(width) = found.gap_width {
+        let (filled, moved) = (grouped(found.filled), grouped(found.moved));
+        let _ = write!(text, "; gaps up to {}: {filled} voxels, {moved} moved", number(width));
+    }
+    text + "\n"
 }
 
 /// Columns two blanks apart: the first flush left, the others flush right.

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use crate::kernel::distance::Neighbours;
 use crate::pipeline::distance::{Method, SOLVERS};
 use crate::pipeline::marks::Seed;
+use crate::pipeline::segment::FillGaps;
 
 /// A crop as typed: for each axis where it begins and ends, where that was said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +80,14 @@ pub(super) fn parse_whole_triple(text: &str) -> Result<[i64; 3], String> {
 /// `x,y,z,radius`.
 pub(super) fn parse_seed(text: &str) -> Result<Seed, String> {
     numbers(text).map(|[x, y, z, radius]| Seed { centre: [x, y, z], radius })
+}
+
+/// A width or `auto`.
+pub(super) fn parse_fill_gaps(text: &str) -> Result<FillGaps, String> {
+    match text {
+        "auto" => Ok(FillGaps::Auto),
+        width => width.parse().map(FillGaps::Width).map_err(|_| "give a length, or auto".into()),
+    }
 }
 
 /// `low,high`.

@@ -205,7 +205,13 @@ mod tests {
 
     #[test]
     fn caps_lie_half_a_slice_beyond_and_cover_the_area() {
-        let marks = ObjectMarks { object: 1, contours: vec![square(4.0), square(6.0)], numbers: vec![0, 1], drawn: true, seed: None };
+        let marks = ObjectMarks {
+            object: 1,
+            contours: vec![square(4.0), square(6.0)],
+            numbers: vec![0, 1],
+            drawn: true,
+            seed: None,
+        };
         let cloud = cloud_of(&marks, &grid(), true);
         let cap: Vec<_> = cloud.iter().filter(|p| p[2] == 3.0).collect();
         assert!(cap.len() >= 15 * 15 && cap.len() <= 17 * 17 + 64, "{}", cap.len());

@@ -20,6 +20,7 @@ mod mesh_ply;
 mod mesh_sources;
 mod middle;
 mod middle_labels;
+mod neighbours;
 mod points;
 mod ranks;
 mod reconstruct;

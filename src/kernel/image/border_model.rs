@@ -45,6 +45,24 @@ const SIGNIFICANT: f64 = 4.0;
 pub const ON_LEVEL: [f64; 2] = [0.15, 0.85];
 
 impl Reading {
+    /// Reads the profiles at the marks of one object or of several as a border of one kind, whether it stands out or not.
+    #[must_use]
+    pub fn forced(profiles: &[Profile], wall: bool) -> Self {
+        let found = Self::of(profiles);
+        match (wall, found.model) {
+            (false, BorderModel::Level) | (true, BorderModel::Wall(_)) => found,
+            (false, _) => {
+                Self { model: BorderModel::Level, bias: 0.0, share: 0.5, contrast: mean_step(profiles), ..found }
+            }
+            (true, _) => {
+                let above = |p: &Profile| p.here() - 0.5 * (p.inside() + p.outside());
+                let height = profiles.iter().map(above).sum::<f64>() / profiles.len().max(1) as f64;
+                let model = BorderModel::Wall(if height < 0.0 { -1.0 } else { 1.0 });
+                Self { model, bias: 0.0, contrast: height.abs().max(1e-6), ..found }
+            }
+        }
+    }
+
     /// Reads the profiles at the marks of one object or of several.
     #[must_use]
     pub fn of(profiles: &[Profile]) -> Self {
@@ -87,6 +105,10 @@ impl Reading {
         }
         found
     }
+}
+
+fn mean_step(profiles: &[Profile]) -> f64 {
+    profiles.iter().map(|p| p.inside() - p.outside()).sum::<f64>() / profiles.len().max(1) as f64
 }
 
 /// Where the mean profile is half way between inside and outside, nearest to the border.

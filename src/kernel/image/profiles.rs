@@ -89,7 +89,15 @@ mod tests {
     #[test]
     fn a_step_and_a_wall_are_read() {
         let at = |n: usize| (n as f64 - REACH as f64) * STEP;
-        let step = Profile(std::array::from_fn(|n| if at(n) < 0.0 { 1.0 } else if at(n) > 0.0 { 0.0 } else { 0.5 }));
+        let step = Profile(std::array::from_fn(|n| {
+            if at(n) < 0.0 {
+                1.0
+            } else if at(n) > 0.0 {
+                0.0
+            } else {
+                0.5
+            }
+        }));
         assert_eq!((step.inside(), step.outside(), step.here()), (1.0, 0.0, 0.5));
         assert_eq!(step.fall(), 0.5);
         let wall = Profile(std::array::from_fn(|n| (-(at(n) - 1.3).powi(2)).exp() as f32));

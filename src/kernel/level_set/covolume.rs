@@ -20,8 +20,8 @@
 //! a few planes. Cost: 12 tetrahedra norms and about 60 operations per voxel.
 
 use super::coefficients::{
-    Coefficients, EDGES, NO_COEFFICIENTS, NO_IMAGE, PlaneNorms, SPEED, add_means, close, coefficients, mean_norms, normalise, old_values,
-    spread,
+    Coefficients, EDGES, NO_COEFFICIENTS, NO_IMAGE, PlaneNorms, SPEED, add_means, close, coefficients, mean_norms,
+    normalise, old_values, spread,
 };
 use super::gradients::{FaceNorms, Metric, faces, vertex_plane};
 use super::mask::CellMask;

@@ -34,7 +34,8 @@ impl Lattice {
 
     /// The same of a function with values of any kind.
     pub fn plane_of<R>(&self, plane: usize, geometry: &Geometry, of: impl Fn([f64; 3]) -> R) -> Vec<R> {
-        let place = |n: usize, a: usize| geometry.origin[a] + (n as i64 - 1) as f64 * self.step[a] as f64 * geometry.spacing[a];
+        let place =
+            |n: usize, a: usize| geometry.origin[a] + (n as i64 - 1) as f64 * self.step[a] as f64 * geometry.spacing[a];
         let nodes = (0..self.counts[1]).flat_map(|j| (0..self.counts[0]).map(move |i| [i, j]));
         nodes.map(|[i, j]| of([place(i, 0), place(j, 1), place(plane, 2)])).collect()
     }
@@ -95,12 +96,7 @@ impl Lattice {
 
 fn catmull_rom(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
-    [
-        0.5 * (-t3 + 2.0 * t2 - t),
-        0.5 * (3.0 * t3 - 5.0 * t2 + 2.0),
-        0.5 * (-3.0 * t3 + 4.0 * t2 + t),
-        0.5 * (t3 - t2),
-    ]
+    [0.5 * (-t3 + 2.0 * t2 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (-3.0 * t3 + 4.0 * t2 + t), 0.5 * (t3 - t2)]
 }
 
 #[cfg(test)]

@@ -90,9 +90,10 @@ mod tests {
         let mut outline = |radius: f64, lobes: f64| -> Vec<[f64; 2]> {
             let turn = |n: usize| n as f64 / marks as f64 * std::f64::consts::TAU;
             let at = |n: usize| (turn(n), radius * (1.0 + lobes * (3.0 * turn(n)).cos()));
-            (0..marks).map(|n| (at(n), [normal(), normal()])).map(|((t, r), noise)| {
-                [r * t.cos() + sigma * noise[0], r * t.sin() + sigma * noise[1]]
-            }).collect()
+            (0..marks)
+                .map(|n| (at(n), [normal(), normal()]))
+                .map(|((t, r), noise)| [r * t.cos() + sigma * noise[0], r * t.sin() + sigma * noise[1]])
+                .collect()
         };
         (0..12).map(|n| outline(8.0 + f64::from(n), if n % 2 == 0 { 0.0 } else { 0.1 })).collect()
     }

@@ -84,7 +84,10 @@ mod tests {
     #[test]
     fn planes_of_axes_and_oblique_ones_keep_their_points() {
         let circle = |of: &dyn Fn(f64, f64) -> [f64; 3]| -> Vec<[f64; 3]> {
-            (0..12).map(|n| f64::from(n) / 12.0 * std::f64::consts::TAU).map(|t| of(4.0 * t.cos(), 3.0 * t.sin())).collect()
+            (0..12)
+                .map(|n| f64::from(n) / 12.0 * std::f64::consts::TAU)
+                .map(|t| of(4.0 * t.cos(), 3.0 * t.sin()))
+                .collect()
         };
         let tolerance = [0.25, 0.25, 0.5];
         let flat = circle(&|a, b| [a, b, 7.0]);

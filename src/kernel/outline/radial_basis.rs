@@ -106,8 +106,12 @@ mod tests {
 
     #[test]
     fn a_linear_function_comes_back_and_values_are_kept() {
-        let points: Vec<[f64; 3]> =
-            (0..40).map(|n| { let t = f64::from(n); [(t * 0.7).sin() * 9.0, (t * 1.3).cos() * 7.0, t * 0.4] }).collect();
+        let points: Vec<[f64; 3]> = (0..40)
+            .map(|n| {
+                let t = f64::from(n);
+                [(t * 0.7).sin() * 9.0, (t * 1.3).cos() * 7.0, t * 0.4]
+            })
+            .collect();
         let of = |p: [f64; 3]| 2.0 + 0.5 * p[0] - p[1] + 3.0 * p[2];
         let linear = RadialBasis::through(&points, &points.iter().map(|&p| of(p)).collect::<Vec<_>>(), 0.0).unwrap();
         let (value, gradient) = linear.value([20.0, -11.0, 5.0]);

@@ -155,7 +155,10 @@ impl Buckets {
         let rows = (j - ring).max(0)..=(j + ring).min(counts[1] - 1);
         rows.flat_map(move |row| {
             let step = if (row - j).abs() == ring || ring == 0 { 1 } else { 2 * ring };
-            (i - ring..=i + ring).step_by(step as usize).filter(move |n| (0..counts[0]).contains(n)).map(move |n| (n, row))
+            (i - ring..=i + ring)
+                .step_by(step as usize)
+                .filter(move |n| (0..counts[0]).contains(n))
+                .map(move |n| (n, row))
         })
         .map(move |(n, row)| &self.squares[(row * counts[0] + n) as usize])
     }

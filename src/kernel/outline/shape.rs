@@ -12,6 +12,11 @@ use super::section::Section;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::vector::dot;
 
+/// Points beside outlines lie at least so many smallest spacings away.
+pub const LEAST_BESIDE: f64 = 0.75;
+/// Values may be missed by as much as a function of 50 cubed smallest spacings would gain by it: outlines of neighbouring
+/// slices smooth each other a little, which is less than marks scatter.
+const SMOOTHING: f64 = 50.0;
 /// Samples at most: what solving for them takes grows with the third power.
 const MOST_SAMPLES: usize = 900;
 /// Points along an outline, at least and at most, where there is room.
@@ -40,10 +45,14 @@ impl Fitted {
     #[must_use]
     pub fn new(sections: &[&Section], least: f64) -> Option<Self> {
         let samples = sampled(sections, least);
+        let smoothing = SMOOTHING * (least / LEAST_BESIDE).powi(3);
         let Some(ends) = parallel_ends(sections) else {
-            return Some(Self { function: RadialBasis::through(&samples.points, &samples.values)?, ends: None });
+            return Some(Self {
+                function: RadialBasis::through(&samples.points, &samples.values, smoothing)?,
+                ends: None,
+            });
         };
-        let function = closed(sections, samples, ends)?;
+        let function = closed(sections, samples, ends, smoothing)?;
         Some(Self { function, ends: Some(ends) })
     }
 
@@ -100,10 +109,10 @@ fn parallel_ends(sections: &[&Section]) -> Option<Ends> {
 }
 
 /// The function through the samples that is positive beyond both ends.
-fn closed(sections: &[&Section], mut samples: Samples, ends: Ends) -> Option<RadialBasis> {
+fn closed(sections: &[&Section], mut samples: Samples, ends: Ends, smoothing: f64) -> Option<RadialBasis> {
     let (first, last) = (sections.first()?, sections.last()?);
     let (below, above) = (ends.low - first.plane.offset, ends.high - last.plane.offset);
-    let open = RadialBasis::through(&samples.points, &samples.values);
+    let open = RadialBasis::through(&samples.points, &samples.values, smoothing);
     let before = samples.points.len();
     let is_open = |place: [f64; 3]| open.as_ref().is_none_or(|function| function.value(place).0 < 0.0);
     samples.add_end(first, below, is_open);
@@ -111,7 +120,7 @@ fn closed(sections: &[&Section], mut samples: Samples, ends: Ends) -> Option<Rad
     if samples.points.len() == before {
         return open;
     }
-    RadialBasis::through(&samples.points, &samples.values)
+    RadialBasis::through(&samples.points, &samples.values, smoothing)
 }
 
 /// A shape on a grid.

@@ -14,9 +14,9 @@ use super::equidistant::{Between, Candidates, Known};
 use super::marching_cubes::Patch;
 use super::polygon::{self, Point};
 use super::splits::Splits;
+use super::tetrahedron::{ORDERS, Tetrahedron, corner_of};
 use super::vertex_key::VertexKey;
 use crate::grid::Box3;
-use crate::kernel::vector::{cross, dot, sub};
 
 /// The surfaces inside the cells of one brick.
 #[derive(Clone, Debug, Default)]
@@ -27,8 +27,6 @@ pub struct TaggedPatch {
     pub distances: Vec<f64>,
 }
 
-/// Orders in which a way along a cell's edges can take the axes; each is a tetrahedron.
-const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 /// The edges of a tetrahedron.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
@@ -40,12 +38,6 @@ pub struct Interfaces {
     candidates: Candidates,
     /// The direction across the surface at each vertex of the patch.
     normals: Vec<[f64; 3]>,
-}
-
-/// A tetrahedron of a cell.
-#[derive(Clone, Copy)]
-struct Tetrahedron {
-    corners: [Corner; 4],
 }
 
 /// What splits the edges of a cell, by the middle of the edge in halves of voxels of the cell, x fastest.
@@ -131,40 +123,9 @@ impl Interfaces {
         }
     }
 
-    /// The pieces of a tetrahedron: each is a polygon of vertices, named by the corners that they lie between, that
-    /// separates two of its corners.
+    /// Cuts a tetrahedron by the labels of its corners.
     fn cut(&mut self, known: &Known<'_>, tetrahedron: &Tetrahedron, patch: &mut TaggedPatch) {
-        let labels = tetrahedron.corners.map(|corner| corner.label);
-        let like = |n: usize| (0..4).filter(|&m| labels[m] == labels[n]).fold(0_u8, |set, m| set | 1 << m);
-        let mut kinds: Vec<u8> = (0..4).map(like).collect();
-        kinds.sort_unstable_by_key(|set| (std::cmp::Reverse(set.count_ones()), *set));
-        kinds.dedup();
-        let members = |set: u8| (0..4).filter(move |n| set >> n & 1 == 1).map(|n| 1_u8 << n);
-        let mut face = |corners: [u8; 2], polygon: &[u8]| self.facet(known, tetrahedron, corners, polygon, patch);
-        match *kinds.as_slice() {
-            [many, one] if one.is_power_of_two() => {
-                let [a, b, c] = three(members(many));
-                face([a, one], &[a | one, b | one, c | one]);
-            }
-            [pair, other] => {
-                let ([a, b, _], [c, d, _]) = (three(members(pair)), three(members(other)));
-                face([a, c], &[a | c, b | c, b | d, a | d]);
-            }
-            [pair, c, d] => {
-                let [a, b, _] = three(members(pair));
-                face([c, d], &[c | d, a | c | d, b | c | d]);
-                for single in [c, d] {
-                    face([a, single], &[a | single, b | single, b | c | d, a | c | d]);
-                }
-            }
-            _ => {
-                for (n, m) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
-                    let edge = 1_u8 << n | 1 << m;
-                    let [k, l, _] = three(members(0b1111 & !edge));
-                    face([1 << n, 1 << m], &[edge, edge | k, 0b1111, edge | l]);
-                }
-            }
-        }
+        tetrahedron.pieces(|corners, polygon| self.facet(known, tetrahedron, corners, polygon, patch));
     }
 
     /// Adds a polygon that separates the labels of two corners.
@@ -176,17 +137,11 @@ impl Interfaces {
         polygon: &[u8],
         patch: &mut TaggedPatch,
     ) {
-        let place = |set: u8| set.trailing_zeros() as usize;
-        let [from, to] = corners.map(place);
-        let pair = [from, to].map(|n| tetrahedron.corners[n].label);
+        let pair = tetrahedron.pair(corners);
         if pair.contains(&0) {
             return;
         }
-        // Which way round is told from the middles of what vertices lie within, which never fall together.
-        let middles = [0, 1, 2].map(|n| tetrahedron.middle(polygon[n]));
-        let normal = cross(sub(middles[1], middles[0]), sub(middles[2], middles[0]));
-        let along = sub(tetrahedron.middle(1 << to), tetrahedron.middle(1 << from));
-        let is_upward = (dot(normal, along) > 0.0) == (pair[0] < pair[1]);
+        let is_upward = tetrahedron.is_upward(corners, polygon);
         for triangle in self.triangles(known, tetrahedron, polygon, is_upward, patch) {
             patch.patch.triangles.push(if is_upward { triangle } else { [triangle[0], triangle[2], triangle[1]] });
             patch.patch.pairs.push([pair[0].min(pair[1]), pair[0].max(pair[1])]);
@@ -315,37 +270,4 @@ fn place_in_cell(cell: [i64; 3], halves: [i64; 3]) -> usize {
 /// A place in physical units, from the centre of the domain's first voxel.
 fn physical(known: &Known<'_>, place: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|a| place[a] * known.geometry.spacing[a])
-}
-
-impl Tetrahedron {
-    /// The middle of some of its corners, voxel units.
-    fn middle(&self, set: u8) -> [f64; 3] {
-        let corners =
-            || self.corners.iter().enumerate().filter(move |(n, _)| set >> n & 1 == 1).map(|(_, corner)| corner);
-        std::array::from_fn(|a| corners().map(|corner| corner.place[a]).sum::<f64>() / f64::from(set.count_ones()))
-    }
-
-    /// Some of its corners in the order of all cells, how many they are, and the key of the vertex within them.
-    fn sorted(&self, set: u8) -> ([Corner; 4], usize, VertexKey) {
-        let mut corners = self.corners;
-        let mut len = 0;
-        for n in (0..4).filter(|n| set >> n & 1 == 1) {
-            corners[len] = self.corners[n];
-            len += 1;
-        }
-        corners[..len].sort_unstable_by_key(Corner::order);
-        let halves = corners.map(|corner| corner.halves);
-        (corners, len, VertexKey::within(&halves[..len]))
-    }
-}
-
-/// The first three of some sets; 0 where there are fewer.
-fn three(sets: impl Iterator<Item = u8>) -> [u8; 3] {
-    let mut found = [0; 3];
-    found.iter_mut().zip(sets).for_each(|(place, set)| *place = set);
-    found
-}
-
-fn corner_of(cell: [i64; 3], corner: u8) -> [i64; 3] {
-    std::array::from_fn(|a| cell[a] + i64::from(corner >> a & 1))
 }

@@ -4,23 +4,28 @@
 //! [`SurfaceMeasure`] sums volume and area as the triangles pass, [`PatchIndex`] answers how far points lie from them.
 
 mod components;
+mod contact;
 mod corner;
 mod creases;
 mod edge_tally;
 mod equidistant;
+mod indicators;
 mod interfaces;
 mod marching_cubes;
 mod measure;
 mod nearby;
 mod nearest;
 mod pairs;
+mod partition;
 mod polygon;
 mod splits;
 mod tables;
+mod tetrahedron;
 mod vertex_key;
 mod weld;
 
 pub use components::Components;
+pub use contact::{Contact, Contacts};
 pub use edge_tally::EdgeTally;
 pub use equidistant::{Between, Known};
 pub use interfaces::{Interfaces, TaggedPatch};
@@ -29,6 +34,7 @@ pub use measure::{Measures, SurfaceMeasure};
 pub use nearby::Nearby;
 pub use nearest::{Hausdorff, Nearest, PatchIndex};
 pub use pairs::{Pair, Pairs};
+pub use partition::{Partition, REACH as PARTITION_REACH};
 pub use vertex_key::VertexKey;
 pub use weld::Welder;
 

@@ -4,6 +4,7 @@
 //! alive at one time. Everything is an upper bound but for objects whose search has to reach farther than its start:
 //! how far, only the flood can tell, and it is what the estimate is to be given before.
 
+use super::neighbours::needs;
 use super::reach::first_reach;
 use super::settings::{Guides, SegmentSettings};
 use crate::grid::{Box3, BrickGrid};
@@ -80,6 +81,8 @@ pub fn estimate(
     let writing = if writes { threads * COARSE_VOXELS * size.max(4) } else { 0 };
     // Decoders keep their buffers.
     let decoders = threads * plane;
+    let [joining, joined] =
+        if objects.len() > 1 { needs(guides.geometry, settings.fill_gaps, threads) } else { [0; 2] };
     let coarse = if writes { voxels * size * 3 / 4 } else { 0 };
     let buffers = if settings.smoothing == Smoothing::Gaussian && settings.motion.rho > 0.0 {
         THREAD_BYTES.max(thread_bytes(guides.geometry.spacing, [settings.sigma_on(guides.geometry); 3], size))
@@ -87,8 +90,8 @@ pub fn estimate(
         THREAD_BYTES
     };
     Estimate {
-        held: reading.max(decoders + (solving + threads * buffers).max(writing)),
-        scratch: image + (SOLVE_BYTES * largest_voxels).max(coarse) + KEPT_BYTES * near_voxels,
+        held: reading.max(decoders + (solving + threads * buffers).max(writing).max(joining)),
+        scratch: image + (SOLVE_BYTES * largest_voxels).max(coarse).max(joined) + KEPT_BYTES * near_voxels,
         least_scratch: image + DISTANCE_BYTES * largest_voxels,
         output: if writes { voxels * (size + 1) * 3 / 2 + 5 * near_voxels } else { 0 },
         near_voxels,

@@ -19,7 +19,7 @@ pub enum Overlap {
 }
 
 /// An object on the image's grid.
-pub(super) struct Placed<'a> {
+pub struct Placed<'a> {
     /// Its label.
     pub label: u32,
     /// Its box in voxels of the image.

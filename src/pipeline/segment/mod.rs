@@ -3,14 +3,16 @@
 //! ```text
 //! stack -> bricks -> root image        marks -> contours -> cloud, object by object, each in a box of its own
 //! cloud -> distance -> flood -> band   image -> presmoothing -> edge detector      band + edges -> time loop -> u
-//! u -> surface -> mesh, measures       u of all objects -> one label volume
+//! u -> surface -> mesh, measures       u of all objects -> neighbours -> one label volume, common faces
 //! ```
 
 mod check;
+mod cross_validate;
 mod estimate;
 mod labels;
-mod outlines;
+mod neighbours;
 mod object;
+mod outlines;
 mod output;
 mod reach;
 mod seed;
@@ -19,12 +21,13 @@ mod shape_field;
 mod shape_start;
 mod speed;
 mod survey;
-
+mod tissue;
 
 pub use check::{check_marks, check_seed, check_smoothing};
 pub use estimate::{Estimate, estimate};
-pub use labels::Overlap;
-pub use object::ObjectReport;
-pub use output::{Outcome, segment};
+pub use labels::{Overlap, Placed};
+pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_faces, join};
+pub use object::{CrossValidation, ObjectReport};
 pub use outlines::crossed;
+pub use output::{Outcome, Refused, segment};
 pub use settings::{Guides, ImageModel, SegmentSettings, Start};

@@ -47,6 +47,27 @@ pub struct ObjectReport {
     pub measures: Measures,
     /// Distances of the marks from the surface.
     pub hausdorff: Option<Hausdorff>,
+    /// Marks that are farther from it than the largest spacing.
+    pub marks_off: u64,
+    /// What was taken from the image: `level`, `wall`, `edge`, `none`.
+    pub image_model: &'static str,
+    /// Weight of the pull towards the marks.
+    pub theta: f64,
+    /// Weight of the image.
+    pub rho: f64,
+    /// How far outlines that are left out lie from the shape of the others, where that was asked for.
+    pub cross_validation: Option<CrossValidation>,
+}
+
+/// What leaving out each outline in turn tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CrossValidation {
+    /// Mean distance of the marks that were left out.
+    pub mean: f64,
+    /// Nine of ten are nearer than this.
+    pub p90: f64,
+    /// Where the next outline would help most: the axis that its slice is across, and the slice.
+    pub next_slice: Option<(usize, i64)>,
 }
 
 /// A solved object before its surface is drawn.
@@ -69,6 +90,12 @@ pub(super) struct Solution {
     pub band_voxels: u64,
     /// How the time loop ended.
     pub evolution: Evolution,
+    /// What was taken from the image.
+    pub image_model: &'static str,
+    /// Weight of the pull towards the marks.
+    pub theta: f64,
+    /// Weight of the image.
+    pub rho: f64,
 }
 
 /// Solves one object.
@@ -109,7 +136,7 @@ pub(super) fn solve<T: Element>(
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
     let beta = enclosure.beta;
     let band = enclosure.into_band(engine, &suffix)?;
-    let forces = Forces { theta: settings.motion.theta, speed: None };
+    let forces = Forces::of_settings(settings);
     Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole }
         .solve(engine, picture, marks, settings, forces)
 }
@@ -118,8 +145,19 @@ pub(super) fn solve<T: Element>(
 pub(super) struct Forces {
     /// Weight of the pull towards the marks.
     pub theta: f64,
+    /// Weight of the image.
+    pub rho: f64,
     /// Speed outwards; none where the image's edges pull, or nothing.
     pub speed: Option<BrickArray<f32>>,
+    /// What the image shows, where that is known.
+    pub image_model: Option<&'static str>,
+}
+
+impl Forces {
+    /// Those of the settings: the marks, and the image's edges.
+    pub(super) fn of_settings(settings: &SegmentSettings) -> Self {
+        Self { theta: settings.motion.theta, rho: settings.motion.rho, speed: None, image_model: None }
+    }
 }
 
 /// An object before its surface moves.
@@ -170,7 +208,22 @@ impl Begun {
         stage.finish();
         let Band { u, distance: pull, voxels: band_voxels, .. } = band;
         let distance = distance.unwrap_or(pull);
-        Ok(Solution { geometry, window, u, distance, cloud_points, beta, hole, band_voxels, evolution })
+        let (theta, rho) = (forces.theta, forces.rho);
+        let image_model = forces.image_model.unwrap_or(if edges.is_some() { "edge" } else { "none" });
+        Ok(Solution {
+            geometry,
+            window,
+            u,
+            distance,
+            cloud_points,
+            beta,
+            hole,
+            band_voxels,
+            evolution,
+            image_model,
+            theta,
+            rho,
+        })
     }
 }
 

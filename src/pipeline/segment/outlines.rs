@@ -56,9 +56,8 @@ pub(super) fn sections_of(marks: &ObjectMarks, image: &Geometry, scatter: Scatte
     });
     let step = CURVE_STEP * image.min_spacing();
     let same = SAME_PLANE * image.min_spacing();
-    let shared = |a: &Drawn, b: &Drawn| {
-        a.plane.is_parallel_to(&b.plane) && (a.plane.offset - b.plane.offset).abs() <= same
-    };
+    let shared =
+        |a: &Drawn, b: &Drawn| a.plane.is_parallel_to(&b.plane) && (a.plane.offset - b.plane.offset).abs() <= same;
     let section = |group: &[Drawn]| {
         let curves = group.iter().map(|outline| Curve::through(&outline.in_plane, scatter, step)).collect();
         let marks = group.iter().flat_map(|outline| outline.marks).copied().collect();

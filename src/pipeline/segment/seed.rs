@@ -27,7 +27,7 @@ pub(super) fn grow<T: Element>(
     stage.voxels(window.volume());
     let band = start_as_ball(&stage, engine, &geometry, seed)?;
     stage.finish();
-    let forces = Forces { theta: settings.motion.theta, speed: None };
+    let forces = Forces::of_settings(settings);
     Begun { geometry, window, band, distance: None, cloud_points: 0, beta: 0.0, hole: None }
         .solve(engine, picture, marks, settings, forces)
 }

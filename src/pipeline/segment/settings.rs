@@ -1,6 +1,7 @@
 //! Settings of `segment`, and what they are when the user gives none. Lengths are physical.
 
 use super::labels::Overlap;
+use super::neighbours::FillGaps;
 use crate::grid::{Geometry, PointCloud};
 use crate::pipeline::distance::Method;
 use crate::pipeline::image_terms::{EdgeSettings, Smoothing};
@@ -60,6 +61,10 @@ pub struct SegmentSettings {
     pub percentiles: [f64; 2],
     /// Which object a voxel belongs to where several overlap.
     pub overlap: Overlap,
+    /// How wide a gap between objects is filled; none leaves them.
+    pub fill_gaps: Option<FillGaps>,
+    /// True to leave out each outline in turn and tell how far its marks then are.
+    pub cross_validate: bool,
     /// Edge of the bricks that hold the image.
     pub brick: i64,
 }
@@ -80,6 +85,8 @@ impl Default for SegmentSettings {
             caps: true,
             percentiles: [0.1, 99.9],
             overlap: Overlap::Smaller,
+            fill_gaps: None,
+            cross_validate: false,
             brick: 64,
         }
     }

@@ -62,9 +62,28 @@ pub(super) fn begin<T: Element>(
         stage.finish();
         Some(speed)
     };
-    let forces = Forces { theta: theta(&trust, settings), speed };
+    let image_model = match (trust.reading.model, speed.is_some()) {
+        (_, false) => None,
+        (BorderModel::Level, true) => Some("level"),
+        (BorderModel::Wall(_), true) => Some("wall"),
+        (BorderModel::None, true) => Some("none"),
+    };
+    let rho = match (image_model, trust.reading.model) {
+        (None, _) => settings.motion.rho,
+        (_, BorderModel::None) => 0.0,
+        _ => settings.rho.unwrap_or(1.0),
+    };
+    let forces = Forces { theta: theta(&trust, settings), rho, speed, image_model };
     let ShapeField { geometry, window, .. } = field;
-    let begun = Begun { geometry, window, band, distance: Some(distance), cloud_points: cloud.len() as u64, beta: 0.0, hole: None };
+    let begun = Begun {
+        geometry,
+        window,
+        band,
+        distance: Some(distance),
+        cloud_points: cloud.len() as u64,
+        beta: 0.0,
+        hole: None,
+    };
     Ok((begun, forces))
 }
 

@@ -3,6 +3,7 @@
 
 use super::object::{Picture, name};
 use super::outlines;
+use super::settings::ImageModel;
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::{Box3, Geometry};
@@ -11,7 +12,7 @@ use crate::kernel::image::profiles::{LEN, Profile, REACH, STEP, interpolate};
 use crate::kernel::outline::cross_validation::{HeldOut, leave_out};
 use crate::kernel::outline::curve::Scatter;
 use crate::kernel::outline::section::Section;
-use crate::kernel::outline::shape::Fitted;
+use crate::kernel::outline::shape::{Fitted, LEAST_BESIDE};
 use crate::kernel::vector::{dot, sub};
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::ObjectMarks;
@@ -19,8 +20,6 @@ use crate::pipeline::smoothing::smoothed;
 use crate::pipeline::vicinity::Vicinity;
 use crate::store::{BoxSource, Element};
 
-/// Points beside outlines lie at least so many smallest spacings away.
-pub(super) const LEAST_BESIDE: f64 = 0.75;
 /// Profiles are taken so many smallest spacings apart, and so many at most for an object.
 const APART: f64 = 1.5;
 const MOST_PROFILES: usize = 3000;
@@ -150,13 +149,23 @@ fn profile_at(
 }
 
 /// How far each object's image and shape are trusted.
-pub(super) fn trust(objects: &[Option<Outlined>], image: &Geometry, scatter: Scatter) -> Vec<Option<Trust>> {
+pub(super) fn trust(
+    objects: &[Option<Outlined>],
+    image: &Geometry,
+    scatter: Scatter,
+    model: ImageModel,
+) -> Vec<Option<Trust>> {
     let h = image.min_spacing();
     let all: Vec<Profile> = objects.iter().flatten().flat_map(|o| &o.profiles).map(|s| s.profile).collect();
     let growth = h * growth(objects.iter().flatten().flat_map(|o| &o.held_out), scatter).unwrap_or(DEFAULT_GROWTH / h);
     let trust = |object: &Outlined| {
         let own: Vec<Profile> = object.profiles.iter().map(|s| s.profile).collect();
-        let reading = Reading::of(if own.len() < ENOUGH_PROFILES { &all } else { &own });
+        let profiles = if own.len() < ENOUGH_PROFILES { &all } else { &own };
+        let reading = match model {
+            ImageModel::Level if !profiles.is_empty() => Reading::forced(profiles, false),
+            ImageModel::Wall if !profiles.is_empty() => Reading::forced(profiles, true),
+            _ => Reading::of(profiles),
+        };
         Trust {
             reading,
             image: image_deviation(&object.profiles, &reading, object.deviation(), h),

@@ -1,0 +1,84 @@
+//! The common faces of all labels, as one mesh: drawn box by box, welded in grid order, each pair measured.
+
+use super::EDGE;
+use super::join::Joined;
+use crate::error::Result;
+use crate::exec::{Stage, Workers};
+use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
+use crate::kernel::image::labels;
+use crate::kernel::surface::{Contact, Contacts, PARTITION_REACH, Partition, Patch, Welder, cells_of_brick};
+use crate::store::{BoxSource, MeshSink};
+
+/// Boxes whose patches are made in parallel before they are welded in order.
+const BATCH: usize = 64;
+
+/// Sends the surfaces between labels, and to what has none, to `sink`; measures what lies between each two.
+///
+/// # Errors
+/// When the sink fails, a field cannot be read or the run is interrupted.
+pub fn draw(
+    stage: &Stage<'_>,
+    geometry: &Geometry,
+    joined: &Joined<'_>,
+    sink: &mut dyn MeshSink,
+) -> Result<Vec<Contact>> {
+    let grid = BrickGrid::new(geometry.shape, EDGE);
+    let (mut welder, mut contacts) = (Welder::new(geometry), Contacts::new(geometry));
+    let workers = Workers::new(|| (Partition::default(), Vec::new()));
+    let bricks: Vec<BrickId> = (0..grid.len()).collect();
+    for batch in bricks.chunks(BATCH) {
+        let patches = stage.run(batch, &workers, |(partition, values), &id| {
+            patch(partition, values, joined, geometry, &grid.brick_box(id))
+        })?;
+        for patch in patches.iter().filter(|patch| !patch.triangles.is_empty()) {
+            welder.add(patch, sink)?;
+            for ((_, positions), &pair) in welder.triangles_of(patch).zip(&patch.pairs) {
+                contacts.add(pair, positions);
+            }
+        }
+    }
+    Ok(contacts.finish())
+}
+
+/// Whether two labels have a face in common.
+pub(in crate::pipeline::segment) fn touch(stage: &Stage<'_>, geometry: &Geometry, joined: &Joined<'_>) -> Result<bool> {
+    let grid = BrickGrid::new(geometry.shape, EDGE);
+    let bricks: Vec<BrickId> = (0..grid.len()).collect();
+    let found = stage.run(&bricks, &Workers::new(Vec::new), |values, &id| {
+        let part = grid.brick_box(id);
+        let part = Box3::new(part.lo, part.hi.map(|v| v + 1)).intersect(&geometry.domain());
+        if BoxSource::<u32>::constant_in(joined, &part) == Some(0) {
+            return Ok(false);
+        }
+        values.resize(part.len(), 0_u32);
+        joined.read_box(&part, values)?;
+        Ok(labels::touch(values, &part))
+    })?;
+    Ok(found.contains(&true))
+}
+
+/// The surfaces in the cells of one box; around the image lies what has no label.
+fn patch(
+    partition: &mut Partition,
+    values: &mut Vec<u32>,
+    joined: &Joined<'_>,
+    geometry: &Geometry,
+    brick: &Box3,
+) -> Result<Patch> {
+    let cells = cells_of_brick(brick, geometry.shape, true);
+    let mut patch = Patch { cells, ..Patch::default() };
+    let around = Box3::new(cells.lo, cells.hi.map(|v| v + 1)).grow(PARTITION_REACH);
+    let inside = around.intersect(&geometry.domain());
+    if cells.is_empty() || BoxSource::<u32>::constant_in(joined, &inside) == Some(0) {
+        return Ok(patch);
+    }
+    let mut known = vec![0; inside.len()];
+    joined.read_box(&inside, &mut known)?;
+    values.clear();
+    values.resize(around.len(), 0);
+    for (row, (y, z)) in known.chunks_exact(inside.shape()[0] as usize).zip(inside.rows()) {
+        values[around.offset_of([inside.lo[0], y, z])..][..row.len()].copy_from_slice(row);
+    }
+    partition.extract(values, &around, &cells, &mut patch);
+    Ok(patch)
+}

@@ -1,0 +1,62 @@
+//! From solved objects to a tissue: their labels joined, and the faces that they have in common written.
+
+use super::labels::Placed;
+use super::neighbours::{Joined, Joining, csv, draw_faces, join, touch};
+use super::settings::SegmentSettings;
+use crate::error::{Error, Result};
+use crate::exec::Engine;
+use crate::grid::Geometry;
+use crate::io::mesh_ply::PlyWriter;
+use crate::io::ome_zarr::StoreWriter;
+use crate::kernel::surface::Contact;
+use crate::pipeline::ingest::Image;
+use crate::pipeline::intensity::Normalised;
+use crate::store::{Element, NoMesh};
+
+/// Joins objects; walls between them are looked for in the image where that has a say in them.
+pub(super) fn join_objects<'a, T: Element>(
+    engine: &Engine,
+    geometry: &Geometry,
+    image: &Image<T>,
+    objects: Vec<Placed<'a>>,
+    settings: &SegmentSettings,
+) -> Result<Joined<'a>> {
+    let normalised = Normalised::new(&image.bricks, image.range, geometry.domain());
+    let joining = Joining {
+        geometry,
+        image: (settings.motion.rho > 0.0).then_some(&normalised),
+        overlap: settings.overlap,
+        fill: settings.fill_gaps,
+    };
+    join(engine, objects, &joining)
+}
+
+/// Draws, measures and writes the faces of labels, where gaps were filled or any two meet.
+pub(super) fn write_faces(
+    engine: &Engine,
+    geometry: &Geometry,
+    labels: &Joined<'_>,
+    settings: &SegmentSettings,
+    store: Option<&StoreWriter>,
+) -> Result<Vec<Contact>> {
+    let stage = engine.stage("faces", 0);
+    stage.voxels(geometry.domain().volume());
+    if settings.fill_gaps.is_none() && !touch(&stage, geometry, labels)? {
+        stage.finish();
+        return Ok(Vec::new());
+    }
+    let contacts = match store {
+        Some(store) => {
+            let mut mesh = PlyWriter::create_tagged(&store.file("meshes/cells.ply")?, geometry.unit.as_deref())?;
+            let contacts = draw_faces(&stage, geometry, labels, &mut mesh)?;
+            mesh.finish()?;
+            let path = store.file("meshes/contacts.csv")?;
+            std::fs::write(&path, csv(&contacts))
+                .map_err(|e| Error::from_io("cannot write the table", &e).at(&path))?;
+            contacts
+        }
+        None => draw_faces(&stage, geometry, labels, &mut NoMesh)?,
+    };
+    stage.finish();
+    Ok(contacts)
+}
