@@ -17,6 +17,8 @@ pub const LEAST_BESIDE: f64 = 0.75;
 /// Values may be missed by as much as a function of 50 cubed smallest spacings would gain by it: outlines of neighbouring
 /// slices smooth each other a little, which is less than marks scatter.
 const SMOOTHING: f64 = 50.0;
+/// For small objects as much of their own size.
+const SMOOTHING_OF_SIZE: f64 = 0.05;
 /// Samples at most: what solving for them takes grows with the third power.
 const MOST_SAMPLES: usize = 900;
 /// Points along an outline, at least and at most, where there is room.
@@ -45,7 +47,8 @@ impl Fitted {
     #[must_use]
     pub fn new(sections: &[&Section], least: f64) -> Option<Self> {
         let samples = sampled(sections, least);
-        let smoothing = SMOOTHING * (least / LEAST_BESIDE).powi(3);
+        let radius = sections.iter().map(|section| section.radius()).sum::<f64>() / sections.len().max(1) as f64;
+        let smoothing = (SMOOTHING * (least / LEAST_BESIDE).powi(3)).min(SMOOTHING_OF_SIZE * radius.powi(3));
         let Some(ends) = parallel_ends(sections) else {
             return Some(Self {
                 function: RadialBasis::through(&samples.points, &samples.values, smoothing)?,
@@ -112,7 +115,9 @@ fn parallel_ends(sections: &[&Section]) -> Option<Ends> {
 fn closed(sections: &[&Section], mut samples: Samples, ends: Ends, smoothing: f64) -> Option<RadialBasis> {
     let (first, last) = (sections.first()?, sections.last()?);
     let (below, above) = (ends.low - first.plane.offset, ends.high - last.plane.offset);
-    let open = RadialBasis::through(&samples.points, &samples.values, smoothing);
+    // A single plane tells nothing of what is beside it.
+    let open =
+        (sections.len() > 1).then(|| RadialBasis::through(&samples.points, &samples.values, smoothing)).flatten();
     let before = samples.points.len();
     let is_open = |place: [f64; 3]| open.as_ref().is_none_or(|function| function.value(place).0 < 0.0);
     samples.add_end(first, below, is_open);

@@ -20,6 +20,10 @@ use crate::pipeline::marks::ObjectMarks;
 use crate::store::{BrickArray, Element};
 use std::sync::Arc;
 
+/// The weight of the image beside its variance: that is measured with outlines left out, so from twice as far away as
+/// anything between outlines is, and four times too large.
+const RHO: f64 = 4.0;
+
 /// The band reaches so many deviations of the shape from it, and within these bounds of smallest spacings.
 const BAND_DEVIATIONS: f64 = 3.0;
 const BAND: [f64; 2] = [5.0, 16.0];
@@ -56,7 +60,7 @@ pub(super) fn begin<T: Element>(
         None
     } else {
         let stage = engine.stage(&name("speed", marks), 0);
-        let rho = settings.rho.unwrap_or(1.0);
+        let rho = settings.rho.unwrap_or(RHO);
         let pulls = Pulls { field: &field, trust, rho, image: smoothed.as_ref(), shape: &shape, distance: &distance };
         let speed = speed(&stage, engine, object, &pulls)?;
         stage.finish();
@@ -71,7 +75,7 @@ pub(super) fn begin<T: Element>(
     let rho = match (image_model, trust.reading.model) {
         (None, _) => settings.motion.rho,
         (_, BorderModel::None) => 0.0,
-        _ => settings.rho.unwrap_or(1.0),
+        _ => settings.rho.unwrap_or(RHO),
     };
     let forces = Forces { theta: theta(&trust, settings), rho, speed, image_model };
     let ShapeField { geometry, window, .. } = field;
@@ -166,7 +170,7 @@ fn start_at(
 
 /// Widths of the smoothing before levels and walls are looked for, in smallest spacings.
 const LEVEL_SIGMA: f64 = 1.0;
-const WALL_SIGMA: f64 = 1.5;
+const WALL_SIGMA: f64 = 1.0;
 
 fn smooth<T: Element>(
     engine: &Engine,

@@ -32,7 +32,7 @@ const NEAREST: usize = 8;
 pub(super) struct Pulls<'a> {
     pub field: &'a ShapeField<'a>,
     pub trust: Trust,
-    /// Weight of the image, 1 when it is to be weighed by its variance alone.
+    /// Weight of the image, 1 where it is to be weighed by its variance alone.
     pub rho: f64,
     /// The smoothed image; none where it is left out.
     pub image: Option<&'a BrickArray<f32>>,
