@@ -292,11 +292,17 @@ mod tests {
     fn every_flag_arrives() {
         let settings = meant(
             "--delta 1 --theta 2 --rho 3 --k 4 --sigma 5 --beta 6 --tau 7 --epsilon 8 --omega 1.5 --stop l2 --tol 9 \
-             --max-steps 10 --method fsm --edge plain --smoothing heat --percentiles 1,99 --no-caps --overlap last \
+             --max-steps 10 --method fsm --edge plain --smoothing heat --percentiles 1,99 --no-caps --overlap last --image wall --cross-validate \
               --fill-gaps 2.5 --brick 32",
         );
         let expected = SegmentSettings {
             method: Method::FSM,
+            // A beta is for the flood.
+            image: ImageModel::Wall,
+            start: Start::Flood,
+            theta: Some(2.0),
+            rho: Some(3.0),
+            cross_validate: true,
             motion: Motion {
                 theta: 2.0,
                 rho: 3.0,

@@ -247,3 +247,52 @@ fn families<'a>(sections: &[&'a Section]) -> Vec<Vec<&'a Section>> {
     }
     families
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::curve::Curve;
+    use super::super::plane::Plane;
+    use super::*;
+
+    /// A section of a ball of radius 10 around the origin, at a height.
+    fn section(height: f64, radius: f64) -> Section {
+        let circle = |n: u32| {
+            let t = f64::from(n) / 48.0 * std::f64::consts::TAU;
+            [radius * t.cos(), radius * t.sin(), height]
+        };
+        let marks: Vec<[f64; 3]> = (0..48).map(circle).collect();
+        let plane = Plane::of(&marks, [0.5; 3]).unwrap();
+        let points = marks.iter().map(|&p| plane.project(p)).collect();
+        Section::new(plane, vec![Curve { points, deviation: 0.1 }], marks)
+    }
+
+    #[test]
+    fn a_few_sections_of_a_ball_make_the_ball() {
+        let heights = [-7.0, 0.0, 7.0];
+        let sections: Vec<Section> = heights.iter().map(|&h: &f64| section(h, (100.0 - h * h).sqrt())).collect();
+        let fitted = Fitted::new(&sections.iter().collect::<Vec<_>>(), 0.75).unwrap();
+        for n in 0..200 {
+            let (t, z) = (f64::from(n) * 2.4, f64::from(n) / 100.0 - 0.995);
+            let across = (1.0f64 - z * z).sqrt();
+            let on_ball = [10.0 * across * t.cos(), 10.0 * across * t.sin(), 10.0 * z];
+            let off = fitted.distance(on_ball).0;
+            assert!(off.abs() < if z.abs() < 0.7 { 0.5 } else { 2.0 }, "{on_ball:?}: {off}");
+        }
+        assert!(fitted.distance([0.0; 3]).0 < -5.0 && fitted.distance([0.0, 0.0, 14.1]).0 > 0.0);
+    }
+
+    #[test]
+    fn a_single_section_however_small_is_a_body() {
+        for radius in [1.5, 2.5, 12.0, 300.0] {
+            let alone = section(4.0, radius);
+            let fitted = Fitted::new(&[&alone], 0.75).unwrap();
+            assert!(
+                fitted.distance([0.0, 0.0, 4.0]).0 < -0.3 * radius,
+                "{radius}: {:?}",
+                fitted.distance([0.0, 0.0, 4.0])
+            );
+            assert!(fitted.distance([0.0, 0.0, 4.0 + 1.05 * radius]).0 > 0.0);
+            assert!(fitted.distance([0.98 * radius, 0.0, 4.0]).0.abs() < 0.2 * radius);
+        }
+    }
+}

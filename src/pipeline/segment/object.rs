@@ -137,7 +137,7 @@ pub(super) fn solve<T: Element>(
     let beta = enclosure.beta;
     let band = enclosure.into_band(engine, &suffix)?;
     let forces = Forces::of_settings(settings);
-    Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole }
+    Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole, rests: false }
         .solve(engine, picture, marks, settings, forces)
 }
 
@@ -176,6 +176,8 @@ pub(super) struct Begun {
     pub beta: f64,
     /// The cloud's largest hole.
     pub hole: Option<Hole>,
+    /// True where it is too thin for the grid to move, and stays what its outlines say.
+    pub rests: bool,
 }
 
 impl Begun {
@@ -188,7 +190,7 @@ impl Begun {
         settings: &SegmentSettings,
         forces: Forces,
     ) -> Result<Solution> {
-        let Self { geometry, window, mut band, distance, cloud_points, beta, hole } = self;
+        let Self { geometry, window, mut band, distance, cloud_points, beta, hole, rests } = self;
         let edges = match (&forces.speed, settings.image) {
             (None, ImageModel::Edge | ImageModel::Auto) => {
                 edge_field(engine, picture, marks, settings, &geometry, window, &band)?
@@ -204,7 +206,11 @@ impl Begun {
         }
         let stage = engine.stage(&name("level set", marks), 0);
         stage.voxels(band.voxels);
-        let evolution = evolve(&stage, engine, &mut band, image, geometry.spacing, &time_loop)?;
+        let evolution = if rests {
+            Evolution { steps: 0, sor_iterations: 0, stopped_by: "too thin", residual: 0.0 }
+        } else {
+            evolve(&stage, engine, &mut band, image, geometry.spacing, &time_loop)?
+        };
         stage.finish();
         let Band { u, distance: pull, voxels: band_voxels, .. } = band;
         let distance = distance.unwrap_or(pull);

@@ -28,7 +28,7 @@ pub(super) fn grow<T: Element>(
     let band = start_as_ball(&stage, engine, &geometry, seed)?;
     stage.finish();
     let forces = Forces::of_settings(settings);
-    Begun { geometry, window, band, distance: None, cloud_points: 0, beta: 0.0, hole: None }
+    Begun { geometry, window, band, distance: None, cloud_points: 0, beta: 0.0, hole: None, rests: false }
         .solve(engine, picture, marks, settings, forces)
 }
 

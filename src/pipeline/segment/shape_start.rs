@@ -48,7 +48,12 @@ pub(super) fn begin<T: Element>(
     let cloud = cloud(&object.sections);
     let distance = distance_to(engine, marks, &field.geometry, &cloud, &set, settings)?;
     let stage = engine.stage(&name("band", marks), 0);
-    let band = start_at(&stage, engine, &shape, &distance, reach as f32, pull_range(&trust, h) as f32)?;
+    let mut band = start_at(&stage, engine, &shape, &distance, reach as f32, pull_range(&trust, h) as f32)?;
+    let rests = is_thin(&stage, &shape, field.geometry.max_spacing())?;
+    if rests {
+        let spacing = field.geometry.max_spacing() as f32;
+        slope(&stage, &mut band, &shape, spacing)?;
+    }
     stage.finish();
     let uses_edges = settings.image == ImageModel::Edge;
     let smoothed = match trust.reading.model {
@@ -87,6 +92,7 @@ pub(super) fn begin<T: Element>(
         cloud_points: cloud.len() as u64,
         beta: 0.0,
         hole: None,
+        rests,
     };
     Ok((begun, forces))
 }
@@ -166,6 +172,29 @@ fn start_at(
     band.voxels = counts.iter().sum();
     stage.voxels(band.voxels);
     Ok(band)
+}
+
+/// A shape that is nowhere deeper than so many largest spacings cannot be moved on its grid.
+const THIN: f64 = 1.5;
+
+fn is_thin(stage: &Stage<'_>, shape: &BrickArray<f32>, spacing: f64) -> Result<bool> {
+    let lowest = stage.run(&one_wave(shape.set()), &Workers::none(), |(), &slot| {
+        Ok(shape.read(slot, |values| values.iter().copied().fold(f32::INFINITY, f32::min)))
+    })?;
+    let deep = (0..shape.set().grid().len()).any(|id| shape.set().slot(id).is_none() && shape.absent(id) < 0.0);
+    Ok(!deep && lowest.into_iter().all(|value| f64::from(value) > -THIN * spacing))
+}
+
+/// A start that falls from 1 to 0 across the shape's surface, so that this is where u = 1/2 without any motion.
+fn slope(stage: &Stage<'_>, band: &mut Band, shape: &BrickArray<f32>, spacing: f32) -> Result<()> {
+    stage.run(&one_wave(shape.set()), &Workers::none(), |(), &slot| {
+        shape.read(slot, |shape| {
+            band.u.write(slot, |u| u.iter_mut().zip(shape).for_each(|(u, s)| *u = (0.5 - s / spacing).clamp(0.0, 1.0)));
+        });
+        band.u.refresh_faces(slot);
+        Ok(())
+    })?;
+    Ok(())
 }
 
 /// Widths of the smoothing before levels and walls are looked for, in smallest spacings.
