@@ -25,15 +25,18 @@ fn every_stage_heeds_signals() {
     let stages: Vec<&str> = lines.iter().filter_map(|line| Some(line.split_once("  done  ")?.0)).collect();
     let wanted = [
         "read stack",
+        "marks 1",
+        "profiles 1",
+        "shape 1",
         "distance 1",
-        "tagging 1",
         "band 1",
         "presmoothing 1",
-        "edges 1",
+        "speed 1",
         "level set 1",
         "surface 1",
         "write levelset 1",
         "write distance 1",
+        "neighbours",
         "write labels",
         "write image",
     ];
@@ -62,7 +65,7 @@ fn a_stage_under_way_is_left() {
     let bench = Bench::new(&Ball::small());
     // A level set that never rests: what ends the run is the signal, wherever in the stage it comes.
     let mut run = Held::start(bench.command(&format!("{RUN} --tol 1e-30 --max-steps 1000000000")));
-    run.hear("edges 1  done");
+    run.hear("speed 1  done");
     run.signal("INT");
     let Ended { status, said, .. } = run.finish();
     assert_eq!((status.code(), said.lines().last()), (Some(130), Some(SENTENCE)), "{said}");
@@ -74,7 +77,7 @@ fn a_stage_under_way_is_left() {
 fn what_a_killed_run_leaves_goes_with_the_next_one() {
     let bench = Bench::new(&Ball::small());
     let mut run = Held::start(bench.command(&format!("{RUN} --tol 1e-30 --max-steps 1000000000")));
-    run.hear("edges 1  done");
+    run.hear("speed 1  done");
     // While a run goes on, another one leaves its store alone.
     bench.succeed("segment image.tif --points marks.csv -o out/x.zarr -q --max-steps 1");
     assert_eq!(bench.entries("out").len(), 2, "{:?}", bench.entries("out"));

@@ -150,8 +150,8 @@ pub fn median(mut values: Vec<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::profiles::{REACH, STEP};
     use super::*;
+    use crate::kernel::image::profiles::{REACH, STEP};
 
     fn profiles(of: impl Fn(f64, f64) -> f64) -> Vec<Profile> {
         let profile = |k: usize| {

@@ -71,7 +71,7 @@ fn mean(values: impl Iterator<Item = f32>) -> f64 {
 pub fn interpolate(values: &[f32], part: &Box3, place: [f64; 3]) -> f32 {
     let last = part.shape().map(|n| (n - 1) as f64);
     let local: [f64; 3] = std::array::from_fn(|a| (place[a] - part.lo[a] as f64).clamp(0.0, last[a]));
-    let low = local.map(|v| v.floor());
+    let low = local.map(f64::floor);
     let share: [f64; 3] = std::array::from_fn(|a| local[a] - low[a]);
     let at = |by: [i64; 3]| {
         let voxel = std::array::from_fn(|a| part.lo[a] + (low[a] as i64 + by[a]).min(part.shape()[a] - 1));

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Where the image gives a speed F along the outward normal in place of g, its term is `max(F (u_q - u_p), 0) S_pq / 4`
-//! in place of that with r_p: `F |grad u|` by upwind differences (Osher & Sethian 1988), over the norms at the faces.
+//! in place of that with `r_p`: `F |grad u|` by upwind differences (Osher & Sethian 1988), over the norms at the faces.
 //!
 //! which is the printed scheme with `A_q / m = 1 / h_s` and the velocity written out. The solver gets it divided by the
 //! diagonal, `u_p = old_p + sum w_pq (u_q - old_p)` with `w = c / (1 + sum c)`: an average of `u_q` and `old_p`, so the

@@ -41,7 +41,7 @@ impl Lattice {
     }
 
     /// Takes over all planes, in order.
-    pub fn fill(&mut self, planes: Vec<Vec<f32>>) {
+    pub fn fill(&mut self, planes: &[Vec<f32>]) {
         self.values = planes.concat();
     }
 
@@ -109,7 +109,8 @@ mod tests {
         let of = |p: [f64; 3]| (0.1 * p[0] * p[0] - p[1] + 0.2 * p[2]) as f32;
         let mut lattice = Lattice::for_box(geometry.shape, geometry.spacing, 300.0);
         assert!(lattice.step[0] > 2);
-        lattice.fill((0..lattice.planes()).map(|n| lattice.plane(n, &geometry, of)).collect());
+        let planes: Vec<_> = (0..lattice.planes()).map(|n| lattice.plane(n, &geometry, of)).collect();
+        lattice.fill(&planes);
         let part = Box3::new([2, 3, 4], [41, 30, 17]);
         let mut values = vec![0.0; part.len()];
         lattice.read(&part, &mut values);

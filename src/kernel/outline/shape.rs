@@ -95,7 +95,9 @@ fn sampled(sections: &[&Section], least: f64) -> Samples {
     let kept: Vec<&Section> = kept.collect();
     let count = (MOST_SAMPLES / (3 * curves(&kept)).max(1)).clamp(ALONG[0], ALONG[1]);
     let mut samples = Samples::default();
-    kept.iter().for_each(|section| samples.add_section(section, count, least));
+    for section in &kept {
+        samples.add_section(section, count, least);
+    }
     samples
 }
 
@@ -250,9 +252,9 @@ fn families<'a>(sections: &[&'a Section]) -> Vec<Vec<&'a Section>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::curve::Curve;
-    use super::super::plane::Plane;
     use super::*;
+    use crate::kernel::outline::curve::Curve;
+    use crate::kernel::outline::plane::Plane;
 
     /// A section of a ball of radius 10 around the origin, at a height.
     fn section(height: f64, radius: f64) -> Section {

@@ -114,7 +114,7 @@ pub(super) fn solve<T: Element>(
     }
     if let Some(outlined) = outlined {
         let (begun, forces) = begin(engine, picture, marks, outlined, settings)?;
-        return begun.solve(engine, picture, marks, settings, forces);
+        return begun.solve(engine, picture, marks, settings, &forces);
     }
     let cloud = cloud_of(marks, picture.geometry, settings.caps);
     let loose = settings.start == Start::Auto && !marks.drawn;
@@ -138,7 +138,7 @@ pub(super) fn solve<T: Element>(
     let band = enclosure.into_band(engine, &suffix)?;
     let forces = Forces::of_settings(settings);
     Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole, rests: false }
-        .solve(engine, picture, marks, settings, forces)
+        .solve(engine, picture, marks, settings, &forces)
 }
 
 /// What moves an object's surface, beside its curvature and the settings.
@@ -188,7 +188,7 @@ impl Begun {
         picture: &Picture<'_, T>,
         marks: &ObjectMarks,
         settings: &SegmentSettings,
-        forces: Forces,
+        forces: &Forces,
     ) -> Result<Solution> {
         let Self { geometry, window, mut band, distance, cloud_points, beta, hole, rests } = self;
         let edges = match (&forces.speed, settings.image) {

@@ -135,13 +135,16 @@ fn run<T: Sample>(
     Ok(Outcome { geometry, element: T::TYPE, objects, refused, label_voxels, neighbours, contacts })
 }
 
+/// Each object's outlines and how far they are trusted; none where its marks are none.
+type Surveyed = (Vec<Option<Outlined>>, Vec<Option<Trust>>);
+
 /// Looks at all objects that are marked by outlines, unless the papers' start was asked for.
 fn survey<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
     objects: &[ObjectMarks],
     settings: &SegmentSettings,
-) -> Result<(Vec<Option<Outlined>>, Vec<Option<Trust>>)> {
+) -> Result<Surveyed> {
     let scatter = scatter_of(objects, picture.geometry);
     let looks = !matches!(settings.image, ImageModel::None | ImageModel::Edge) && settings.rho != Some(0.0);
     let outlined = |marks: &ObjectMarks| match settings.start {

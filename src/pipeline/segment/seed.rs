@@ -29,7 +29,7 @@ pub(super) fn grow<T: Element>(
     stage.finish();
     let forces = Forces::of_settings(settings);
     Begun { geometry, window, band, distance: None, cloud_points: 0, beta: 0.0, hole: None, rests: false }
-        .solve(engine, picture, marks, settings, forces)
+        .solve(engine, picture, marks, settings, &forces)
 }
 
 /// A band of all voxels, which starts as the ball; no point pulls at it.

@@ -39,7 +39,7 @@ impl<'a> ShapeField<'a> {
         let planes: Vec<usize> = (0..lattice.planes()).collect();
         let of = |point: [f64; 3]| fitted.distance(point).0 as f32;
         let filled = stage.run(&planes, &Workers::none(), |(), &n| Ok(lattice.plane(n, &geometry, of)))?;
-        lattice.fill(filled);
+        lattice.fill(&filled);
         Ok(Self { shape: Shape::new(fitted, geometry.clone(), lattice, sections), geometry, window })
     }
 

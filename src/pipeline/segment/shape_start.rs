@@ -12,6 +12,7 @@ use crate::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use crate::kernel::image::border_model::BorderModel;
 use crate::kernel::level_set::CELL;
 use crate::kernel::level_set::start::{self, near_surface};
+use crate::kernel::outline::section::Section;
 use crate::pipeline::band::Band;
 use crate::pipeline::distance::{Sources, cloud_distance};
 use crate::pipeline::image_terms::{EdgeSettings, presmooth};
@@ -101,7 +102,7 @@ pub(super) fn begin<T: Element>(
 fn band_reach(object: &Outlined, trust: &Trust, h: f64) -> f64 {
     let offsets = || object.sections.windows(2).filter(|w| w[0].plane.is_parallel_to(&w[1].plane));
     let gap = offsets().map(|w| (w[1].plane.offset - w[0].plane.offset).abs()).fold(0.0, f64::max);
-    let radius = object.sections.iter().map(|s| s.radius()).fold(0.0, f64::max);
+    let radius = object.sections.iter().map(Section::radius).fold(0.0, f64::max);
     let farthest = if gap > 0.0 { 0.5 * gap } else { radius };
     let unsure = trust.shape.hypot(trust.growth * (farthest / h).powi(2));
     (BAND_DEVIATIONS * unsure + trust.reading.bias.abs()).clamp(BAND[0], BAND[1])

@@ -161,9 +161,9 @@ fn levels(stage: &Stage<'_>, geometry: &Geometry, object: &Outlined, trust: &Tru
         Ok([0, 1].map(|m| values.iter().map(|v| v[m] as f32).collect::<Vec<f32>>()))
     })?;
     let [level, fall] = &mut lattices;
-    let (levels, falls) = nodes.into_iter().map(|[a, b]| (a, b)).unzip();
-    level.fill(levels);
-    fall.fill(falls);
+    let (levels, falls): (Vec<_>, Vec<_>) = nodes.into_iter().map(|[a, b]| (a, b)).unzip();
+    level.fill(&levels);
+    fall.fill(&falls);
     let [level, fall] = lattices;
     Ok(Levels { level, fall, mean_fall: mean_fall as f32 })
 }
