@@ -1,6 +1,6 @@
 //! The image smoothed by a Gaussian on some of its cells, block by block (`kernel::image::gaussian`).
 //!
-//! A block is a box of cells around those that are wanted, at most [`BLOCK`] along each axis: what its cells read of the
+//! A block is a box of cells around those that are wanted, at most four along each axis: what its cells read of the
 //! voxels around them is read and smoothed along x and y once for all of them. Which blocks there are changes no bit.
 //! Beyond the domain lies its mirror image, the border voxel repeated (homogeneous Neumann): the solution is then that of
 //! the heat equation without flux through the border.

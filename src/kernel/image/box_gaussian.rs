@@ -84,7 +84,7 @@ mod tests {
         let at = |v| f64::from(out[part.offset_of(v)]);
         let middle = at([5, 5, 6]);
         for (voxel, squared) in [([6, 5, 6], 1.0), ([5, 4, 6], 1.0), ([5, 5, 8], 4.0), ([4, 6, 7], 3.0)] {
-            assert!((at(voxel) / middle - (-0.5 * squared).exp()).abs() < 1e-6, "{voxel:?}");
+            assert!((at(voxel) / middle - (-0.5_f64 * squared).exp()).abs() < 1e-6, "{voxel:?}");
         }
         assert_eq!(at([5, 7, 4]), at([5, 3, 8]));
         Gaussian::new(1.0).smooth(voxels().map(|_| 0.75), &around, &part, &mut out);
