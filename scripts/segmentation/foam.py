@@ -53,4 +53,6 @@ def read_contacts(store):
         return {}
     first, second = list(rows[0])[:2]
     area = next(name for name in rows[0] if "area" in name)
-    return {tuple(sorted((int(row[first]), int(row[second])))): float(row[area]) for row in rows}
+    pairs = ((tuple(sorted((int(row[first]), int(row[second])))), float(row[area])) for row in rows)
+    # 0 is the outside of the tissue.
+    return {pair: size for pair, size in pairs if pair[0] > 0}
