@@ -85,7 +85,7 @@ pub fn check_seed(seed: &Seed, image: &Geometry) -> Result<()> {
 /// # Errors
 /// When a Gaussian would be too wide.
 pub fn check_smoothing(settings: &SegmentSettings, image: &Geometry) -> Result<()> {
-    if settings.smoothing == Smoothing::Heat || settings.motion.rho == 0.0 {
+    if settings.smoothing == Smoothing::Heat || !settings.uses_image() {
         return Ok(());
     }
     check_width(image.spacing, [settings.sigma_on(image); 3])

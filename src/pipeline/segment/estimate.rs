@@ -84,7 +84,7 @@ pub fn estimate(
     let [joining, joined] =
         if objects.len() > 1 { needs(guides.geometry, settings.fill_gaps, threads) } else { [0; 2] };
     let coarse = if writes { voxels * size * 3 / 4 } else { 0 };
-    let buffers = if settings.smoothing == Smoothing::Gaussian && settings.motion.rho > 0.0 {
+    let buffers = if settings.smoothing == Smoothing::Gaussian && settings.uses_image() {
         THREAD_BYTES.max(thread_bytes(guides.geometry.spacing, [settings.sigma_on(guides.geometry); 3], size))
     } else {
         THREAD_BYTES

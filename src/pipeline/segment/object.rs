@@ -109,6 +109,9 @@ pub(super) fn solve<T: Element>(
     outlined: Option<(&Outlined, Trust)>,
     settings: &SegmentSettings,
 ) -> Result<Solution> {
+    if outlined.is_none() && matches!(settings.image, ImageModel::Level | ImageModel::Wall) {
+        return Err(needs_outlines(marks, settings));
+    }
     if let Some(seed) = marks.seed {
         return grow(engine, picture, marks, &seed, settings);
     }
@@ -136,7 +139,9 @@ pub(super) fn solve<T: Element>(
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
     let beta = enclosure.beta;
     let band = enclosure.into_band(engine, &suffix)?;
-    let forces = Forces::of_settings(settings);
+    // Marks that a cloud is made of are dense, and edges make results worse where marks are good.
+    let edges = !loose || settings.image == ImageModel::Edge;
+    let forces = Forces { edges: edges && settings.uses_image(), ..Forces::of_settings(settings) };
     Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole, rests: false }
         .solve(engine, picture, marks, settings, &forces)
 }
@@ -147,6 +152,8 @@ pub(super) struct Forces {
     pub theta: f64,
     /// Weight of the image.
     pub rho: f64,
+    /// True where the image's edges pull.
+    pub edges: bool,
     /// Speed outwards; none where the image's edges pull, or nothing.
     pub speed: Option<BrickArray<f32>>,
     /// What the image shows, where that is known.
@@ -156,7 +163,8 @@ pub(super) struct Forces {
 impl Forces {
     /// Those of the settings: the marks, and the image's edges.
     pub(super) fn of_settings(settings: &SegmentSettings) -> Self {
-        Self { theta: settings.motion.theta, rho: settings.motion.rho, speed: None, image_model: None }
+        let (theta, rho) = (settings.motion.theta, settings.motion.rho);
+        Self { theta, rho, edges: settings.uses_image(), speed: None, image_model: None }
     }
 }
 
@@ -191,12 +199,8 @@ impl Begun {
         forces: &Forces,
     ) -> Result<Solution> {
         let Self { geometry, window, mut band, distance, cloud_points, beta, hole, rests } = self;
-        let edges = match (&forces.speed, settings.image) {
-            (None, ImageModel::Edge | ImageModel::Auto) => {
-                edge_field(engine, picture, marks, settings, &geometry, window, &band)?
-            }
-            _ => None,
-        };
+        let look = || edge_field(engine, picture, marks, settings, &geometry, window, &band);
+        let edges = forces.edges.then(look).transpose()?;
         let mut time_loop = settings.motion.time_loop(&geometry);
         time_loop.velocity.theta = forces.theta as f32;
         time_loop.velocity.speed = forces.speed.is_some();
@@ -245,10 +249,7 @@ fn edge_field<T: Element>(
     geometry: &Geometry,
     window: Box3,
     band: &Band,
-) -> Result<Option<BrickArray<f32>>> {
-    if settings.motion.rho == 0.0 {
-        return Ok(None);
-    }
+) -> Result<BrickArray<f32>> {
     let image = Normalised::new(picture.voxels, picture.range, window);
     let (set, spacing) = (band.solved.set(), geometry.spacing);
     let detector = settings.edges(geometry);
@@ -258,7 +259,16 @@ fn edge_field<T: Element>(
     let stage = engine.stage(&name("edges", marks), set.len() as u64);
     let found = edges(&stage, engine, &smoothed, set, spacing, detector.k)?;
     stage.finish();
-    Ok(Some(found))
+    Ok(found)
+}
+
+fn needs_outlines(marks: &ObjectMarks, settings: &SegmentSettings) -> Error {
+    let model = if settings.image == ImageModel::Wall { "wall" } else { "level" };
+    Error::input(format!(
+        "object {} has no outlines along which --image {model} could read grey values; name its contours in a contour \
+         column, each in a plane, and leave out --start flood and --beta, or give --image edge",
+        marks.object
+    ))
 }
 
 fn leak(marks: &ObjectMarks, settings: &SegmentSettings, saddle: f32, image: &Geometry) -> Error {

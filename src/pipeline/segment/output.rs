@@ -86,9 +86,9 @@ fn run<T: Sample>(
     let stage = engine.stage("read stack", crop.shape()[2].unsigned_abs());
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();
-    if settings.motion.rho > 0.0 && image.extremes[0] == image.extremes[1] {
+    if settings.uses_image() && image.extremes[0] == image.extremes[1] {
         return Err(Error::input(format!(
-            "the image holds only the value {}; check --channel, --time and --crop, or give --rho 0 to use the marks \
+            "the image holds only the value {}; check --channel, --time and --crop, or give --image none to use the marks \
              alone",
             image.extremes[0]
         )));
@@ -146,7 +146,7 @@ fn survey<T: Element>(
     settings: &SegmentSettings,
 ) -> Result<Surveyed> {
     let scatter = scatter_of(objects, picture.geometry);
-    let looks = !matches!(settings.image, ImageModel::None | ImageModel::Edge) && settings.rho != Some(0.0);
+    let looks = settings.uses_image() && settings.image != ImageModel::Edge;
     let outlined = |marks: &ObjectMarks| match settings.start {
         Start::Auto if marks.seed.is_none() => Outlined::new(engine, picture, marks, scatter, looks),
         _ => Ok(None),

@@ -96,6 +96,12 @@ impl Default for SegmentSettings {
 const SIGMA_VOXELS: f64 = 2.0;
 
 impl SegmentSettings {
+    /// True where the image has a say.
+    #[must_use]
+    pub fn uses_image(&self) -> bool {
+        self.image != ImageModel::None && self.rho != Some(0.0)
+    }
+
     /// The width of the presmoothing on a grid.
     #[must_use]
     pub fn sigma_on(&self, geometry: &Geometry) -> f64 {

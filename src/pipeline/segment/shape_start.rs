@@ -56,34 +56,19 @@ pub(super) fn begin<T: Element>(
         slope(&stage, &mut band, &shape, spacing)?;
     }
     stage.finish();
-    let uses_edges = settings.image == ImageModel::Edge;
-    let smoothed = match trust.reading.model {
-        BorderModel::None => None,
-        _ if uses_edges => None,
-        model => Some(smooth(engine, picture, marks, &field, &set, settings, model)?),
-    };
-    let speed = if uses_edges {
-        None
+    let forces = if settings.image == ImageModel::Edge {
+        Forces { theta: theta(&trust, settings), ..Forces::of_settings(settings) }
     } else {
-        let stage = engine.stage(&name("speed", marks), 0);
-        let rho = settings.rho.unwrap_or(RHO);
-        let pulls = Pulls { field: &field, trust, rho, image: smoothed.as_ref(), shape: &shape, distance: &distance };
-        let speed = speed(&stage, engine, object, &pulls)?;
-        stage.finish();
-        Some(speed)
+        let fields = [&shape, &distance];
+        let (rho, speed) = image_speed(engine, picture, marks, (object, trust), &field, fields, settings)?;
+        let image_model = match trust.reading.model {
+            BorderModel::Level => "level",
+            BorderModel::Wall(_) => "wall",
+            BorderModel::None => "none",
+        };
+        let theta = theta(&trust, settings);
+        Forces { theta, rho, edges: false, speed: Some(speed), image_model: Some(image_model) }
     };
-    let image_model = match (trust.reading.model, speed.is_some()) {
-        (_, false) => None,
-        (BorderModel::Level, true) => Some("level"),
-        (BorderModel::Wall(_), true) => Some("wall"),
-        (BorderModel::None, true) => Some("none"),
-    };
-    let rho = match (image_model, trust.reading.model) {
-        (None, _) => settings.motion.rho,
-        (_, BorderModel::None) => 0.0,
-        _ => settings.rho.unwrap_or(RHO),
-    };
-    let forces = Forces { theta: theta(&trust, settings), rho, speed, image_model };
     let ShapeField { geometry, window, .. } = field;
     let begun = Begun {
         geometry,
@@ -96,6 +81,30 @@ pub(super) fn begin<T: Element>(
         rests,
     };
     Ok((begun, forces))
+}
+
+/// The speed that image and shape give, and the image's weight in it.
+fn image_speed<T: Element>(
+    engine: &Engine,
+    picture: &Picture<'_, T>,
+    marks: &ObjectMarks,
+    (object, trust): (&Outlined, Trust),
+    field: &ShapeField<'_>,
+    [shape, distance]: [&BrickArray<f32>; 2],
+    settings: &SegmentSettings,
+) -> Result<(f64, BrickArray<f32>)> {
+    let model = trust.reading.model;
+    let (rho, smoothed) = if model == BorderModel::None {
+        (0.0, None)
+    } else {
+        let smoothed = smooth(engine, picture, marks, field, shape.set(), settings, model)?;
+        (settings.rho.unwrap_or(RHO), Some(smoothed))
+    };
+    let stage = engine.stage(&name("speed", marks), 0);
+    let pulls = Pulls { field, trust, rho, image: smoothed.as_ref(), shape, distance };
+    let speed = speed(&stage, engine, object, &pulls)?;
+    stage.finish();
+    Ok((rho, speed))
 }
 
 /// How far from the shape the surface may go, in smallest spacings.

@@ -24,7 +24,7 @@ pub(super) fn join_objects<'a, T: Element>(
     let normalised = Normalised::new(&image.bricks, image.range, geometry.domain());
     let joining = Joining {
         geometry,
-        image: (settings.motion.rho > 0.0).then_some(&normalised),
+        image: settings.uses_image().then_some(&normalised),
         overlap: settings.overlap,
         fill: settings.fill_gaps,
     };
