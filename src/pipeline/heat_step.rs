@@ -12,7 +12,7 @@ use crate::kernel::level_set::mask::CellMask;
 use crate::kernel::level_set::scheme::SCHEME_LEN;
 use crate::kernel::level_set::sor::{Halves, Relaxation, relax};
 use crate::kernel::level_set::{CELL, CELL_LEN};
-use crate::store::{BoxSource, BrickArray};
+use crate::store::{BoxSink, BoxSource, BrickArray};
 use crate::tile::HaloTile;
 
 /// Relaxations of a cell each time it is taken up, over-relaxed by [`HEAT_OMEGA`].
@@ -44,10 +44,9 @@ pub(super) fn heat_step(
         let part = grid.brick_box(set.id(slot));
         let values = &mut values[..part.len()];
         image.read_box(&part, values)?;
-        let copy = |brick: &mut [f32]| spread(values, &part.shape(), brick);
-        initial.write(slot, copy);
-        smoothed.write(slot, copy);
-        solved.write(slot, |flags: &mut [u8]| spread(&vec![1; values.len()], &part.shape(), flags));
+        initial.write_box(&part, values)?;
+        smoothed.write_box(&part, values)?;
+        solved.write_box(&part, &vec![1; values.len()])?;
         smoothed.refresh_faces(slot);
         Ok(())
     })?;
@@ -55,14 +54,6 @@ pub(super) fn heat_step(
         relax_heat(stage, set, [&smoothed, &initial], &solved, spacing, sigma)?;
     }
     Ok(smoothed)
-}
-
-/// Copies a dense box, shorter than a cell where the domain ends, into a cell's storage.
-fn spread<T: Copy>(values: &[T], shape: &[i64; 3], brick: &mut [T]) {
-    for (row, values) in values.chunks_exact(shape[0] as usize).enumerate() {
-        let (y, z) = (row % shape[1] as usize, row / shape[1] as usize);
-        brick[(z * CELL + y) * CELL..][..values.len()].copy_from_slice(values);
-    }
 }
 
 fn relax_heat(

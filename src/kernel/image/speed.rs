@@ -96,13 +96,15 @@ pub fn speeds(shape: &[f32], distance: &[f32], offsets: &[f32], doubts: &[f32], 
     let h = by.spacing;
     for n in 0..out.len() {
         let away = distance[n] / h;
-        let unsure = by.shape.hypot(by.growth * away * away);
+        let grown = by.growth * away * away;
+        let variance = by.shape * by.shape + grown * grown;
         let image = by.image * doubts[n];
-        let weight = unsure * unsure / (unsure * unsure + image * image);
-        let weight = if weight.is_finite() { weight } else { 0.0 };
+        // No weight where the image's variance is not finite.
+        let weight = variance / (variance + image * image);
         let off = shape[n] / h - by.bias;
-        let beyond = (off.abs() / (GATE * unsure.hypot(by.image.min(unsure)).max(1.0)) - 1.0).max(0.0);
-        let gate = (-beyond * beyond * 4.0).exp();
+        let reach = GATE * (variance + variance.min(by.image * by.image)).sqrt().max(1.0);
+        let beyond = (off.abs() / reach - 1.0).clamp(0.0, 1.0);
+        let gate = (1.0 - beyond * beyond) * (1.0 - beyond * beyond);
         let pull = by.rho * weight * gate * offsets[n] / h - (1.0 - weight * gate) * off;
         out[n] = (pull / SPAN).clamp(-FASTEST, FASTEST);
     }

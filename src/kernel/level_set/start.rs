@@ -81,6 +81,21 @@ pub fn holds(sides: CellSides<'_>, edge: usize, valid: [usize; 3], reaches: Reac
     rows(edge, valid).flatten().any(|place| sides.solves(place, reaches))
 }
 
+/// The start of u around a surface, whose signed distance is `shape`: 1 inside, 0 outside; or falling from 1 to 0 over
+/// `width` across it, where that is above 0.
+pub fn from_shape(shape: &[f32], width: f32, u: &mut [f32]) {
+    if width > 0.0 {
+        u.iter_mut().zip(shape).for_each(|(u, s)| *u = (0.5 - s / width).clamp(0.0, 1.0));
+    } else {
+        u.iter_mut().zip(shape).for_each(|(u, &s)| *u = value(u8::from(s < 0.0)));
+    }
+}
+
+/// A potential that pulls towards sources as their distance does, but fades beyond `range`: `d range / (d + range)`.
+pub fn fading(distance: &[f32], range: f32, out: &mut [f32]) {
+    out.iter_mut().zip(distance).for_each(|(out, d)| *out = d / (1.0 + d / range));
+}
+
 /// Sets 1 at voxels of the domain within `reach` of a surface, 0 elsewhere; `shape` is the signed distance to it.
 /// Returns how many there are.
 pub fn near_surface(shape: &[f32], edge: usize, valid: [usize; 3], reach: f32, solved: &mut [u8]) -> u64 {

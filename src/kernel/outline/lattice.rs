@@ -27,13 +27,8 @@ impl Lattice {
         self.counts[2]
     }
 
-    /// The values of one plane of nodes of a grid, of a function of the position.
-    pub fn plane(&self, plane: usize, geometry: &Geometry, of: impl Fn([f64; 3]) -> f32) -> Vec<f32> {
-        self.plane_of(plane, geometry, of)
-    }
-
-    /// The same of a function with values of any kind.
-    pub fn plane_of<R>(&self, plane: usize, geometry: &Geometry, of: impl Fn([f64; 3]) -> R) -> Vec<R> {
+    /// The values of a function of the position on one plane of nodes of a grid.
+    pub fn plane<R>(&self, plane: usize, geometry: &Geometry, of: impl Fn([f64; 3]) -> R) -> Vec<R> {
         let place =
             |n: usize, a: usize| geometry.origin[a] + (n as i64 - 1) as f64 * self.step[a] as f64 * geometry.spacing[a];
         let nodes = (0..self.counts[1]).flat_map(|j| (0..self.counts[0]).map(move |i| [i, j]));

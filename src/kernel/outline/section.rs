@@ -79,6 +79,15 @@ impl Section {
     }
 }
 
+/// The widest distance between neighbouring sections of one direction, which come one after the other; 0 where none is
+/// parallel to the one before it.
+#[must_use]
+pub fn widest_gap<S: std::borrow::Borrow<Section>>(sections: &[S]) -> f64 {
+    let planes = sections.windows(2).map(|pair| [&pair[0].borrow().plane, &pair[1].borrow().plane]);
+    let gaps = planes.filter(|[a, b]| a.is_parallel_to(b)).map(|[a, b]| (b.offset - a.offset).abs());
+    gaps.fold(0.0, f64::max)
+}
+
 fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> [[f64; 2]; 2] {
     points.fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], p| {
         [std::array::from_fn(|a| low[a].min(p[a])), std::array::from_fn(|a| high[a].max(p[a]))]

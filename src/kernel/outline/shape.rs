@@ -8,7 +8,7 @@
 use super::lattice::Lattice;
 use super::radial_basis::RadialBasis;
 use super::samples::Samples;
-use super::section::Section;
+use super::section::{Section, widest_gap};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::vector::dot;
 
@@ -108,7 +108,7 @@ fn parallel_ends(sections: &[&Section]) -> Option<Ends> {
     if !sections.iter().all(|section| section.plane.is_parallel_to(&first.plane)) {
         return None;
     }
-    let gap = sections.windows(2).map(|w| w[1].plane.offset - w[0].plane.offset).fold(0.0, f64::max);
+    let gap = widest_gap(sections);
     let height = if gap > 0.0 { gap } else { first.radius() };
     Some(Ends { normal: first.plane.normal, low: first.plane.offset - height, high: last.plane.offset + height })
 }
@@ -223,8 +223,7 @@ impl<'a> Shape<'a> {
 
     /// The length over which what is left of an end section fades.
     fn fade(&self, family: &[&Section]) -> f64 {
-        let gap = family.windows(2).map(|w| w[1].plane.offset - w[0].plane.offset).fold(0.0, f64::max);
-        (0.5 * gap).max(self.geometry.min_spacing())
+        (0.5 * widest_gap(family)).max(self.geometry.min_spacing())
     }
 
     /// What is left of a section at the point of its plane below a point.

@@ -23,14 +23,18 @@ struct Drawn<'a> {
     in_plane: Vec<[f64; 2]>,
 }
 
+/// The plane that a contour was drawn in; none where it is not flat.
+fn plane_of(contour: &[[f64; 3]], image: &Geometry) -> Option<Plane> {
+    Plane::of(contour, image.spacing.map(|h| FLATNESS * h))
+}
+
 /// The outlines of an object; none where any contour of three marks or more is none.
 fn drawn<'a>(marks: &'a ObjectMarks, image: &Geometry) -> Option<Vec<Drawn<'a>>> {
     if !marks.drawn {
         return None;
     }
-    let tolerance = image.spacing.map(|h| FLATNESS * h);
     let outline = |marks: &'a Vec<[f64; 3]>| {
-        let plane = Plane::of(marks, tolerance)?;
+        let plane = plane_of(marks, image)?;
         let in_plane = marks.iter().map(|&p| plane.project(p)).collect();
         Some(Drawn { plane, marks, in_plane })
     };
@@ -69,9 +73,8 @@ pub(super) fn sections_of(marks: &ObjectMarks, image: &Geometry, scatter: Scatte
 /// The numbers of an object's contours that cross themselves.
 #[must_use]
 pub fn crossed(marks: &ObjectMarks, image: &Geometry) -> Vec<i64> {
-    let tolerance = image.spacing.map(|h| FLATNESS * h);
     let crosses = |contour: &[[f64; 3]]| {
-        let plane = Plane::of(contour, tolerance)?;
+        let plane = plane_of(contour, image)?;
         Some(crosses_itself(&contour.iter().map(|&p| plane.project(p)).collect::<Vec<_>>()))
     };
     let numbered = marks.numbers.iter().zip(&marks.contours);

@@ -9,9 +9,8 @@ use crate::kernel::level_set::CELL;
 use crate::kernel::outline::lattice::Lattice;
 use crate::kernel::outline::section::Section;
 use crate::kernel::outline::shape::{Fitted, Shape};
-use crate::kernel::outline::spread;
 use crate::pipeline::vicinity::voxel_bounds;
-use crate::store::BrickArray;
+use crate::store::{BoxSink, BrickArray};
 
 /// Nodes of the lattice that the function is laid out on, about.
 const NODES: f64 = 60_000.0;
@@ -64,25 +63,33 @@ impl<'a> ShapeField<'a> {
         Ok(Arc::new(BrickSet::from_fn(grid, |id| near[id as usize])))
     }
 
-    /// The signed distance on cells.
-    pub(super) fn on_cells(&self, stage: &Stage<'_>, engine: &Engine, set: &Arc<BrickSet>) -> Result<BrickArray<f32>> {
+    /// The signed distance on cells, and how deep the shape is in them; as deep as can be where it fills others.
+    pub(super) fn on_cells(
+        &self,
+        stage: &Stage<'_>,
+        engine: &Engine,
+        set: &Arc<BrickSet>,
+    ) -> Result<(BrickArray<f32>, f64)> {
         let mut field = BrickArray::with_faces(engine.scratch(), set)?;
         let grid = *set.grid();
+        let mut fills = false;
         for id in (0..grid.len()).filter(|&id| set.slot(id).is_none()) {
             let corner = grid.brick_box(id).lo;
             let mut value = [0.0];
             self.read(&Box3::new(corner, corner.map(|v| v + 1)), &mut value);
             field.set_absent(id, value[0]);
+            fills |= value[0] < 0.0;
         }
-        stage.run(&one_wave(set), &Workers::new(Vec::new), |values, &slot| {
+        let lowest = stage.run(&one_wave(set), &Workers::new(Vec::new), |values, &slot| {
             let part = grid.brick_box(set.id(slot));
             values.resize(part.len(), 0.0);
             self.read(&part, values);
-            field.write(slot, |cell| spread(values, &part, CELL, cell));
+            field.write_box(&part, values)?;
             field.refresh_faces(slot);
-            Ok(())
+            Ok(values.iter().copied().fold(f32::INFINITY, f32::min))
         })?;
-        Ok(field)
+        let deepest = if fills { f64::INFINITY } else { -f64::from(lowest.into_iter().fold(0.0, f32::min)) };
+        Ok((field, deepest))
     }
 }
 

@@ -11,8 +11,8 @@ use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use crate::kernel::image::border_model::BorderModel;
 use crate::kernel::level_set::CELL;
-use crate::kernel::level_set::start::{self, near_surface};
-use crate::kernel::outline::section::Section;
+use crate::kernel::level_set::start;
+use crate::kernel::outline::section::{Section, widest_gap};
 use crate::pipeline::band::Band;
 use crate::pipeline::distance::{Sources, cloud_distance};
 use crate::pipeline::image_terms::{EdgeSettings, presmooth};
@@ -29,6 +29,9 @@ const RHO: f64 = 4.0;
 const BAND_DEVIATIONS: f64 = 3.0;
 const BAND: [f64; 2] = [5.0, 16.0];
 
+/// A shape that is nowhere deeper than so many largest spacings cannot be moved on its grid.
+const THIN: f64 = 1.5;
+
 /// Starts an object from its outlines.
 pub(super) fn begin<T: Element>(
     engine: &Engine,
@@ -43,18 +46,17 @@ pub(super) fn begin<T: Element>(
     let stage = engine.stage(&name("shape", marks), 0);
     let field = ShapeField::new(&stage, picture.geometry, &sections, &object.fitted, reach)?;
     let set = field.cells_within(&stage, reach)?;
-    let shape = field.on_cells(&stage, engine, &set)?;
+    let (shape, deepest) = field.on_cells(&stage, engine, &set)?;
     stage.voxels((set.len() * set.grid().brick_len()) as u64);
     stage.finish();
     let cloud = cloud(&object.sections);
     let distance = distance_to(engine, marks, &field.geometry, &cloud, &set, settings)?;
+    let spacing = field.geometry.max_spacing();
+    let rests = deepest < THIN * spacing;
+    let width = if rests { spacing as f32 } else { 0.0 };
+    let by = AtShape { reach: reach as f32, range: pull_range(&trust, h) as f32, width };
     let stage = engine.stage(&name("band", marks), 0);
-    let mut band = start_at(&stage, engine, &shape, &distance, reach as f32, pull_range(&trust, h) as f32)?;
-    let rests = is_thin(&stage, &shape, field.geometry.max_spacing())?;
-    if rests {
-        let spacing = field.geometry.max_spacing() as f32;
-        slope(&stage, &mut band, &shape, spacing)?;
-    }
+    let band = start_at(&stage, engine, [&shape, &distance], &by)?;
     stage.finish();
     let forces = if settings.image == ImageModel::Edge {
         Forces { theta: theta(&trust, settings), ..Forces::of_settings(settings) }
@@ -109,8 +111,7 @@ fn image_speed<T: Element>(
 
 /// How far from the shape the surface may go, in smallest spacings.
 fn band_reach(object: &Outlined, trust: &Trust, h: f64) -> f64 {
-    let offsets = || object.sections.windows(2).filter(|w| w[0].plane.is_parallel_to(&w[1].plane));
-    let gap = offsets().map(|w| (w[1].plane.offset - w[0].plane.offset).abs()).fold(0.0, f64::max);
+    let gap = widest_gap(&object.sections);
     let radius = object.sections.iter().map(Section::radius).fold(0.0, f64::max);
     let farthest = if gap > 0.0 { 0.5 * gap } else { radius };
     let unsure = trust.shape.hypot(trust.growth * (farthest / h).powi(2));
@@ -147,34 +148,38 @@ fn distance_to(
     Ok(distance)
 }
 
-/// The band around a shape, started at it; the outlines' pull fades beyond `range`: `psi = range (1 - exp(-d / range))`
-/// takes the distance's place.
+/// How a band starts at a shape; physical lengths.
+struct AtShape {
+    /// How far it reaches.
+    reach: f32,
+    /// Beyond this the outlines' pull fades.
+    range: f32,
+    /// Over how much u falls across the surface; 0 for a step.
+    width: f32,
+}
+
+/// The band around a shape, started at it.
 fn start_at(
     stage: &Stage<'_>,
     engine: &Engine,
-    shape: &BrickArray<f32>,
-    distance: &BrickArray<f32>,
-    reach: f32,
-    range: f32,
+    [shape, distance]: [&BrickArray<f32>; 2],
+    by: &AtShape,
 ) -> Result<Band> {
     let set = shape.set();
     let new = || BrickArray::<f32>::with_faces(engine.scratch(), set);
     let mut band = Band { u: new()?, distance: new()?, solved: BrickArray::new(engine.scratch(), set)?, voxels: 0 };
     for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
         band.u.set_absent(id, start::value(u8::from(shape.absent(id) < 0.0)));
-        band.distance.set_absent(id, range);
+        band.distance.set_absent(id, by.range);
     }
+    let edge = set.grid().edge() as usize;
     let counts = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
         let valid = set.grid().brick_box(set.id(slot)).shape().map(|n| n as usize);
         let count = shape.read(slot, |shape| {
-            band.u.write(slot, |u| u.iter_mut().zip(shape).for_each(|(u, &s)| *u = start::value(u8::from(s < 0.0))));
-            band.solved.write(slot, |solved| near_surface(shape, set.grid().edge() as usize, valid, reach, solved))
+            band.u.write(slot, |u| start::from_shape(shape, by.width, u));
+            band.solved.write(slot, |solved| start::near_surface(shape, edge, valid, by.reach, solved))
         });
-        distance.read(slot, |d| {
-            band.distance.write(slot, |out| {
-                out.iter_mut().zip(d).for_each(|(out, d)| *out = range * (1.0 - (-d / range).exp()));
-            });
-        });
+        distance.read(slot, |d| band.distance.write(slot, |pull| start::fading(d, by.range, pull)));
         band.u.refresh_faces(slot);
         band.distance.refresh_faces(slot);
         Ok(count)
@@ -182,29 +187,6 @@ fn start_at(
     band.voxels = counts.iter().sum();
     stage.voxels(band.voxels);
     Ok(band)
-}
-
-/// A shape that is nowhere deeper than so many largest spacings cannot be moved on its grid.
-const THIN: f64 = 1.5;
-
-fn is_thin(stage: &Stage<'_>, shape: &BrickArray<f32>, spacing: f64) -> Result<bool> {
-    let lowest = stage.run(&one_wave(shape.set()), &Workers::none(), |(), &slot| {
-        Ok(shape.read(slot, |values| values.iter().copied().fold(f32::INFINITY, f32::min)))
-    })?;
-    let deep = (0..shape.set().grid().len()).any(|id| shape.set().slot(id).is_none() && shape.absent(id) < 0.0);
-    Ok(!deep && lowest.into_iter().all(|value| f64::from(value) > -THIN * spacing))
-}
-
-/// A start that falls from 1 to 0 across the shape's surface, so that this is where u = 1/2 without any motion.
-fn slope(stage: &Stage<'_>, band: &mut Band, shape: &BrickArray<f32>, spacing: f32) -> Result<()> {
-    stage.run(&one_wave(shape.set()), &Workers::none(), |(), &slot| {
-        shape.read(slot, |shape| {
-            band.u.write(slot, |u| u.iter_mut().zip(shape).for_each(|(u, s)| *u = (0.5 - s / spacing).clamp(0.0, 1.0)));
-        });
-        band.u.refresh_faces(slot);
-        Ok(())
-    })?;
-    Ok(())
 }
 
 /// Widths of the smoothing before levels and walls are looked for, in smallest spacings.

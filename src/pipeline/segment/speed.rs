@@ -18,10 +18,8 @@ use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::border_model::{BorderModel, ON_LEVEL};
 use crate::kernel::image::speed::{Grey, Weights, level_offsets, speeds, wall_offsets};
-use crate::kernel::level_set::CELL;
 use crate::kernel::outline::lattice::Lattice;
-use crate::kernel::outline::spread;
-use crate::store::{BoxSource, BrickArray};
+use crate::store::{BoxSink, BoxSource, BrickArray};
 
 /// Nodes of the lattices of grey values, about.
 const NODES: f64 = 30_000.0;
@@ -62,7 +60,7 @@ pub(super) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
         let part = set.grid().brick_box(set.id(slot));
         buffers.fill(&part, by, geometry, levels.as_ref())?;
         speeds(&buffers.shape, &buffers.distance, &buffers.offsets, &buffers.doubts, weights, &mut buffers.speed);
-        field.write(slot, |cell| spread(&buffers.speed, &part, CELL, cell));
+        field.write_box(&part, &buffers.speed)?;
         field.refresh_faces(slot);
         Ok(())
     })?;
@@ -157,7 +155,7 @@ fn levels(stage: &Stage<'_>, geometry: &Geometry, object: &Outlined, trust: &Tru
     let mut lattices = [0, 1].map(|_| Lattice::for_box(geometry.shape, geometry.spacing, NODES));
     let planes: Vec<usize> = (0..lattices[0].planes()).collect();
     let nodes = stage.run(&planes, &Workers::none(), |(), &n| {
-        let values = lattices[0].plane_of(n, geometry, at);
+        let values = lattices[0].plane(n, geometry, at);
         Ok([0, 1].map(|m| values.iter().map(|v| v[m] as f32).collect::<Vec<f32>>()))
     })?;
     let [level, fall] = &mut lattices;

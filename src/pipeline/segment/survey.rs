@@ -157,7 +157,8 @@ pub(super) fn trust(
 ) -> Vec<Option<Trust>> {
     let h = image.min_spacing();
     let all: Vec<Profile> = objects.iter().flatten().flat_map(|o| &o.profiles).map(|s| s.profile).collect();
-    let growth = h * growth(objects.iter().flatten().flat_map(|o| &o.held_out), scatter).unwrap_or(DEFAULT_GROWTH / h);
+    let held_out = objects.iter().flatten().flat_map(|object| &object.held_out);
+    let growth = growth(held_out, scatter, h).unwrap_or(DEFAULT_GROWTH);
     let trust = |object: &Outlined| {
         let own: Vec<Profile> = object.profiles.iter().map(|s| s.profile).collect();
         let profiles = if own.len() < ENOUGH_PROFILES { &all } else { &own };
@@ -178,8 +179,11 @@ pub(super) fn trust(
 
 /// How the shape's error grows with the square of the distance from outlines: marks that were left out lie that far from it, their own
 /// scatter apart. The worst tenth is left aside.
-fn growth<'a>(held_out: impl Iterator<Item = &'a HeldOut>, scatter: Scatter) -> Option<f64> {
-    let share = |held: &HeldOut| (held.off.powi(2) - scatter.sigma.powi(2)).max(0.0) / held.away.powi(4).max(1e-12);
+fn growth<'a>(held_out: impl Iterator<Item = &'a HeldOut>, scatter: Scatter, h: f64) -> Option<f64> {
+    let share = |held: &HeldOut| {
+        let (off, away) = ((held.off.powi(2) - scatter.sigma.powi(2)).max(0.0) / (h * h), held.away / h);
+        off / away.powi(4).max(1e-12)
+    };
     let mut shares: Vec<f64> = held_out.map(share).collect();
     shares.sort_by(f64::total_cmp);
     shares.truncate(shares.len() * 9 / 10);
