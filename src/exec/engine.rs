@@ -39,7 +39,7 @@ pub struct StageReport {
 
 /// Runs kernels over bricks: threads, cancellation, progress, scratch and the account of all that.
 pub struct Engine {
-    pool: rayon::ThreadPool,
+    pool: Arc<rayon::ThreadPool>,
     cancel: Cancel,
     progress: Arc<dyn Progress>,
     comm: Arc<dyn Comm>,
@@ -62,7 +62,7 @@ impl Engine {
         progress: Arc<dyn Progress>,
     ) -> Result<Self> {
         scratch.set_page_cache(machine_memory().saturating_sub(budget.total) / 2);
-        let pool = pool(threads)?;
+        let pool = Arc::new(pool(threads)?);
         let comm = Arc::new(SelfComm);
         Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, reports: Mutex::default() })
     }
@@ -76,7 +76,7 @@ impl Engine {
     /// The engine of one of this engine's ranks: its share of the threads, at least one; the same window.
     pub(super) fn of_rank(&self, comm: Arc<dyn Comm>) -> Result<Self> {
         Ok(Self {
-            pool: pool((self.threads() / self.ranks).max(1))?,
+            pool: Arc::new(pool((self.threads() / self.ranks).max(1))?),
             cancel: self.cancel.clone(),
             progress: Arc::new(OfRank(self.progress.clone())),
             comm,
@@ -85,6 +85,31 @@ impl Engine {
             budget: self.budget,
             reports: Mutex::default(),
         })
+    }
+
+    /// An engine that shares this one's threads and window, for one of several jobs side by side: it keeps reports of
+    /// its own, and says nothing of its stages.
+    pub(super) fn beside(&self) -> Self {
+        Self {
+            pool: self.pool.clone(),
+            cancel: self.cancel.clone(),
+            progress: Arc::new(OfRank(self.progress.clone())),
+            comm: self.comm.clone(),
+            ranks: self.ranks,
+            scratch: self.scratch.clone(),
+            budget: self.budget,
+            reports: Mutex::default(),
+        }
+    }
+
+    /// Runs on this engine's threads.
+    pub(super) fn in_pool<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        self.pool.install(work)
+    }
+
+    /// Takes over the reports of stages that were done on an engine beside this one.
+    pub(super) fn take_reports(&self, reports: Vec<StageReport>) {
+        self.reports.lock().unwrap_or_else(PoisonError::into_inner).extend(reports);
     }
 
     /// Number of threads.

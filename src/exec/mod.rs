@@ -11,6 +11,7 @@ mod ownership;
 mod progress;
 mod ranks;
 mod schedule;
+mod side_by_side;
 mod thread_comm;
 
 pub use budget::{Budget, machine_memory, peak_resident};

@@ -33,6 +33,20 @@ pub struct ObjectMarks {
     pub seed: Option<Seed>,
 }
 
+impl ObjectMarks {
+    /// The marks, moved.
+    #[must_use]
+    pub fn moved(&self, by: [f64; 3]) -> Self {
+        let moved = |p: &[f64; 3]| std::array::from_fn(|a| p[a] + by[a]);
+        Self {
+            contours: self.contours.iter().map(|contour| contour.iter().map(moved).collect()).collect(),
+            seed: self.seed.map(|seed| Seed { centre: moved(&seed.centre), ..seed }),
+            numbers: self.numbers.clone(),
+            ..*self
+        }
+    }
+}
+
 /// Splits a cloud into objects, in order of their numbers, and their contours.
 #[must_use]
 pub fn split(cloud: &PointCloud) -> Vec<ObjectMarks> {

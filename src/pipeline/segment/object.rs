@@ -19,6 +19,7 @@ use crate::pipeline::marks::{ObjectMarks, cloud_of};
 use crate::store::{BoxSource, BrickArray, Element};
 
 /// The image as the objects see it.
+#[derive(Clone, Copy)]
 pub(super) struct Picture<'a, T: Element> {
     /// Its voxels.
     pub voxels: &'a dyn BoxSource<T>,
@@ -96,6 +97,16 @@ pub(super) struct Solution {
     pub theta: f64,
     /// Weight of the image.
     pub rho: f64,
+}
+
+impl Solution {
+    /// The solution, moved in the world.
+    pub(super) fn moved(mut self, by: [f64; 3]) -> Self {
+        let moved = |p: [f64; 3]| std::array::from_fn(|a| p[a] + by[a]);
+        self.geometry.origin = moved(self.geometry.origin);
+        self.hole = self.hole.map(|hole| Hole { place: moved(hole.place), ..hole });
+        self
+    }
 }
 
 /// Solves one object.

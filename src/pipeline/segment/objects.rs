@@ -1,0 +1,194 @@
+//! All objects: looked at together, solved each for itself, small ones side by side; their surfaces drawn and checked.
+
+use super::cross_validate::cross_validate;
+use super::object::{ObjectReport, Picture, Solution, solve};
+use super::outlines::scatter_of;
+use super::settings::{ImageModel, SegmentSettings, Start};
+use super::survey::{Outlined, Trust, trust};
+use crate::error::{Error, ErrorKind, Result};
+use crate::exec::Engine;
+use crate::grid::Geometry;
+use crate::io::ome_zarr::{ImageSpec, StoreWriter};
+use crate::kernel::surface::Hausdorff;
+use crate::pipeline::cell_needs::SOLVE_BYTES;
+use crate::pipeline::marks::ObjectMarks;
+use crate::pipeline::pyramid::{Reduce, write_levels};
+use crate::pipeline::surface::{self, Drawn};
+use crate::pipeline::vicinity::voxel_bounds;
+use crate::store::{Element, ElementType};
+
+/// An object that could not be solved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refused {
+    /// Its number.
+    pub label: u32,
+    /// Why, in one sentence.
+    pub reason: String,
+}
+
+/// What was solved, in order of the labels, and what was not.
+pub(super) struct Objects {
+    pub solved: Vec<(Solution, ObjectReport)>,
+    pub refused: Vec<Refused>,
+}
+
+/// Solves all objects. They are solved on a grid whose first voxel is the origin, so that where the image lies in the
+/// world changes nothing but their place.
+///
+/// # Errors
+/// When none can be solved, scratch runs out, the output cannot be written or the run is interrupted.
+pub(super) fn solve_all<T: Element>(
+    engine: &Engine,
+    picture: &Picture<'_, T>,
+    objects: &[ObjectMarks],
+    settings: &SegmentSettings,
+    store: Option<&StoreWriter>,
+) -> Result<Objects> {
+    let origin = picture.geometry.origin;
+    let grid = Geometry { origin: [0.0; 3], ..picture.geometry.clone() };
+    let picture = Picture { geometry: &grid, ..*picture };
+    let local: Vec<ObjectMarks> = objects.iter().map(|marks| marks.moved(origin.map(|v| -v))).collect();
+    let most = at_once(engine, &local, &grid);
+    let (outlined, trusts) = survey(engine, &picture, &local, settings, most)?;
+    let all: Vec<usize> = (0..objects.len()).collect();
+    let found = engine.side_by_side(&all, most, |engine, &n| {
+        let outlined = outlined[n].as_ref();
+        let solved = solve(engine, &picture, &local[n], outlined.zip(trusts[n]), settings).and_then(|solution| {
+            let solution = solution.moved(origin);
+            let mut report = draw(engine, &solution, &objects[n], store, objects.len() > 1)?;
+            if let Some(outlined) = outlined.filter(|_| settings.cross_validate) {
+                report.cross_validation = cross_validate(engine, outlined, &grid)?;
+            }
+            Ok((solution, report))
+        });
+        match solved {
+            // One object that cannot be solved does not stop the others.
+            Err(error) if error.kind() == ErrorKind::Input && objects.len() > 1 => {
+                Ok(Err(Refused { label: objects[n].object, reason: error.to_string() }))
+            }
+            other => other.map(Ok),
+        }
+    })?;
+    let (mut solved, mut refused) = (Vec::new(), Vec::new());
+    for object in found {
+        match object {
+            Ok(object) => solved.push(object),
+            Err(object) => refused.push(object),
+        }
+    }
+    if solved.is_empty() {
+        let reasons: Vec<String> = refused.into_iter().map(|refused| refused.reason).collect();
+        return Err(Error::input(reasons.join("; ")));
+    }
+    Ok(Objects { solved, refused })
+}
+
+/// Voxels of the largest box around an object that is small: larger ones keep all cores busy.
+const SMALL: u64 = 2 << 20;
+
+/// How many objects are solved at a time: as many as there are threads where all are small and half of the window holds
+/// what they take.
+fn at_once(engine: &Engine, objects: &[ObjectMarks], grid: &Geometry) -> usize {
+    let all = grid.domain().volume();
+    let volume = |marks: &ObjectMarks| match marks.seed {
+        Some(_) => all,
+        None => voxel_bounds(&marks.contours.concat(), grid).volume(),
+    };
+    let largest = objects.iter().map(volume).max().unwrap_or(0);
+    if largest > SMALL {
+        return 1;
+    }
+    // What is solved reaches around the marks: twice their extent along each axis is more than any band.
+    let room = engine.scratch().window() / 2 / (8 * largest * SOLVE_BYTES).max(1);
+    (room as usize).clamp(1, engine.threads())
+}
+
+/// Each object's outlines and how far they are trusted; none where its marks are none.
+type Surveyed = (Vec<Option<Outlined>>, Vec<Option<Trust>>);
+
+/// Looks at all objects that are marked by outlines, unless the papers' start was asked for.
+fn survey<T: Element>(
+    engine: &Engine,
+    picture: &Picture<'_, T>,
+    objects: &[ObjectMarks],
+    settings: &SegmentSettings,
+    most: usize,
+) -> Result<Surveyed> {
+    let scatter = scatter_of(objects, picture.geometry);
+    let looks = settings.uses_image() && settings.image != ImageModel::Edge;
+    let outlined = engine.side_by_side(objects, most, |engine, marks| match settings.start {
+        Start::Auto if marks.seed.is_none() => Outlined::new(engine, picture, marks, scatter, looks),
+        _ => Ok(None),
+    })?;
+    let trusts = trust(&outlined, picture.geometry, scatter, settings.image);
+    Ok((outlined, trusts))
+}
+
+/// Extracts, measures and writes an object's surface, and writes its segmentation function.
+fn draw(
+    engine: &Engine,
+    solution: &Solution,
+    marks: &ObjectMarks,
+    store: Option<&StoreWriter>,
+    several: bool,
+) -> Result<ObjectReport> {
+    let (u, geometry, label) = (&solution.u, &solution.geometry, marks.object);
+    let stage = engine.stage(&format!("surface {label}"), 0);
+    let name = if several { format!("meshes/object-{label}.ply") } else { "meshes/surface.ply".into() };
+    let mesh = store.map(|store| store.file(&name)).transpose()?;
+    let Drawn { measures, hausdorff, lost_points } =
+        surface::draw(&stage, u, geometry, &marks.contours.concat(), mesh.as_deref())?;
+    stage.voxels(solution.band_voxels);
+    stage.finish();
+    if let Err(error) = check_surface(marks, geometry, hausdorff) {
+        // Nothing stays of what is refused; a file that cannot be removed goes with its store.
+        let _ = mesh.map(std::fs::remove_file);
+        return Err(error);
+    }
+    if let Some(store) = store {
+        let farthest = f64::from(solution.distance.absent(0));
+        for (name, field, high) in [("levelset", u, 1.0), ("distance", &solution.distance, farthest)] {
+            let group = if several { format!("{name}/object-{label}") } else { name.into() };
+            let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
+            let stage = engine.stage(&format!("write {name} {label}"), 0);
+            write_levels::<f32>(&stage, engine, store.image(&group, &spec)?.levels(), field, Reduce::Mean)?;
+            stage.finish();
+        }
+    }
+    Ok(ObjectReport {
+        label,
+        cloud_points: solution.cloud_points,
+        beta: solution.beta,
+        hole: solution.hole,
+        band_voxels: solution.band_voxels,
+        evolution: solution.evolution,
+        measures,
+        hausdorff,
+        marks_off: lost_points,
+        image_model: solution.image_model,
+        theta: solution.theta,
+        rho: solution.rho,
+        cross_validation: None,
+    })
+}
+
+/// Marks lie so many largest spacings from their surface in the mean, at most.
+const MOST_OFF: f64 = 4.0;
+
+/// Refuses a surface that is not that of the marks.
+fn check_surface(marks: &ObjectMarks, geometry: &Geometry, hausdorff: Option<Hausdorff>) -> Result<()> {
+    let object = marks.object;
+    let wrong = |what: String| {
+        Error::input(format!(
+            "object {object}: {what}; leave out --beta, --theta and --rho where they were given, or mark more outlines"
+        ))
+    };
+    match hausdorff {
+        None if marks.seed.is_none() => Err(wrong("its surface vanished".into())),
+        Some(found) if found.mean > MOST_OFF * geometry.max_spacing() => {
+            let off = found.mean;
+            Err(wrong(format!("its marks lie {off:.3} from the surface that was found, in the mean")))
+        }
+        _ => Ok(()),
+    }
+}
