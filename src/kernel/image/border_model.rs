@@ -4,7 +4,7 @@
 //! outlines. *Wall*: a bright (or dark) sheet runs along the border, which lies on its crest. Told by the profiles at
 //! the marks: a wall stands out from both its flanks, a step from one.
 
-use super::profiles::Profile;
+use super::profiles::{LEN, Profile, REACH, STEP};
 
 /// What the image shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +35,7 @@ pub struct Reading {
 }
 
 /// A wall stands out from the higher of its flanks by more than this part of the difference of inside and outside.
-const WALL_OVER_STEP: f64 = 0.3;
+const WALL_OVER_STEP: f64 = 0.45;
 /// Its flanks are so many smallest spacings from its crest, and that so far from the marks at most.
 const WALL_FLANK: f64 = 2.5;
 const FARTHEST_CREST: f64 = 3.5;
@@ -97,10 +97,10 @@ impl Reading {
         }
         if found.significance > SIGNIFICANT {
             found.model = BorderModel::Level;
-            let outside = profiles.iter().map(|p| p.here() - p.outside()).sum::<f64>() / profiles.len() as f64;
-            found.share = outside / step;
-            if !(ON_LEVEL[0]..=ON_LEVEL[1]).contains(&found.share) {
-                found.bias = half_way(profiles);
+            let (share, bias) = beside(profiles);
+            found.share = share;
+            if !(ON_LEVEL[0]..=ON_LEVEL[1]).contains(&share) {
+                found.bias = bias;
             }
         }
         found
@@ -111,22 +111,35 @@ fn mean_step(profiles: &[Profile]) -> f64 {
     profiles.iter().map(|p| p.inside() - p.outside()).sum::<f64>() / profiles.len().max(1) as f64
 }
 
-/// Where the mean profile is half way between inside and outside, nearest to the border.
-fn half_way(profiles: &[Profile]) -> f64 {
-    use super::profiles::{LEN, REACH, STEP};
-    let mean = |n: usize| profiles.iter().map(|p| f64::from(p.0[n])).sum::<f64>() / profiles.len() as f64;
-    let values: [f64; LEN] = std::array::from_fn(mean);
-    let half = 0.5 * (values[0] + values[LEN - 1]);
+fn mean_profile(profiles: &[Profile]) -> [f64; LEN] {
+    let mean = |n: usize| profiles.iter().map(|p| f64::from(p.0[n])).sum::<f64>() / profiles.len().max(1) as f64;
+    std::array::from_fn(mean)
+}
+
+/// A rim is higher than what lies inside of it by more than this part of the difference of inside and outside.
+const RIM: f64 = 0.1;
+
+/// Where the value under the outlines lies between outside (0) and inside (1), and how far outside of them the mean
+/// profile is half way, where that is nearest. A rim that outshines what it bounds is the inside of its border.
+fn beside(profiles: &[Profile]) -> (f64, f64) {
+    let mean = mean_profile(profiles);
+    let plateau = |of: fn(&Profile) -> f64| profiles.iter().map(of).sum::<f64>() / profiles.len().max(1) as f64;
+    let (inside, outside) = (plateau(Profile::inside), plateau(Profile::outside));
+    let sign = (inside - outside).signum();
+    let peak = mean.iter().map(|v| sign * v).fold(f64::NEG_INFINITY, f64::max) * sign;
+    let has_rim = (peak - mean[0]) * sign > RIM * (inside - outside).abs();
+    let top = if has_rim { peak } else { inside };
+    let half = 0.5 * (top + outside);
     let crossing = |n: usize| {
-        let (a, b) = (values[n] - half, values[n + 1] - half);
+        let (a, b) = (mean[n] - half, mean[n + 1] - half);
         (a * b <= 0.0 && a != b).then(|| (n as f64 + a / (a - b) - REACH as f64) * STEP)
     };
-    (0..LEN - 1).filter_map(crossing).min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+    let nearest = (0..LEN - 1).filter_map(crossing).min_by(|a, b| a.abs().total_cmp(&b.abs()));
+    ((mean[REACH] - outside) / (top - outside), nearest.unwrap_or(0.0))
 }
 
 /// A profile's value at a place in smallest spacings from the border.
 fn at(profile: &Profile, place: f64) -> f64 {
-    use super::profiles::{LEN, REACH, STEP};
     let n = (place / STEP + REACH as f64).clamp(0.0, (LEN - 1) as f64);
     let (low, share) = ((n.floor() as usize).min(LEN - 2), n - n.floor().min((LEN - 2) as f64));
     let (a, b) = (f64::from(profile.0[low]), f64::from(profile.0[low + 1]));
@@ -151,7 +164,6 @@ pub fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::image::profiles::{REACH, STEP};
 
     fn profiles(of: impl Fn(f64, f64) -> f64) -> Vec<Profile> {
         let profile = |k: usize| {

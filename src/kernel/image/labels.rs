@@ -84,17 +84,6 @@ pub fn border<T: Copy + Default + PartialEq>(labels: &[T], around: &Box3, part: 
     }
 }
 
-/// Whether two voxels of different labels but 0 have a face in common; `labels` is dense over a box.
-#[must_use]
-pub fn touch(labels: &[u32], part: &Box3) -> bool {
-    let [width, height, depth] = part.shape().map(|n| n as usize);
-    let differ = |a: u32, b: u32| a > 0 && b > 0 && a != b;
-    let along = |stride: usize, line: usize| {
-        labels.chunks_exact(line).any(|l| l.iter().zip(&l[stride.min(line)..]).any(|(&a, &b)| differ(a, b)))
-    };
-    along(1, width) || along(width, width * height) || along(width * height, width * height * depth)
-}
-
 /// The voxels of a box that have a label, with it, in the order of the voxels; `labels` is dense over the box.
 pub fn labelled<'a>(labels: &'a [u32], part: &'a Box3) -> impl Iterator<Item = ([i64; 3], u32)> + 'a {
     let rows = part.rows().zip(labels.chunks_exact(part.shape()[0] as usize));
@@ -126,15 +115,6 @@ mod tests {
         let part = Box3::new([3, 5, 7], [8, 6, 8]);
         assert_eq!(labelled(&labels, &part).last(), Some(([6, 5, 7], 4)));
         assert_eq!(labelled(&labels, &part).count(), 4);
-    }
-
-    #[test]
-    fn labels_touch_across_faces() {
-        let part = Box3::from_shape([3, 2, 2]);
-        assert!(!touch(&[1, 0, 2, 1, 1, 0, 0, 2, 0, 0, 0, 2], &part));
-        assert!(touch(&[1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], &part));
-        assert!(touch(&[0, 0, 0, 1, 0, 0, 0, 0, 0, 2, 0, 0], &part));
-        assert!(!touch(&[0, 0, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0], &part), "rows end");
     }
 
     #[test]

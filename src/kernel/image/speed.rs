@@ -90,18 +90,32 @@ const SPAN: f32 = 3.0;
 const GATE: f32 = 3.0;
 /// The fastest.
 const FASTEST: f32 = 1.0;
+/// An end lies anywhere between the last outline and where the next one would have been marked: the deviation of what is
+/// spread evenly from 0 to 1.
+pub const OF_AN_END: f32 = 0.289;
 
-/// The speed outwards at voxels with signed distance `shape` to the shape and `distance` to the outlines.
-pub fn speeds(shape: &[f32], distance: &[f32], offsets: &[f32], doubts: &[f32], by: Weights, out: &mut [f32]) {
+/// Where voxels lie; lengths.
+#[derive(Clone, Copy, Debug)]
+pub struct Places<'a> {
+    /// Signed distance to the shape.
+    pub shape: &'a [f32],
+    /// Distance to the outlines.
+    pub distance: &'a [f32],
+    /// How far beyond the first or last outline.
+    pub beyond: &'a [f32],
+}
+
+/// The speed outwards at voxels.
+pub fn speeds(at: Places<'_>, offsets: &[f32], doubts: &[f32], by: Weights, out: &mut [f32]) {
     let h = by.spacing;
     for n in 0..out.len() {
-        let away = distance[n] / h;
-        let grown = by.growth * away * away;
-        let variance = by.shape * by.shape + grown * grown;
+        let away = at.distance[n] / h;
+        let (grown, end) = (by.growth * away * away, OF_AN_END * at.beyond[n] / h);
+        let variance = by.shape * by.shape + grown * grown + end * end;
         let image = by.image * doubts[n];
         // No weight where the image's variance is not finite.
         let weight = variance / (variance + image * image);
-        let off = shape[n] / h - by.bias;
+        let off = at.shape[n] / h - by.bias;
         let reach = GATE * (variance + variance.min(by.image * by.image)).sqrt().max(1.0);
         let beyond = (off.abs() / reach - 1.0).clamp(0.0, 1.0);
         let gate = (1.0 - beyond * beyond) * (1.0 - beyond * beyond);

@@ -1,7 +1,7 @@
 //! Leave one section out: how far its marks lie from the shape of the others tells how sure a shape is between marks.
 
+use super::fitted::Fitted;
 use super::section::Section;
-use super::shape::Fitted;
 use crate::kernel::vector::{dot, sub};
 
 /// A shape without a section is fitted to so many of those nearest to it.

@@ -44,7 +44,13 @@ impl Section {
     /// The signed distance to the border.
     #[must_use]
     pub fn distance(&self, point: [f64; 2]) -> f64 {
-        let distance = self.buckets.distance(point);
+        self.distance_within(point, f64::INFINITY)
+    }
+
+    /// The same where it is at most `limit`; beyond it `limit`, with the sign of the side.
+    #[must_use]
+    pub fn distance_within(&self, point: [f64; 2], limit: f64) -> f64 {
+        let distance = self.buckets.distance(point, limit);
         if self.buckets.holds(point) { -distance } else { distance }
     }
 
@@ -134,8 +140,8 @@ impl Buckets {
         [0, 1].map(|a| (((point[a] - self.low[a]) / self.size).max(0.0) as usize).min(self.counts[a] - 1))
     }
 
-    /// The distance to the nearest edge: rings of buckets until none that is left can hold a nearer one.
-    fn distance(&self, point: [f64; 2]) -> f64 {
+    /// The distance to the nearest edge, or `limit`: rings of buckets until none that is left can hold a nearer one.
+    fn distance(&self, point: [f64; 2], limit: f64) -> f64 {
         let [i, j] = self.bucket(point);
         let centre = [i, j].map(|n| n as i64);
         // How far the point lies outside of its bucket's square, at most.
@@ -144,7 +150,7 @@ impl Buckets {
             (low - point[a]).max(point[a] - low - self.size).max(0.0)
         });
         let beyond = beyond.fold(0.0, f64::max);
-        let mut nearest = f64::INFINITY;
+        let mut nearest = limit * limit;
         for ring in 0..=self.counts[0].max(self.counts[1]) as i64 {
             if nearest <= ((ring - 1) as f64 * self.size - beyond).max(0.0).powi(2) && ring > 0 {
                 break;
@@ -155,7 +161,7 @@ impl Buckets {
                 }
             }
         }
-        nearest.sqrt()
+        nearest.sqrt().min(limit)
     }
 
     /// The buckets of a square ring.

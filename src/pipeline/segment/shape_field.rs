@@ -8,7 +8,8 @@ use crate::grid::{Box3, BrickGrid, BrickId, BrickSet, Geometry};
 use crate::kernel::level_set::CELL;
 use crate::kernel::outline::lattice::Lattice;
 use crate::kernel::outline::section::Section;
-use crate::kernel::outline::shape::{Fitted, Shape};
+use crate::kernel::outline::fitted::Fitted;
+use crate::kernel::outline::shape::Shape;
 use crate::pipeline::vicinity::voxel_bounds;
 use crate::store::{BoxSink, BrickArray};
 
@@ -45,6 +46,11 @@ impl<'a> ShapeField<'a> {
     /// Fills a box of voxels, dense, with the signed distance.
     pub(super) fn read(&self, part: &Box3, out: &mut [f32]) {
         self.shape.read(part, out);
+    }
+
+    /// Fills a box of voxels, dense, with how far they lie beyond the first or last outline.
+    pub(super) fn beyond_sections(&self, part: &Box3, out: &mut [f32]) {
+        self.shape.beyond_sections(part, out);
     }
 
     /// The cells with voxels within `reach` of the surface.
@@ -96,7 +102,7 @@ impl<'a> ShapeField<'a> {
 /// The grid around sections: their bounds, how far the shape may reach beyond them, and a margin, from a whole cell on.
 fn box_around(image: &Geometry, sections: &[&Section], fitted: &Fitted, margin: f64) -> (Geometry, Box3) {
     let lifted = |section: &&Section| -> Vec<[f64; 3]> {
-        let beyond = fitted.reach_beyond(sections);
+        let beyond = fitted.ends().map_or(0.0, |ends| ends.height());
         let points = section.curves.iter().flat_map(|curve| &curve.points);
         points.flat_map(|&p| [-beyond, beyond].map(|by| section.plane.lift(p, by))).collect()
     };

@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use crate::kernel::image::border_model::BorderModel;
+use crate::kernel::image::speed::OF_AN_END;
 use crate::kernel::level_set::CELL;
 use crate::kernel::level_set::start;
 use crate::kernel::outline::section::{Section, widest_gap};
@@ -114,7 +115,8 @@ fn band_reach(object: &Outlined, trust: &Trust, h: f64) -> f64 {
     let gap = widest_gap(&object.sections);
     let radius = object.sections.iter().map(Section::radius).fold(0.0, f64::max);
     let farthest = if gap > 0.0 { 0.5 * gap } else { radius };
-    let unsure = trust.shape.hypot(trust.growth * (farthest / h).powi(2));
+    let end = f64::from(OF_AN_END) * object.fitted.ends().map_or(0.0, |ends| ends.height()) / h;
+    let unsure = trust.shape.hypot(trust.growth * (farthest / h).powi(2)).hypot(end);
     (BAND_DEVIATIONS * unsure + trust.reading.bias.abs()).clamp(BAND[0], BAND[1])
 }
 

@@ -1,12 +1,12 @@
 //! The speed at which image and shape move an object's surface along its normal, brick by brick.
 //!
 //! ```text
-//! F = ( rho w D - (1 - w) (phi - b) ) / 3 h        w = U^2 / (U^2 + V^2)        U^2 = U_0^2 + (c d^2)^2
+//! F = ( rho w D - (1 - w) (phi - b) ) / 3 h     w = U^2 / (U^2 + V^2)     U^2 = U_0^2 + (c d^2)^2 + e^2 / 12
 //! ```
 //!
 //! phi is the signed distance to the shape of the outlines, b how far outside of the marks the image's border lies, D
 //! how far the image says that the border is away, outwards; U is how uncertain the shape is, the more the farther
-//! from the outlines (d), V how uncertain the image. The surface rests where both agree, weighed by their variances.
+//! from the outlines (d) and beyond the last of them (e), V how uncertain the image. The surface rests where both agree, weighed by their variances.
 
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::border_model::{BorderModel, ON_LEVEL};
-use crate::kernel::image::speed::{Grey, Weights, level_offsets, speeds, wall_offsets};
+use crate::kernel::image::speed::{Grey, Places, Weights, level_offsets, speeds, wall_offsets};
 use crate::kernel::outline::lattice::Lattice;
 use crate::store::{BoxSink, BoxSource, BrickArray};
 
@@ -59,7 +59,8 @@ pub(super) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
     stage.run(&one_wave(set), &Workers::new(Buffers::default), |buffers, &slot| {
         let part = set.grid().brick_box(set.id(slot));
         buffers.fill(&part, by, geometry, levels.as_ref())?;
-        speeds(&buffers.shape, &buffers.distance, &buffers.offsets, &buffers.doubts, weights, &mut buffers.speed);
+        let at = Places { shape: &buffers.shape, distance: &buffers.distance, beyond: &buffers.beyond };
+        speeds(at, &buffers.offsets, &buffers.doubts, weights, &mut buffers.speed);
         field.write_box(&part, &buffers.speed)?;
         field.refresh_faces(slot);
         Ok(())
@@ -71,6 +72,7 @@ pub(super) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
 struct Buffers {
     shape: Vec<f32>,
     distance: Vec<f32>,
+    beyond: Vec<f32>,
     /// Where the image says the border is, and how many times its usual deviation that is unsure.
     offsets: Vec<f32>,
     doubts: Vec<f32>,
@@ -83,11 +85,13 @@ struct Buffers {
 
 impl Buffers {
     fn fill(&mut self, part: &Box3, by: &Pulls<'_>, geometry: &Geometry, levels: Option<&Levels>) -> Result<()> {
-        for buffer in [&mut self.shape, &mut self.distance, &mut self.offsets, &mut self.doubts, &mut self.speed] {
+        let fields = [&mut self.shape, &mut self.distance, &mut self.beyond];
+        for buffer in fields.into_iter().chain([&mut self.offsets, &mut self.doubts, &mut self.speed]) {
             buffer.resize(part.len(), 0.0);
         }
         by.shape.read_box(part, &mut self.shape)?;
         by.distance.read_box(part, &mut self.distance)?;
+        by.field.beyond_sections(part, &mut self.beyond);
         self.offsets.fill(0.0);
         self.doubts.fill(f32::INFINITY);
         let Some(image) = by.image else { return Ok(()) };

@@ -12,7 +12,7 @@ use crate::kernel::image::profiles::{LEN, Profile, REACH, STEP, interpolate};
 use crate::kernel::outline::cross_validation::{HeldOut, leave_out};
 use crate::kernel::outline::curve::Scatter;
 use crate::kernel::outline::section::Section;
-use crate::kernel::outline::shape::{Fitted, LEAST_BESIDE};
+use crate::kernel::outline::fitted::{Fitted, LEAST_BESIDE};
 use crate::kernel::vector::{dot, sub};
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::ObjectMarks;

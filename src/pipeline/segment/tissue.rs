@@ -1,7 +1,7 @@
 //! From solved objects to a tissue: their labels joined, and the faces that they have in common written.
 
 use super::labels::Placed;
-use super::neighbours::{Joined, Joining, csv, draw_faces, join, touch};
+use super::neighbours::{Joined, Joining, csv, draw_faces, join};
 use super::settings::SegmentSettings;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
@@ -31,7 +31,7 @@ pub(super) fn join_objects<'a, T: Element>(
     join(engine, objects, &joining)
 }
 
-/// Draws, measures and writes the faces of labels, where gaps were filled or any two meet.
+/// Draws, measures and writes the faces of labels, where gaps were asked to be filled.
 pub(super) fn write_faces(
     engine: &Engine,
     geometry: &Geometry,
@@ -41,7 +41,7 @@ pub(super) fn write_faces(
 ) -> Result<Vec<Contact>> {
     let stage = engine.stage("faces", 0);
     stage.voxels(geometry.domain().volume());
-    if settings.fill_gaps.is_none() && !touch(&stage, geometry, labels)? {
+    if settings.fill_gaps.is_none() {
         stage.finish();
         return Ok(Vec::new());
     }

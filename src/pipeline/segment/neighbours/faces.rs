@@ -5,7 +5,6 @@ use super::join::Joined;
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
-use crate::kernel::image::labels;
 use crate::kernel::surface::{Contact, Contacts, PARTITION_REACH, Partition, Patch, Welder, cells_of_brick};
 use crate::store::{BoxSource, MeshSink};
 
@@ -38,23 +37,6 @@ pub fn draw(
         }
     }
     Ok(contacts.finish())
-}
-
-/// Whether two labels have a face in common.
-pub(in crate::pipeline::segment) fn touch(stage: &Stage<'_>, geometry: &Geometry, joined: &Joined<'_>) -> Result<bool> {
-    let grid = BrickGrid::new(geometry.shape, EDGE);
-    let bricks: Vec<BrickId> = (0..grid.len()).collect();
-    let found = stage.run(&bricks, &Workers::new(Vec::new), |values, &id| {
-        let part = grid.brick_box(id);
-        let part = Box3::new(part.lo, part.hi.map(|v| v + 1)).intersect(&geometry.domain());
-        if BoxSource::<u32>::constant_in(joined, &part) == Some(0) {
-            return Ok(false);
-        }
-        values.resize(part.len(), 0_u32);
-        joined.read_box(&part, values)?;
-        Ok(labels::touch(values, &part))
-    })?;
-    Ok(found.contains(&true))
 }
 
 /// The surfaces in the cells of one box; around the image lies what has no label.

@@ -23,7 +23,6 @@ mod walls;
 mod widths;
 
 pub use faces::draw as draw_faces;
-pub(super) use faces::touch;
 pub use join::{FillGaps, Found, Joined, Joining, join};
 pub(super) use needs::needs;
 pub(super) use table::csv;

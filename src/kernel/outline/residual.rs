@@ -1,0 +1,117 @@
+//! What a function leaves to the sections' own signed distances, shared out linearly between neighbouring sections of a
+//! direction (Raya & Udupa 1990); directions count by how near their sections are.
+
+use super::section::{Section, widest_gap};
+use crate::grid::{Box3, Geometry};
+use crate::kernel::vector::dot;
+
+/// What is left to a section's own distance counts up to so many smallest spacings.
+pub(super) const MOST_LEFT: f64 = 6.0;
+
+/// Sections of one direction in order of their offsets.
+#[derive(Clone, Debug)]
+pub(super) struct Family<'a> {
+    sections: Vec<&'a Section>,
+    /// The axis that they lie across; none where they are oblique.
+    axis: Option<usize>,
+    /// Their widest distance.
+    gap: f64,
+}
+
+/// Sections by direction.
+pub(super) fn families<'a>(sections: &[&'a Section]) -> Vec<Family<'a>> {
+    let mut families: Vec<Family> = Vec::new();
+    for &section in sections {
+        match families.iter_mut().find(|family| family.sections[0].plane.is_parallel_to(&section.plane)) {
+            Some(family) => family.sections.push(section),
+            None => families.push(Family { sections: vec![section], axis: None, gap: 0.0 }),
+        }
+    }
+    for family in &mut families {
+        family.sections.sort_by(|a, b| a.plane.offset.total_cmp(&b.plane.offset));
+        let lies_across = |a: &usize| family.sections.iter().all(|section| section.plane.normal[*a] == 1.0);
+        family.axis = (0..3).find(lies_across);
+        family.gap = widest_gap(&family.sections);
+    }
+    families
+}
+
+/// Adds to the function's values in a box what is left to the sections, near its surface; `function` gives it at points.
+pub(super) fn share_out(
+    families: &[Family<'_>],
+    geometry: &Geometry,
+    part: &Box3,
+    function: impl Fn([f64; 3]) -> f64,
+    out: &mut [f32],
+) {
+    let h = geometry.min_spacing();
+    let (limit, least) = ((2.0 * MOST_LEFT * h) as f32, (0.5 * h).powi(2));
+    let of = |family| Residuals { family, most: MOST_LEFT * h, function: &function, part, known: Vec::new() };
+    let mut residuals: Vec<_> = families.iter().map(of).collect();
+    let width = part.shape()[0] as usize;
+    for ((y, z), row) in part.rows().zip(out.chunks_exact_mut(width)) {
+        for (x, value) in (part.lo[0]..).zip(row).filter(|(_, value)| value.abs() < limit) {
+            let (voxel, point) = ([x, y, z], geometry.position([x, y, z]));
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for residuals in &mut residuals {
+                let (left, away) = residuals.at(voxel, point, h);
+                let weight = 1.0 / (away * away + least);
+                sum += weight * left;
+                weights += weight;
+            }
+            *value += (sum / weights) as f32;
+        }
+    }
+}
+
+/// What is left to the sections of a family in a box.
+struct Residuals<'a, F> {
+    family: &'a Family<'a>,
+    most: f64,
+    function: &'a F,
+    part: &'a Box3,
+    /// By section what is left at the box's voxels, seen along the axis; NaN where nobody has asked yet. Sections that
+    /// lie across an axis are asked for the same point by all voxels of a column.
+    known: Vec<(usize, Vec<f64>)>,
+}
+
+impl<F: Fn([f64; 3]) -> f64> Residuals<'_, F> {
+    /// What is left at a voxel, and how far the nearest section is.
+    fn at(&mut self, voxel: [i64; 3], point: [f64; 3], h: f64) -> (f64, f64) {
+        let sections = &self.family.sections;
+        let along = dot(sections[0].plane.normal, point);
+        let above = sections.partition_point(|section| section.plane.offset <= along);
+        let away = |n: usize| (sections[n].plane.offset - along).abs();
+        if above == 0 || above == sections.len() {
+            let n = above.saturating_sub(1);
+            let (fade, away) = ((0.5 * self.family.gap).max(h), away(n));
+            return (self.of(n, voxel, point) * (-(away / fade).powi(2)).exp(), away);
+        }
+        let (below, over) = (away(above - 1), away(above));
+        let (low, high) = (self.of(above - 1, voxel, point), self.of(above, voxel, point));
+        ((low * over + high * below) / (below + over), below.min(over))
+    }
+
+    /// What is left of section `n` at the point of its plane below a voxel.
+    fn of(&mut self, n: usize, voxel: [i64; 3], point: [f64; 3]) -> f64 {
+        let Some(axis) = self.family.axis else { return self.left(n, point) };
+        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+        let place = ((voxel[b] - self.part.lo[b]) * self.part.shape()[a] + voxel[a] - self.part.lo[a]) as usize;
+        let known = self.known.iter().position(|(section, _)| *section == n).unwrap_or_else(|| {
+            let shape = self.part.shape();
+            self.known.push((n, vec![f64::NAN; (shape[a] * shape[b]) as usize]));
+            self.known.len() - 1
+        });
+        if self.known[known].1[place].is_nan() {
+            self.known[known].1[place] = self.left(n, point);
+        }
+        self.known[known].1[place]
+    }
+
+    fn left(&self, n: usize, point: [f64; 3]) -> f64 {
+        let section = self.family.sections[n];
+        let there = section.plane.project(point);
+        let value = (self.function)(section.plane.lift(there, 0.0));
+        (section.distance_within(there, value.abs() + self.most) - value).clamp(-self.most, self.most)
+    }
+}
