@@ -30,6 +30,9 @@ pub struct Reading {
     pub significance: f64,
     /// The mean place of the value under the outlines between outside (0) and inside (1).
     pub share: f64,
+    /// How far outside of the border its grey value is looked for, in smallest spacings: 0 but where the outlines run so
+    /// high on a border that what is inside would be taken for outside.
+    pub shift: f64,
     /// Profiles that were read.
     pub profiles: usize,
 }
@@ -70,7 +73,7 @@ impl Reading {
         let shared_crest = |sign: f32| median(profiles.iter().map(|p| p.crest(sign)).collect());
         let ridge = |sign: f32| {
             let crest = shared_crest(sign);
-            let value = |p: &Profile, place: f64| f64::from(sign) * at(p, place);
+            let value = |p: &Profile, place: f64| f64::from(sign) * p.at(place);
             let mean = |place: f64| profiles.iter().map(|p| value(p, place)).sum::<f64>();
             let flanks = [crest - WALL_FLANK, crest + WALL_FLANK];
             let higher = if mean(flanks[0]) > mean(flanks[1]) { flanks[0] } else { flanks[1] };
@@ -84,6 +87,7 @@ impl Reading {
             contrast: step,
             significance: step.abs() / step_error,
             share: 0.5,
+            shift: 0.0,
             profiles: profiles.len(),
         };
         for sign in [1.0, -1.0] {
@@ -97,10 +101,15 @@ impl Reading {
         }
         if found.significance > SIGNIFICANT {
             found.model = BorderModel::Level;
-            let (share, bias) = beside(profiles);
+            let flanks = Flanks::of(profiles);
+            let (share, off) = flanks.beside(flanks.rim);
             found.share = share;
             if !(ON_LEVEL[0]..=ON_LEVEL[1]).contains(&share) {
-                found.bias = bias;
+                found.bias = off;
+            } else if let (high, shift) = flanks.beside(flanks.inside)
+                && high > HIGH
+            {
+                found.shift = shift;
             }
         }
         found
@@ -111,39 +120,45 @@ fn mean_step(profiles: &[Profile]) -> f64 {
     profiles.iter().map(|p| p.inside() - p.outside()).sum::<f64>() / profiles.len().max(1) as f64
 }
 
-fn mean_profile(profiles: &[Profile]) -> [f64; LEN] {
-    let mean = |n: usize| profiles.iter().map(|p| f64::from(p.0[n])).sum::<f64>() / profiles.len().max(1) as f64;
-    std::array::from_fn(mean)
-}
-
 /// A rim is higher than what lies inside of it by more than this part of the difference of inside and outside.
 const RIM: f64 = 0.1;
+/// Outlines run high on a border from this share of the way up on.
+const HIGH: f64 = 0.7;
 
-/// Where the value under the outlines lies between outside (0) and inside (1), and how far outside of them the mean
-/// profile is half way, where that is nearest. A rim that outshines what it bounds is the inside of its border.
-fn beside(profiles: &[Profile]) -> (f64, f64) {
-    let mean = mean_profile(profiles);
-    let plateau = |of: fn(&Profile) -> f64| profiles.iter().map(of).sum::<f64>() / profiles.len().max(1) as f64;
-    let (inside, outside) = (plateau(Profile::inside), plateau(Profile::outside));
-    let sign = (inside - outside).signum();
-    let peak = mean.iter().map(|v| sign * v).fold(f64::NEG_INFINITY, f64::max) * sign;
-    let has_rim = (peak - mean[0]) * sign > RIM * (inside - outside).abs();
-    let top = if has_rim { peak } else { inside };
-    let half = 0.5 * (top + outside);
-    let crossing = |n: usize| {
-        let (a, b) = (mean[n] - half, mean[n + 1] - half);
-        (a * b <= 0.0 && a != b).then(|| (n as f64 + a / (a - b) - REACH as f64) * STEP)
-    };
-    let nearest = (0..LEN - 1).filter_map(crossing).min_by(|a, b| a.abs().total_cmp(&b.abs()));
-    ((mean[REACH] - outside) / (top - outside), nearest.unwrap_or(0.0))
+/// The mean profile, and what its border is between.
+struct Flanks {
+    mean: [f64; LEN],
+    outside: f64,
+    /// Where the inside is darkest (brightest, if that is darker than the outside).
+    inside: f64,
+    /// The inside, or a rim that outshines what it bounds.
+    rim: f64,
 }
 
-/// A profile's value at a place in smallest spacings from the border.
-fn at(profile: &Profile, place: f64) -> f64 {
-    let n = (place / STEP + REACH as f64).clamp(0.0, (LEN - 1) as f64);
-    let (low, share) = ((n.floor() as usize).min(LEN - 2), n - n.floor().min((LEN - 2) as f64));
-    let (a, b) = (f64::from(profile.0[low]), f64::from(profile.0[low + 1]));
-    a + share * (b - a)
+impl Flanks {
+    fn of(profiles: &[Profile]) -> Self {
+        let count = profiles.len().max(1) as f64;
+        let mean = std::array::from_fn(|n| profiles.iter().map(|p| f64::from(p.0[n])).sum::<f64>() / count);
+        let plateau = |of: fn(&Profile) -> f64| profiles.iter().map(of).sum::<f64>() / count;
+        let (inside, outside) = (plateau(Profile::inside), plateau(Profile::outside));
+        let sign = (inside - outside).signum();
+        let peak = mean.iter().map(|v: &f64| sign * v).fold(f64::NEG_INFINITY, f64::max) * sign;
+        let has_rim = (peak - mean[0]) * sign > RIM * (inside - outside).abs();
+        let rim = if has_rim { peak } else { inside };
+        Self { mean, outside, inside: sign * (sign * inside).min(sign * mean[0]), rim }
+    }
+
+    /// Where the value under the outlines lies between outside (0) and `top` (1), and how far outside of them the mean
+    /// profile is half way, where that is nearest.
+    fn beside(&self, top: f64) -> (f64, f64) {
+        let half = 0.5 * (top + self.outside);
+        let crossing = |n: usize| {
+            let (a, b) = (self.mean[n] - half, self.mean[n + 1] - half);
+            (a * b <= 0.0 && a != b).then(|| (n as f64 + a / (a - b) - REACH as f64) * STEP)
+        };
+        let nearest = (0..LEN - 1).filter_map(crossing).min_by(|a, b| a.abs().total_cmp(&b.abs()));
+        ((self.mean[REACH] - self.outside) / (top - self.outside), nearest.unwrap_or(0.0))
+    }
 }
 
 fn mean_and_error(values: &[f64]) -> (f64, f64) {

@@ -35,11 +35,20 @@ impl Profile {
         mean(FLANK.map(|n| self.0[REACH + n]))
     }
 
-    /// How much the value falls from the inside to the outside, per smallest spacing.
+    /// The value at a place in smallest spacings outside of the border.
     #[must_use]
-    pub fn fall(&self) -> f64 {
-        const BY: usize = 2;
-        f64::from(self.0[REACH - BY] - self.0[REACH + BY]) / (2.0 * BY as f64 * STEP)
+    pub fn at(&self, place: f64) -> f64 {
+        let n = (place / STEP + REACH as f64).clamp(0.0, (LEN - 1) as f64);
+        let low = (n.floor() as usize).min(LEN - 2);
+        let (a, b) = (f64::from(self.0[low]), f64::from(self.0[low + 1]));
+        a + (n - low as f64) * (b - a)
+    }
+
+    /// How much the value falls from the inside to the outside there, per smallest spacing.
+    #[must_use]
+    pub fn fall(&self, place: f64) -> f64 {
+        const BY: f64 = 1.0;
+        (self.at(place - BY) - self.at(place + BY)) / (2.0 * BY)
     }
 
     /// Where the profile is highest (`sign` 1) or lowest (-1), in smallest spacings from the border.

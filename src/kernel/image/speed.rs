@@ -19,14 +19,26 @@ pub struct Grey<'a> {
 /// Falls below this part of the mean one count as it.
 const LEAST_FALL: f32 = 0.35;
 
-/// The distance to where the border's grey value is, by Newton's step: `D = (I - T) / fall`, at most `most`; and how
-/// many times less sure that is than in the mean. `h` is the smallest spacing.
-pub fn level_offsets(grey: Grey<'_>, most: f32, h: f32, offsets: &mut [f32], doubts: &mut [f32]) {
+/// How a grey value becomes a distance.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// The largest one, in smallest spacings.
+    pub most: f32,
+    /// How far outside of the border its grey value is, in smallest spacings.
+    pub shift: f32,
+    /// The smallest spacing.
+    pub h: f32,
+}
+
+/// The distance to where the border's grey value is, by Newton's step: `D = (I - T) / fall`, less what that lies outside
+/// of the border; and how many times less sure that is than in the mean.
+pub fn level_offsets(grey: Grey<'_>, by: Step, offsets: &mut [f32], doubts: &mut [f32]) {
     let least = LEAST_FALL * grey.mean_fall.abs();
     let sign = grey.mean_fall.signum();
     for n in 0..offsets.len() {
         let fall = (sign * grey.fall[n]).max(least);
-        offsets[n] = (sign * (grey.values[n] - grey.level[n]) / fall * h).clamp(-most, most);
+        let away = (sign * (grey.values[n] - grey.level[n]) / fall).clamp(-by.most, by.most);
+        offsets[n] = (away - by.shift) * by.h;
         doubts[n] = (grey.mean_fall.abs() / fall).max(1.0);
     }
 }
@@ -101,6 +113,8 @@ pub struct Places<'a> {
     pub shape: &'a [f32],
     /// Distance to the outlines.
     pub distance: &'a [f32],
+    /// Distance to the nearest outline's plane.
+    pub planes: &'a [f32],
     /// How far beyond the first or last outline.
     pub beyond: &'a [f32],
 }
@@ -109,17 +123,17 @@ pub struct Places<'a> {
 pub fn speeds(at: Places<'_>, offsets: &[f32], doubts: &[f32], by: Weights, out: &mut [f32]) {
     let h = by.spacing;
     for n in 0..out.len() {
-        let away = at.distance[n] / h;
+        let away = at.distance[n].min(at.planes[n]) / h;
         let (grown, end) = (by.growth * away * away, OF_AN_END * at.beyond[n] / h);
         let variance = by.shape * by.shape + grown * grown + end * end;
-        let image = by.image * doubts[n];
+        let image = by.image * doubts[n] / by.rho.sqrt();
         // No weight where the image's variance is not finite.
         let weight = variance / (variance + image * image);
         let off = at.shape[n] / h - by.bias;
         let reach = GATE * (variance + variance.min(by.image * by.image)).sqrt().max(1.0);
         let beyond = (off.abs() / reach - 1.0).clamp(0.0, 1.0);
         let gate = (1.0 - beyond * beyond) * (1.0 - beyond * beyond);
-        let pull = by.rho * weight * gate * offsets[n] / h - (1.0 - weight * gate) * off;
+        let pull = weight * gate * offsets[n] / h - (1.0 - weight * gate) * off;
         out[n] = (pull / SPAN).clamp(-FASTEST, FASTEST);
     }
 }

@@ -14,7 +14,7 @@ pub struct HeldOut {
     pub mark: [f64; 3],
     /// Signed distance to the shape of the other sections, positive outside.
     pub off: f64,
-    /// Distance to the nearest section that was not left out.
+    /// Distance to the nearest section that was not left out, or to its plane.
     pub away: f64,
     /// The shape's outward direction there.
     pub normal: [f64; 3],
@@ -34,7 +34,8 @@ pub fn leave_out(sections: &[&Section], n: usize, least: f64) -> Option<Vec<Held
     let fitted = Fitted::new(&others, least)?;
     let held = |&mark: &[f64; 3]| {
         let (off, normal) = fitted.distance(mark);
-        let away = others.iter().map(|other| nearest(&other.marks, mark)).fold(f64::INFINITY, f64::min);
+        let away = others.iter().map(|other| nearest(&other.marks, mark).min(other.plane.height(mark).abs()));
+        let away = away.fold(f64::INFINITY, f64::min);
         HeldOut { mark, off, away, normal }
     };
     Some(out.marks.iter().map(held).collect())

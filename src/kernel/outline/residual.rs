@@ -18,6 +18,16 @@ pub(super) struct Family<'a> {
     gap: f64,
 }
 
+impl Family<'_> {
+    /// How far the nearest section's plane is from a point.
+    pub(super) fn away(&self, point: [f64; 3]) -> f64 {
+        let along = dot(self.sections[0].plane.normal, point);
+        let above = self.sections.partition_point(|section| section.plane.offset <= along);
+        let at = |n: usize| self.sections.get(n).map_or(f64::INFINITY, |section| (section.plane.offset - along).abs());
+        at(above).min(at(above.wrapping_sub(1)))
+    }
+}
+
 /// Sections by direction.
 pub(super) fn families<'a>(sections: &[&'a Section]) -> Vec<Family<'a>> {
     let mut families: Vec<Family> = Vec::new();

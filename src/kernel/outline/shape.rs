@@ -14,8 +14,10 @@ pub struct Shape<'a> {
     geometry: Geometry,
     lattice: Lattice,
     ends: Option<Ends>,
-    /// Sections by direction, where the function does not pass through all marks.
+    /// Sections by direction.
     families: Vec<Family<'a>>,
+    /// Whether the function passes through all marks.
+    is_close: bool,
 }
 
 /// A function that passes outlines within this part of the smallest spacing needs no correction.
@@ -25,15 +27,14 @@ impl<'a> Shape<'a> {
     /// The fitted function, laid out on a lattice of a grid.
     #[must_use]
     pub fn new(fitted: &Fitted, geometry: Geometry, lattice: Lattice, sections: &[&'a Section]) -> Self {
-        let mut shape = Self { geometry, lattice, ends: fitted.ends(), families: Vec::new() };
+        let families = families(sections);
+        let mut shape = Self { geometry, lattice, ends: fitted.ends(), families, is_close: true };
         let spacing = shape.geometry.min_spacing();
         let off = |section: &Section| {
             let on = section.curves.iter().flat_map(|curve| curve.points.iter().step_by(3));
             on.map(|&p| shape.on_lattice(section.plane.lift(p, 0.0)).abs()).fold(0.0, f64::max)
         };
-        if sections.iter().any(|section| off(section) > CLOSE * spacing) {
-            shape.families = families(sections);
-        }
+        shape.is_close = sections.iter().all(|section| off(section) <= CLOSE * spacing);
         shape
     }
 
@@ -47,14 +48,14 @@ impl<'a> Shape<'a> {
         const STEEPEST: f64 = 1.5;
         let middle = std::array::from_fn(|a| 0.5 * (part.lo[a] + part.hi[a] - 1) as f64);
         let half = 0.5 * self.geometry.length(part.shape());
-        let left = if self.families.is_empty() { 0.0 } else { MOST_LEFT * self.geometry.min_spacing() };
+        let left = if self.is_close { 0.0 } else { MOST_LEFT * self.geometry.min_spacing() };
         f64::from(self.lattice.at(middle)).abs() > reach + left + STEEPEST * half
     }
 
     /// Fills a box of voxels, dense, with the signed distance.
     pub fn read(&self, part: &Box3, out: &mut [f32]) {
         self.lattice.read(part, out);
-        if !self.families.is_empty() {
+        if !self.is_close {
             share_out(&self.families, &self.geometry, part, |point| self.on_lattice(point), out);
         }
         if let Some(ends) = self.ends {
@@ -69,6 +70,12 @@ impl<'a> Shape<'a> {
             Some(ends) => self.for_each(part, out, |point, value| *value = ends.beyond_sections(point) as f32),
             None => out.fill(0.0),
         }
+    }
+
+    /// Fills a box of voxels, dense, with how far the nearest section's plane is: there is no doubt of what lies in it.
+    pub fn to_sections(&self, part: &Box3, out: &mut [f32]) {
+        let nearest = |point| self.families.iter().map(|family| family.away(point)).fold(f64::INFINITY, f64::min);
+        self.for_each(part, out, |point, value| *value = nearest(point) as f32);
     }
 
     fn for_each(&self, part: &Box3, out: &mut [f32], mut with: impl FnMut([f64; 3], &mut f32)) {

@@ -53,6 +53,11 @@ impl<'a> ShapeField<'a> {
         self.shape.beyond_sections(part, out);
     }
 
+    /// Fills a box of voxels, dense, with how far the nearest outline's plane is.
+    pub(super) fn to_sections(&self, part: &Box3, out: &mut [f32]) {
+        self.shape.to_sections(part, out);
+    }
+
     /// The cells with voxels within `reach` of the surface.
     pub(super) fn cells_within(&self, stage: &Stage<'_>, reach: f64) -> Result<Arc<BrickSet>> {
         let grid = BrickGrid::new(self.geometry.shape, CELL as i64);

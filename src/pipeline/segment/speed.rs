@@ -1,12 +1,12 @@
 //! The speed at which image and shape move an object's surface along its normal, brick by brick.
 //!
 //! ```text
-//! F = ( rho w D - (1 - w) (phi - b) ) / 3 h     w = U^2 / (U^2 + V^2)     U^2 = U_0^2 + (c d^2)^2 + e^2 / 12
+//! F = ( w D - (1 - w) (phi - b) ) / 3 h     w = U^2 / (U^2 + V^2 / rho)     U^2 = U_0^2 + (c d^2)^2 + e^2 / 12
 //! ```
 //!
 //! phi is the signed distance to the shape of the outlines, b how far outside of the marks the image's border lies, D
 //! how far the image says that the border is away, outwards; U is how uncertain the shape is, the more the farther
-//! from the outlines (d) and beyond the last of them (e), V how uncertain the image. The surface rests where both agree, weighed by their variances.
+//! from the outlines and their planes (d) and beyond the last of them (e), V how uncertain the image. The surface rests where both agree, weighed by their variances.
 
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::border_model::{BorderModel, ON_LEVEL};
-use crate::kernel::image::speed::{Grey, Places, Weights, level_offsets, speeds, wall_offsets};
+use crate::kernel::image::speed::{Grey, Places, Step, Weights, level_offsets, speeds, wall_offsets};
 use crate::kernel::outline::lattice::Lattice;
 use crate::store::{BoxSink, BoxSource, BrickArray};
 
@@ -59,7 +59,7 @@ pub(super) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
     stage.run(&one_wave(set), &Workers::new(Buffers::default), |buffers, &slot| {
         let part = set.grid().brick_box(set.id(slot));
         buffers.fill(&part, by, geometry, levels.as_ref())?;
-        let at = Places { shape: &buffers.shape, distance: &buffers.distance, beyond: &buffers.beyond };
+        let at = Places { shape: &buffers.shape, distance: &buffers.distance, planes: &buffers.planes, beyond: &buffers.beyond };
         speeds(at, &buffers.offsets, &buffers.doubts, weights, &mut buffers.speed);
         field.write_box(&part, &buffers.speed)?;
         field.refresh_faces(slot);
@@ -72,6 +72,7 @@ pub(super) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
 struct Buffers {
     shape: Vec<f32>,
     distance: Vec<f32>,
+    planes: Vec<f32>,
     beyond: Vec<f32>,
     /// Where the image says the border is, and how many times its usual deviation that is unsure.
     offsets: Vec<f32>,
@@ -85,12 +86,13 @@ struct Buffers {
 
 impl Buffers {
     fn fill(&mut self, part: &Box3, by: &Pulls<'_>, geometry: &Geometry, levels: Option<&Levels>) -> Result<()> {
-        let fields = [&mut self.shape, &mut self.distance, &mut self.beyond];
+        let fields = [&mut self.shape, &mut self.distance, &mut self.planes, &mut self.beyond];
         for buffer in fields.into_iter().chain([&mut self.offsets, &mut self.doubts, &mut self.speed]) {
             buffer.resize(part.len(), 0.0);
         }
         by.shape.read_box(part, &mut self.shape)?;
         by.distance.read_box(part, &mut self.distance)?;
+        by.field.to_sections(part, &mut self.planes);
         by.field.beyond_sections(part, &mut self.beyond);
         self.offsets.fill(0.0);
         self.doubts.fill(f32::INFINITY);
@@ -105,7 +107,8 @@ impl Buffers {
             levels.level.read(part, &mut self.level);
             levels.fall.read(part, &mut self.fall);
             let grey = Grey { values: &self.grey, level: &self.level, fall: &self.fall, mean_fall: levels.mean_fall };
-            level_offsets(grey, MOST_OFF as f32 * h, h, &mut self.offsets, &mut self.doubts);
+            let by = Step { most: MOST_OFF as f32, shift: reading.shift as f32, h };
+            level_offsets(grey, by, &mut self.offsets, &mut self.doubts);
         } else if let BorderModel::Wall(sign) = reading.model {
             let around = part.grow(1).intersect(&geometry.domain());
             self.grey.resize(around.len(), 0.0);
@@ -130,16 +133,17 @@ struct Levels {
 
 fn levels(stage: &Stage<'_>, geometry: &Geometry, object: &Outlined, trust: &Trust) -> Result<Levels> {
     let on_level = (ON_LEVEL[0]..=ON_LEVEL[1]).contains(&trust.reading.share);
+    let shift = trust.reading.shift;
     let value = |s: &Sampled| {
         let half = 0.5 * (s.profile.inside() + s.profile.outside());
-        [if on_level { s.profile.here() } else { half }, s.profile.fall()]
+        [if on_level { s.profile.at(shift) } else { half }, s.profile.fall(shift)]
     };
     let samples = object.profiles.iter().map(|s| GeomWithData::new(s.point, value(s)));
     let tree = RTree::bulk_load(samples.collect());
     let count = object.profiles.len().max(1) as f64;
     // Beside a border that the marks miss the fall at the marks is none.
     let mean_fall = if on_level {
-        object.profiles.iter().map(|s| s.profile.fall()).sum::<f64>() / count
+        object.profiles.iter().map(|s| s.profile.fall(shift)).sum::<f64>() / count
     } else {
         0.25 * trust.reading.contrast
     };

@@ -206,10 +206,11 @@ fn image_deviation(profiles: &[Sampled], reading: &Reading, deviation: f64, h: f
             apart(1.4826 * median(off.collect()))
         }
         BorderModel::Level => {
-            let fall = profiles.iter().map(|s| s.profile.fall()).sum::<f64>() / profiles.len().max(1) as f64;
+            let at = reading.shift;
+            let fall = profiles.iter().map(|s| s.profile.fall(at)).sum::<f64>() / profiles.len().max(1) as f64;
             let off = profiles.iter().filter_map(|s| {
-                let grey = grey_of_others(profiles, s, h)?;
-                Some(((s.profile.here() - grey) / fall).clamp(-MOST_OFF, MOST_OFF).powi(2))
+                let grey = grey_of_others(profiles, s, at, h)?;
+                Some(((s.profile.at(at) - grey) / fall).clamp(-MOST_OFF, MOST_OFF).powi(2))
             });
             let (sum, count) = off.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1));
             if count == 0 { 1.0 } else { apart((sum / f64::from(count)).sqrt()) }
@@ -222,8 +223,8 @@ pub(super) const MOST_OFF: f64 = 3.0;
 /// Grey values are carried over from the nearest outlines; others fade over so many smallest spacings more.
 pub(super) const FADE: f64 = 3.0;
 
-/// The grey value under the border that the outlines of other sections tell for a point.
-fn grey_of_others(profiles: &[Sampled], of: &Sampled, h: f64) -> Option<f64> {
+/// The grey value at a place beside the border that the outlines of other sections tell for a point.
+fn grey_of_others(profiles: &[Sampled], of: &Sampled, at: f64, h: f64) -> Option<f64> {
     let square = |s: &Sampled| {
         let by = sub(s.point, of.point);
         dot(by, by)
@@ -231,7 +232,7 @@ fn grey_of_others(profiles: &[Sampled], of: &Sampled, h: f64) -> Option<f64> {
     let others = || profiles.iter().filter(|s| s.section != of.section);
     let nearest = others().map(square).fold(f64::INFINITY, f64::min);
     let fade = 2.0 * (FADE * h).powi(2);
-    let weighted = others().map(|s| ((nearest - square(s)) / fade).exp()).zip(others().map(|s| s.profile.here()));
+    let weighted = others().map(|s| ((nearest - square(s)) / fade).exp()).zip(others().map(|s| s.profile.at(at)));
     let (sum, weights) = weighted.fold((0.0, 0.0), |(sum, all), (w, grey)| (sum + w * grey, all + w));
     (weights > 0.0).then(|| sum / weights)
 }
