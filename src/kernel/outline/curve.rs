@@ -11,7 +11,7 @@
 //! r is the outline's radius, so A is a number for shapes of all sizes. Marks carry white noise of variance sigma^2.
 //! In: marks in the plane, in order. Out: points on the curve, and how sure they are.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// The highest number of waves around a curve.
 const MOST_WAVES: usize = 40;
@@ -82,6 +82,42 @@ fn wave_sum(t: f64) -> f64 {
     sum
 }
 
+/// A curve as the waves around it: `c_0 + sum over k of c_k cos 2 pi k t + s_k sin 2 pi k t`.
+struct Waves(Vec<[[f64; 2]; 2]>);
+
+impl Waves {
+    /// What the weights of marks at these places and of the ellipse, the last three rows, make: sums of cosines of
+    /// differences, taken apart.
+    fn of(places: &[f64], weights: &DMatrix<f64>, scale: f64) -> Self {
+        let n = places.len();
+        let row = |m: usize| std::array::from_fn(|a| weights[(n + m, a)]);
+        let mut waves = vec![[row(0), [0.0; 2]], [row(1), row(2)]];
+        for k in 2..=MOST_WAVES {
+            let square = (k * k - 1) as f64;
+            let mut wave = [[0.0; 2]; 2];
+            for (i, place) in places.iter().enumerate() {
+                let (sin, cos) = (std::f64::consts::TAU * k as f64 * place).sin_cos();
+                for a in 0..2 {
+                    wave[0][a] += scale * 2.0 / (square * square) * weights[(i, a)] * cos;
+                    wave[1][a] += scale * 2.0 / (square * square) * weights[(i, a)] * sin;
+                }
+            }
+            waves.push(wave);
+        }
+        Self(waves)
+    }
+
+    fn at(&self, t: f64) -> [f64; 2] {
+        let (sin, cos) = (std::f64::consts::TAU * t).sin_cos();
+        let mut turn = [1.0, 0.0];
+        self.0.iter().fold([0.0; 2], |sum, [c, s]| {
+            let here = std::array::from_fn(|a| sum[a] + c[a] * turn[0] + s[a] * turn[1]);
+            turn = [turn[0] * cos - turn[1] * sin, turn[0] * sin + turn[1] * cos];
+            here
+        })
+    }
+}
+
 /// A closed curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
@@ -119,13 +155,9 @@ impl Curve {
         let free = n as f64 - variance * inverse.view((0, 0), (n, n)).trace();
         let length: f64 = (0..n).map(|i| distance(marks[i], marks[(i + 1) % n])).sum();
         let count = ((length / step).ceil() as usize).clamp(2 * n, 4096);
-        let at = |t: f64| -> [f64; 2] {
-            let scale = marked.radius * marked.radius * scatter.amplitude * scatter.amplitude;
-            let waves = marked.places.iter().map(|place| scale * wave_sum(t - place));
-            let row = DVector::from_iterator(n + 3, waves.chain(basis(t)));
-            std::array::from_fn(|a| row.dot(&weights.column(a)))
-        };
-        let points = (0..count).map(|m| at(m as f64 / count as f64)).collect();
+        let scale = marked.radius * marked.radius * scatter.amplitude * scatter.amplitude;
+        let waves = Waves::of(&marked.places, &weights, scale);
+        let points = (0..count).map(|m| waves.at(m as f64 / count as f64)).collect();
         Self { points, deviation: scatter.sigma * (free.max(1.0) / n as f64).sqrt().min(1.0) }
     }
 }

@@ -32,23 +32,57 @@ pub struct Fitted {
     ends: Option<Ends>,
 }
 
-impl Fitted {
-    /// Fits sections in order of their offsets, of one direction or several; points beside outlines lie `least` away at
-    /// the least. None where the sections tell no shape.
+/// Sections that are to be fitted, window by window, in any order.
+#[derive(Clone, Debug)]
+pub struct Fit<'a> {
+    sections: &'a [&'a Section],
+    ends: Option<Ends>,
+    windows: Vec<Window>,
+    least: f64,
+    smoothing: f64,
+}
+
+impl<'a> Fit<'a> {
+    /// Of sections in order of their offsets, of one direction or several; points beside outlines lie `least` away at
+    /// the least.
     #[must_use]
-    pub fn new(sections: &[&Section], least: f64) -> Option<Self> {
+    pub fn new(sections: &'a [&'a Section], least: f64) -> Self {
         let radius = sections.iter().map(|section| section.radius()).sum::<f64>() / sections.len().max(1) as f64;
         let smoothing = (SMOOTHING * (least / LEAST_BESIDE).powi(3)).min(SMOOTHING_OF_SIZE * radius.powi(3));
         let ends = Ends::of(sections);
-        let part = |window: Window| {
-            let [low, high] = ends.map_or([None; 2], |ends| ends.round());
-            let at = [window.sections.start == 0, window.sections.end == sections.len()];
-            let ends = [low.filter(|_| at[0]), high.filter(|_| at[1])];
-            let function = fit(&sections[window.sections.clone()], ends, least, smoothing)?;
-            Some((window, function))
-        };
-        let parts = split(sections, ends).into_iter().map(part).collect::<Option<_>>()?;
-        Some(Self { parts, ends })
+        Self { sections, ends, windows: split(sections, ends), least, smoothing }
+    }
+
+    /// The windows.
+    #[must_use]
+    pub fn windows(&self) -> &[Window] {
+        &self.windows
+    }
+
+    /// The function of a window; none where its sections tell no shape.
+    #[must_use]
+    pub fn solve(&self, window: &Window) -> Option<RadialBasis> {
+        let [low, high] = self.ends.map_or([None; 2], |ends| ends.round());
+        let at = [window.sections.start == 0, window.sections.end == self.sections.len()];
+        let ends = [low.filter(|_| at[0]), high.filter(|_| at[1])];
+        fit(&self.sections[window.sections.clone()], ends, self.least, self.smoothing)
+    }
+
+    /// Takes the functions of all windows, in order; none where any is none.
+    #[must_use]
+    pub fn join(self, functions: Vec<Option<RadialBasis>>) -> Option<Fitted> {
+        let parts = self.windows.into_iter().zip(functions).map(|(window, function)| Some((window, function?)));
+        Some(Fitted { parts: parts.collect::<Option<_>>()?, ends: self.ends })
+    }
+}
+
+impl Fitted {
+    /// Fits sections at once.
+    #[must_use]
+    pub fn new(sections: &[&Section], least: f64) -> Option<Self> {
+        let fit = Fit::new(sections, least);
+        let functions = fit.windows().iter().map(|window| fit.solve(window)).collect();
+        fit.join(functions)
     }
 
     /// Where the object ends; none where its sections have several directions.

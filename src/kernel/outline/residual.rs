@@ -56,7 +56,8 @@ pub(super) fn share_out(
 ) {
     let h = geometry.min_spacing();
     let (limit, least) = ((2.0 * MOST_LEFT * h) as f32, (0.5 * h).powi(2));
-    let of = |family| Residuals { family, most: MOST_LEFT * h, function: &function, part, known: Vec::new() };
+    let most = MOST_LEFT * h;
+    let of = |family| Residuals { family, geometry, most, function: &function, part, known: Vec::new() };
     let mut residuals: Vec<_> = families.iter().map(of).collect();
     let width = part.shape()[0] as usize;
     for ((y, z), row) in part.rows().zip(out.chunks_exact_mut(width)) {
@@ -74,14 +75,19 @@ pub(super) fn share_out(
     }
 }
 
+/// Sections that lie across an axis are asked at every other voxel along both axes of their planes; between those what
+/// is left is read linearly.
+const RASTER: i64 = 2;
+
 /// What is left to the sections of a family in a box.
 struct Residuals<'a, F> {
     family: &'a Family<'a>,
+    geometry: &'a Geometry,
     most: f64,
     function: &'a F,
     part: &'a Box3,
-    /// By section what is left at the box's voxels, seen along the axis; NaN where nobody has asked yet. Sections that
-    /// lie across an axis are asked for the same point by all voxels of a column.
+    /// By section what is left on the raster around the box, seen along the axis; NaN where nobody has asked yet: all
+    /// voxels of a column ask for the same.
     known: Vec<(usize, Vec<f64>)>,
 }
 
@@ -105,17 +111,36 @@ impl<F: Fn([f64; 3]) -> f64> Residuals<'_, F> {
     /// What is left of section `n` at the point of its plane below a voxel.
     fn of(&mut self, n: usize, voxel: [i64; 3], point: [f64; 3]) -> f64 {
         let Some(axis) = self.family.axis else { return self.left(n, point) };
-        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
-        let place = ((voxel[b] - self.part.lo[b]) * self.part.shape()[a] + voxel[a] - self.part.lo[a]) as usize;
+        let across = [(axis + 1) % 3, (axis + 2) % 3];
+        let first = across.map(|a| self.part.lo[a].div_euclid(RASTER));
+        let width = (self.part.hi[across[0]] - 1).div_euclid(RASTER) + 2 - first[0];
+        let height = (self.part.hi[across[1]] - 1).div_euclid(RASTER) + 2 - first[1];
         let known = self.known.iter().position(|(section, _)| *section == n).unwrap_or_else(|| {
-            let shape = self.part.shape();
-            self.known.push((n, vec![f64::NAN; (shape[a] * shape[b]) as usize]));
+            self.known.push((n, vec![f64::NAN; (width * height) as usize]));
             self.known.len() - 1
         });
-        if self.known[known].1[place].is_nan() {
-            self.known[known].1[place] = self.left(n, point);
+        let low = across.map(|a| voxel[a].div_euclid(RASTER));
+        let share = across.map(|a| voxel[a].rem_euclid(RASTER) as f64 / RASTER as f64);
+        let mut sum = 0.0;
+        for [i, j] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let weight = [i, j].iter().zip(share).map(|(&up, t)| if up == 1 { t } else { 1.0 - t }).product::<f64>();
+            if weight == 0.0 {
+                continue;
+            }
+            let node = [low[0] + i, low[1] + j];
+            let place = ((node[1] - first[1]) * width + node[0] - first[0]) as usize;
+            if self.known[known].1[place].is_nan() {
+                self.known[known].1[place] = self.left(n, self.on_raster(voxel, across, node));
+            }
+            sum += weight * self.known[known].1[place];
         }
-        self.known[known].1[place]
+        sum
+    }
+
+    /// The position of a node of the raster.
+    fn on_raster(&self, mut voxel: [i64; 3], across: [usize; 2], node: [i64; 2]) -> [f64; 3] {
+        (0..2).for_each(|m| voxel[across[m]] = node[m] * RASTER);
+        self.geometry.position(voxel)
     }
 
     fn left(&self, n: usize, point: [f64; 3]) -> f64 {

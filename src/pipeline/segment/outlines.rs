@@ -17,7 +17,7 @@ const CURVE_STEP: f64 = 0.5;
 const SAME_PLANE: f64 = 0.25;
 
 /// An outline as it was marked.
-struct Drawn<'a> {
+pub(super) struct Drawn<'a> {
     plane: Plane,
     marks: &'a [[f64; 3]],
     in_plane: Vec<[f64; 2]>,
@@ -49,25 +49,36 @@ pub(super) fn scatter_of(objects: &[ObjectMarks], image: &Geometry) -> Scatter {
     noise::estimate(&outlines.collect::<Vec<_>>(), image.min_spacing())
 }
 
-/// The sections that an object's outlines bound, by direction and along it; none where its contours are no outlines.
-#[must_use]
-pub(super) fn sections_of(marks: &ObjectMarks, image: &Geometry, scatter: Scatter) -> Option<Vec<Section>> {
+/// An object's outlines by the planes that they were drawn in, by direction and along it; none where its contours are no
+/// outlines.
+pub(super) fn drawn_by_plane<'a>(marks: &'a ObjectMarks, image: &Geometry) -> Option<Vec<Vec<Drawn<'a>>>> {
     let mut outlines = drawn(marks, image)?;
     outlines.sort_by(|a, b| {
         let key = |d: &Drawn| (d.plane.normal.map(|v| -v), d.plane.offset);
         let ((a, at_a), (b, at_b)) = (key(a), key(b));
         a.iter().zip(&b).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(at_a.total_cmp(&at_b))
     });
-    let step = CURVE_STEP * image.min_spacing();
     let same = SAME_PLANE * image.min_spacing();
-    let shared =
-        |a: &Drawn, b: &Drawn| a.plane.is_parallel_to(&b.plane) && (a.plane.offset - b.plane.offset).abs() <= same;
-    let section = |group: &[Drawn]| {
-        let curves = group.iter().map(|outline| Curve::through(&outline.in_plane, scatter, step)).collect();
-        let marks = group.iter().flat_map(|outline| outline.marks).copied().collect();
-        Section::new(group[0].plane, curves, marks)
-    };
-    Some(outlines.chunk_by(shared).map(section).collect())
+    let mut groups: Vec<Vec<Drawn>> = Vec::new();
+    for outline in outlines {
+        let shares = |before: &Drawn| {
+            let by = before.plane.offset - outline.plane.offset;
+            before.plane.is_parallel_to(&outline.plane) && by.abs() <= same
+        };
+        match groups.last_mut().filter(|group| group.last().is_some_and(shares)) {
+            Some(group) => group.push(outline),
+            None => groups.push(vec![outline]),
+        }
+    }
+    Some(groups)
+}
+
+/// The section that the outlines of a plane bound; `spacing` is the smallest one.
+pub(super) fn section(outlines: &[Drawn<'_>], scatter: Scatter, spacing: f64) -> Section {
+    let step = CURVE_STEP * spacing;
+    let curves = outlines.iter().map(|outline| Curve::through(&outline.in_plane, scatter, step)).collect();
+    let marks = outlines.iter().flat_map(|outline| outline.marks).copied().collect();
+    Section::new(outlines[0].plane, curves, marks)
 }
 
 /// The numbers of an object's contours that cross themselves.

@@ -48,6 +48,13 @@ impl<'a> ShapeField<'a> {
         self.shape.read(part, out);
     }
 
+    /// The signed distance at a voxel.
+    fn at(&self, voxel: [i64; 3]) -> f32 {
+        let mut value = [0.0];
+        self.read(&Box3::new(voxel, voxel.map(|v| v + 1)), &mut value);
+        value[0]
+    }
+
     /// Fills a box of voxels, dense, with how far they lie beyond the first or last outline.
     pub(super) fn beyond_sections(&self, part: &Box3, out: &mut [f32]) {
         self.shape.beyond_sections(part, out);
@@ -67,6 +74,10 @@ impl<'a> ShapeField<'a> {
             if self.shape.is_beyond(&part, reach) {
                 return Ok(false);
             }
+            // Most cells near the surface show it at a few voxels.
+            if a_few(&part).any(|voxel| f64::from(self.at(voxel).abs()) <= reach) {
+                return Ok(true);
+            }
             values.resize(part.len(), 0.0);
             self.read(&part, values);
             Ok(values.iter().any(|v| f64::from(v.abs()) <= reach))
@@ -85,11 +96,9 @@ impl<'a> ShapeField<'a> {
         let grid = *set.grid();
         let mut fills = false;
         for id in (0..grid.len()).filter(|&id| set.slot(id).is_none()) {
-            let corner = grid.brick_box(id).lo;
-            let mut value = [0.0];
-            self.read(&Box3::new(corner, corner.map(|v| v + 1)), &mut value);
-            field.set_absent(id, value[0]);
-            fills |= value[0] < 0.0;
+            let value = self.at(grid.brick_box(id).lo);
+            field.set_absent(id, value);
+            fills |= value < 0.0;
         }
         let lowest = stage.run(&one_wave(set), &Workers::new(Vec::new), |values, &slot| {
             let part = grid.brick_box(set.id(slot));
@@ -102,6 +111,12 @@ impl<'a> ShapeField<'a> {
         let deepest = if fills { f64::INFINITY } else { -f64::from(lowest.into_iter().fold(0.0, f32::min)) };
         Ok((field, deepest))
     }
+}
+
+/// The voxels of a box at a quarter and three quarters along each axis.
+fn a_few(part: &Box3) -> impl Iterator<Item = [i64; 3]> {
+    let part = *part;
+    (0..8).map(move |corner| std::array::from_fn(|a| part.lo[a] + part.shape()[a] * (1 + 2 * (corner >> a & 1)) / 4))
 }
 
 /// The grid around sections: their bounds, how far the shape may reach beyond them, and a margin, from a whole cell on.

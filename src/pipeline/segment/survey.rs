@@ -12,7 +12,7 @@ use crate::kernel::image::profiles::{LEN, Profile, REACH, STEP, interpolate};
 use crate::kernel::outline::cross_validation::{HeldOut, leave_out};
 use crate::kernel::outline::curve::Scatter;
 use crate::kernel::outline::section::Section;
-use crate::kernel::outline::fitted::{Fitted, LEAST_BESIDE};
+use crate::kernel::outline::fitted::{Fit, Fitted, LEAST_BESIDE};
 use crate::kernel::vector::{dot, sub};
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::ObjectMarks;
@@ -72,15 +72,19 @@ impl Outlined {
         looks: bool,
     ) -> Result<Option<Self>> {
         let image = picture.geometry;
-        let Some(sections) = outlines::sections_of(marks, image, scatter) else { return Ok(None) };
+        let Some(groups) = outlines::drawn_by_plane(marks, image) else { return Ok(None) };
+        let stage = engine.stage(&name("marks", marks), 0);
+        let sections = stage
+            .run(&groups, &Workers::none(), |(), group| Ok(outlines::section(group, scatter, image.min_spacing())))?;
         let all: Vec<&Section> = sections.iter().collect();
         let least = LEAST_BESIDE * image.min_spacing();
-        let Some(fitted) = Fitted::new(&all, least) else { return Ok(None) };
-        let stage = engine.stage(&name("marks", marks), 0);
+        let fit = Fit::new(&all, least);
+        let functions = stage.run(fit.windows(), &Workers::none(), |(), window| Ok(fit.solve(window)))?;
         let every = sections.len().div_ceil(MOST_LEFT_OUT);
         let left_out: Vec<usize> = (0..sections.len()).step_by(every).filter(|_| sections.len() > 2).collect();
         let held_out = stage.run(&left_out, &Workers::none(), |(), &n| Ok(leave_out(&all, n, least)))?;
         stage.finish();
+        let Some(fitted) = fit.join(functions) else { return Ok(None) };
         let held_out = held_out.into_iter().flatten().flatten().collect();
         let profiles = if looks { profiles(engine, picture, marks, &sections, &fitted)? } else { Vec::new() };
         Ok(Some(Self { sections, fitted, profiles, held_out }))
@@ -194,6 +198,9 @@ fn growth<'a>(held_out: impl Iterator<Item = &'a HeldOut>, scatter: Scatter, h: 
 /// those beside it.
 const OUTLINES_OWN: f64 = 1.5;
 
+/// So many profiles are compared with those of other sections.
+const ENOUGH_COMPARED: usize = 400;
+
 /// How well the image tells a border, in smallest spacings: of a step how far a section's own outlines lie from where
 /// the grey values under the others' would put them; of a wall how far its crest is from where it mostly is.
 fn image_deviation(profiles: &[Sampled], reading: &Reading, deviation: f64, h: f64) -> f64 {
@@ -208,7 +215,8 @@ fn image_deviation(profiles: &[Sampled], reading: &Reading, deviation: f64, h: f
         BorderModel::Level => {
             let at = reading.shift;
             let fall = profiles.iter().map(|s| s.profile.fall(at)).sum::<f64>() / profiles.len().max(1) as f64;
-            let off = profiles.iter().filter_map(|s| {
+            let every = profiles.len().div_ceil(ENOUGH_COMPARED);
+            let off = profiles.iter().step_by(every.max(1)).filter_map(|s| {
                 let grey = grey_of_others(profiles, s, at, h)?;
                 Some(((s.profile.at(at) - grey) / fall).clamp(-MOST_OFF, MOST_OFF).powi(2))
             });
