@@ -1,12 +1,16 @@
 //! Small jobs side by side: each on one thread at a time where all cores are busy with others, instead of one after the
 //! other on all cores, which a small job cannot keep busy.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::engine::Engine;
+use super::engine::{Engine, StageReport};
 use crate::error::Result;
+
+/// What became of an item, and what its stages cost.
+type Done<R> = (Result<R>, Vec<StageReport>);
 
 impl Engine {
     /// Does `work` for each item, `most` at a time, each with an engine that shares this one's threads, window and
@@ -27,24 +31,24 @@ impl Engine {
         if most < 2 || items.len() < 2 {
             return items.iter().map(|item| work(self, item)).collect();
         }
-        let reports: Vec<Mutex<Vec<_>>> = items.iter().map(|_| Mutex::default()).collect();
-        let numbered: Vec<(usize, &I)> = items.iter().enumerate().collect();
+        // Each job takes the next item when it is done with one: items take unequal times.
+        let next = AtomicUsize::new(0);
+        let done: Vec<Mutex<Option<Done<R>>>> = items.iter().map(|_| Mutex::default()).collect();
+        let job = || {
+            loop {
+                let n = next.fetch_add(1, Ordering::Relaxed);
+                let Some(item) = items.get(n) else { return };
+                let own = self.beside();
+                let result = self.check().and_then(|()| work(&own, item));
+                *done[n].lock().unwrap_or_else(PoisonError::into_inner) = Some((result, own.reports()));
+            }
+        };
+        self.in_pool(|| (0..most.min(items.len())).into_par_iter().with_max_len(1).for_each(|_| job()));
         let mut results = Vec::with_capacity(items.len());
-        for chunk in numbered.chunks(most) {
-            self.check()?;
-            let done = self.in_pool(|| {
-                let each = chunk.par_iter().with_max_len(1).map(|&(n, item)| {
-                    let own = self.beside();
-                    let result = work(&own, item);
-                    *reports[n].lock().unwrap_or_else(PoisonError::into_inner) = own.reports();
-                    result
-                });
-                each.collect::<Vec<Result<R>>>()
-            });
-            results.extend(done);
-        }
-        for own in reports {
-            self.take_reports(own.into_inner().unwrap_or_else(PoisonError::into_inner));
+        for (result, reports) in done.into_iter().filter_map(|d| d.into_inner().unwrap_or_else(PoisonError::into_inner))
+        {
+            self.take_reports(reports);
+            results.push(result);
         }
         results.into_iter().collect()
     }

@@ -8,7 +8,7 @@ use strandline::kernel::level_set::scheme::{SCHEME_LEN, scheme_place};
 use strandline::kernel::level_set::{CELL, CELL_LEN};
 
 use crate::common::lab::PlainGrid;
-use crate::common::plain_scheme::{PlainVelocity, coefficients, gradient_norms, mean_norm};
+use crate::common::plain_scheme::{PlainVelocity, coefficients, gradient_norms, mean_norm, speed_coefficients};
 use crate::common::random::Random;
 
 const GROWN: usize = CELL + 2;
@@ -99,22 +99,38 @@ impl Scene {
         gradient_norms(value, spacing)
     }
 
-    fn assembled(&self, velocity: &PlainVelocity) -> Scheme {
+    /// The scheme with `g` as the edge detector, or as a speed.
+    fn assembled(&self, velocity: &PlainVelocity, speed: bool) -> Scheme {
         let [u, d, g] = [0, 1, 2].map(|f| self.grown(f));
         let fields = Fields { u: &u, d: &d, g: if velocity.rho == 0.0 { &[] } else { &g } };
         let mut values = vec![0.0; SCHEME_LEN];
         let mask = self.mask();
-        let gradient_sum = assemble(fields, &mask, self.spacing, &single(velocity), &mut Planes::new(), &mut values);
+        let velocity = Velocity { speed, ..single(velocity) };
+        let gradient_sum = assemble(fields, &mask, self.spacing, &velocity, &mut Planes::new(), &mut values);
         Scheme { values, gradient_sum }
     }
 
     /// Compares weights, old values and the sum of gradient norms with the printed scheme, relative to `tolerance`.
     fn check(&self, velocity: &PlainVelocity, tolerance: f64) {
-        let out = self.assembled(velocity);
+        self.check_scheme(velocity, false, tolerance);
+    }
+
+    fn check_scheme(&self, velocity: &PlainVelocity, speed: bool, tolerance: f64) {
+        let out = self.assembled(velocity, speed);
         let mut sum = 0.0;
         for (v, at) in self.cell().filter(|(v, _)| self.solved[self.grid.at(*v)] == 1) {
             let norms = self.norms(0, v, self.spacing);
-            let a = coefficients(&norms, self.difference(1, v), self.difference(2, v), self.spacing, velocity);
+            let mut a = if speed {
+                let still = PlainVelocity { rho: 0.0, ..*velocity };
+                coefficients(&norms, self.difference(1, v), [0.0; 6], self.spacing, &still)
+            } else {
+                coefficients(&norms, self.difference(1, v), self.difference(2, v), self.spacing, velocity)
+            };
+            if speed {
+                let here = velocity.rho * self.fields[2][self.grid.at(v)];
+                let more = speed_coefficients(&norms, self.difference(0, v), here, self.spacing, velocity);
+                (0..6).for_each(|q| a[q] += more[q]);
+            }
             // Neumann: beyond the border lies u_p itself, so the term a_pq (u_q - u_p) is 0.
             let inside = PlainGrid::around(v).map(|q| self.grid.contains(q));
             let diagonal = 1.0 - (0..6).filter(|&q| inside[q]).map(|q| a[q]).sum::<f64>();
@@ -193,10 +209,26 @@ fn rough_fields_are_assembled_as_printed() {
     }
 }
 
+/// `F |grad u|` alone and with the other terms; F of both signs.
+#[test]
+fn a_speed_is_assembled_upwind() {
+    for (seed, (shape, lo)) in PLACES.into_iter().enumerate() {
+        for spacing in [ISOTROPIC, MICROSCOPE] {
+            let mut scene = Scene::rough(shape, lo, spacing, 40 + seed as u64);
+            scene.fields[2].iter_mut().for_each(|f| *f -= 0.5);
+            let tau = 0.25 * spacing[0];
+            let alone = PlainVelocity { theta: 0.0, rho: 1.0, delta: 0.0, epsilon: 0.01, tau, normalised: true };
+            for velocity in [alone, PlainVelocity { theta: 0.6, rho: 0.8, delta: 0.05, ..alone }] {
+                scene.check_scheme(&velocity, true, 2e-5);
+            }
+        }
+    }
+}
+
 #[test]
 fn voxels_that_are_held_keep_their_value() {
     let scene = Scene::rough([30, 20, 18], [16, 0, 0], MICROSCOPE, 77);
-    let out = scene.assembled(&velocities(0.3)[5]);
+    let out = scene.assembled(&velocities(0.3)[5], false);
     let mask = scene.mask();
     let mut held = 0;
     for (v, at) in scene.cell().filter(|(_, at)| mask.solved[*at] == 0) {

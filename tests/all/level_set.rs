@@ -123,6 +123,34 @@ fn a_sphere_shrinks_by_its_curvature() {
     }
 }
 
+/// A ball grows and shrinks at the speed that it is given, `dr/dt = F`, the more exactly the finer the grid, and rests
+/// where F is none.
+#[test]
+fn a_sphere_moves_at_its_speed() {
+    let lab = Lab::new(2);
+    let radius_after = |finer: i64, steps: u32, speed: &dyn Fn(f64) -> f64| {
+        let shape = [42, 36, 28].map(|n| n * finer);
+        let geometry = centred(shape, [0.06, 0.07, 0.09].map(|h| h / finer as f64));
+        let (u, grid) = (cone(&geometry, 0.6), PlainGrid { shape });
+        let length = |v| geometry.position(v).iter().map(|x| x * x).sum::<f64>().sqrt();
+        let speeds: Vec<f32> = grid.voxels().map(|v| speed(length(v)) as f32).collect();
+        let mut band = lab.band(geometry.shape, &u, &vec![0.0; u.len()], &vec![1; u.len()]);
+        let field = lab.field(&dense(geometry.shape, CELL as i64), &speeds);
+        let mut run = TimeLoop { stop: Stop::L2(0.0), max_steps: steps, ..settings(0.02, 0.0, 0.0) };
+        run.velocity = Velocity { rho: 1.0, speed: true, epsilon: 1e-3, ..run.velocity };
+        let stage = lab.engine.stage("sphere", 0);
+        evolve(&stage, &lab.engine, &mut band, Some(&field), geometry.spacing, &run).unwrap();
+        (0.75 / PI * surface(&geometry, &whole(&band.u)).1.volume).cbrt()
+    };
+    let time = 40.0 * 0.005;
+    for speed in [1.0, -1.0, 0.5] {
+        let off = [1, 2].map(|finer| (radius_after(finer, 40, &|_| speed) - 0.6 - speed * time).abs());
+        assert!(off[0] < 0.15 * time && off[1] < 0.7 * off[0], "{speed}: {off:?}");
+    }
+    let rested = radius_after(2, 400, &|r| 2.0 * (0.75 - r));
+    assert!((rested - 0.75).abs() < 0.01, "{rested}");
+}
+
 /// The surface moves towards the points at unit speed: the front of `theta = 1` alone comes to rest on them.
 #[test]
 fn the_front_rests_where_the_distance_is_zero() {

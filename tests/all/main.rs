@@ -32,6 +32,7 @@ mod wavefront;
 
 mod cli;
 mod layering;
+mod outlines;
 #[cfg(target_os = "linux")]
 mod signals;
 mod tiff_derived;

@@ -97,3 +97,21 @@ pub(crate) fn coefficients(
         (v.tau / m) * (v_pq.min(0.0) - v.delta * m_p * (area / 4.0) / h * sum)
     })
 }
+
+/// What a speed F outwards adds to `a_pq`: `F |grad u|` is `F (grad u / |grad u|) . grad u`, upwind; `u` are the
+/// differences to the six neighbours.
+#[inline]
+pub(crate) fn speed_coefficients(
+    norms: &[f64; 24],
+    u: [f64; 6],
+    speed: f64,
+    spacing: [f64; 3],
+    v: &PlainVelocity,
+) -> [f64; 6] {
+    const FIRST: [usize; 6] = [20, 16, 12, 8, 0, 4];
+    std::array::from_fn(|q| {
+        let tetrahedra = &norms[FIRST[q]..FIRST[q] + 4];
+        let inverse = tetrahedra.iter().map(|g| 1.0 / (v.epsilon * v.epsilon + g * g).sqrt()).sum::<f64>() / 4.0;
+        -v.tau / spacing[q / 2].powi(2) * (speed * u[q]).max(0.0) * inverse
+    })
+}

@@ -108,7 +108,7 @@ mod tests {
             }
         }));
         assert_eq!((step.inside(), step.outside(), step.here()), (1.0, 0.0, 0.5));
-        assert_eq!(step.fall(), 0.5);
+        assert_eq!(step.fall(0.0), 0.5);
         let wall = Profile(std::array::from_fn(|n| (-(at(n) - 1.3).powi(2)).exp() as f32));
         assert!((wall.crest(1.0) - 1.3).abs() < 0.05, "{}", wall.crest(1.0));
         let gap = Profile(wall.0.map(|v| -v));

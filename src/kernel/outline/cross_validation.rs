@@ -7,6 +7,9 @@ use crate::kernel::vector::{dot, sub};
 /// A shape without a section is fitted to so many of those nearest to it.
 const NEAREST: usize = 6;
 
+/// It goes through so many samples, about: in the large it is the same with fewer.
+const SAMPLES: usize = 200;
+
 /// A mark of a section that was left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOut {
@@ -31,7 +34,7 @@ pub fn leave_out(sections: &[&Section], n: usize, least: f64) -> Option<Vec<Held
     others.truncate(NEAREST);
     others.sort_by_key(|(_, m)| *m);
     let others: Vec<&Section> = others.into_iter().map(|(_, m)| sections[m]).collect();
-    let fitted = Fitted::new(&others, least)?;
+    let fitted = Fitted::new(&others, SAMPLES, least)?;
     let held = |&mark: &[f64; 3]| {
         let (off, normal) = fitted.distance(mark);
         let away = others.iter().map(|other| nearest(&other.marks, mark).min(other.plane.height(mark).abs()));

@@ -19,9 +19,12 @@ const SMOOTHING: f64 = 50.0;
 /// For small objects as much of their own size.
 const SMOOTHING_OF_SIZE: f64 = 0.05;
 /// Samples of a function at most: what solving for them takes grows with the third power.
-const MOST_SAMPLES: usize = 600;
+pub const MOST_SAMPLES: usize = 340;
 /// Points along an outline, at least and at most, where there is room.
-const ALONG: [usize; 2] = [6, 20];
+const ALONG: [usize; 2] = [6, 16];
+/// Sections nearer to each other than this part of their radius need not all be fitted: what is left to those between is
+/// their own.
+const APART: f64 = 0.25;
 /// Gradient norms that a function is divided by.
 const NORMS: [f64; 2] = [0.4, 2.5];
 
@@ -35,22 +38,25 @@ pub struct Fitted {
 /// Sections that are to be fitted, window by window, in any order.
 #[derive(Clone, Debug)]
 pub struct Fit<'a> {
-    sections: &'a [&'a Section],
+    sections: Vec<&'a Section>,
     ends: Option<Ends>,
     windows: Vec<Window>,
+    most: usize,
     least: f64,
     smoothing: f64,
 }
 
 impl<'a> Fit<'a> {
     /// Of sections in order of their offsets, of one direction or several; points beside outlines lie `least` away at
-    /// the least.
+    /// the least, and a function goes through `most` samples about.
     #[must_use]
-    pub fn new(sections: &'a [&'a Section], least: f64) -> Self {
+    pub fn new(sections: &[&'a Section], most: usize, least: f64) -> Self {
         let radius = sections.iter().map(|section| section.radius()).sum::<f64>() / sections.len().max(1) as f64;
         let smoothing = (SMOOTHING * (least / LEAST_BESIDE).powi(3)).min(SMOOTHING_OF_SIZE * radius.powi(3));
         let ends = Ends::of(sections);
-        Self { sections, ends, windows: split(sections, ends), least, smoothing }
+        let sections = if ends.is_some() { thinned(sections, APART * radius) } else { sections.to_vec() };
+        let windows = split(&sections, ends, most);
+        Self { sections, ends, windows, most, least, smoothing }
     }
 
     /// The windows.
@@ -65,7 +71,26 @@ impl<'a> Fit<'a> {
         let [low, high] = self.ends.map_or([None; 2], |ends| ends.round());
         let at = [window.sections.start == 0, window.sections.end == self.sections.len()];
         let ends = [low.filter(|_| at[0]), high.filter(|_| at[1])];
-        fit(&self.sections[window.sections.clone()], ends, self.least, self.smoothing)
+        self.through(&self.sections[window.sections.clone()], ends)
+    }
+
+    /// The function through the samples of sections that is positive so far beyond the first and last of them, where they
+    /// have round ends.
+    fn through(&self, sections: &[&Section], [low, high]: [Option<f64>; 2]) -> Option<RadialBasis> {
+        let mut samples = sampled(sections, self.most, self.least);
+        let through = |samples: &Samples| RadialBasis::through(&samples.points, &samples.values, self.smoothing);
+        if low.or(high).is_some() {
+            // Fewer samples tell whether the shape would go on; a single plane tells nothing of what is beside it.
+            let open = (sections.len() > 1).then(|| through(&sampled(sections, self.most / 3, self.least))).flatten();
+            let is_open = |place: [f64; 3]| open.as_ref().is_none_or(|function| function.value(place).0 < 0.0);
+            if let (Some(height), Some(first)) = (low, sections.first()) {
+                samples.add_end(first, -height, is_open);
+            }
+            if let (Some(height), Some(last)) = (high, sections.last()) {
+                samples.add_end(last, height, is_open);
+            }
+        }
+        through(&samples)
     }
 
     /// Takes the functions of all windows, in order; none where any is none.
@@ -79,8 +104,8 @@ impl<'a> Fit<'a> {
 impl Fitted {
     /// Fits sections at once.
     #[must_use]
-    pub fn new(sections: &[&Section], least: f64) -> Option<Self> {
-        let fit = Fit::new(sections, least);
+    pub fn new(sections: &[&Section], most: usize, least: f64) -> Option<Self> {
+        let fit = Fit::new(sections, most, least);
         let functions = fit.windows().iter().map(|window| fit.solve(window)).collect();
         fit.join(functions)
     }
@@ -114,47 +139,42 @@ impl Fitted {
     }
 }
 
+/// The first and last of sections, and those between that are no nearer to each other than `apart`.
+fn thinned<'a>(sections: &[&'a Section], apart: f64) -> Vec<&'a Section> {
+    let mut kept: Vec<&Section> = Vec::new();
+    for (n, section) in sections.iter().enumerate() {
+        let away = kept.last().map_or(f64::INFINITY, |before| section.plane.offset - before.plane.offset);
+        if away >= apart || n + 1 == sections.len() {
+            kept.push(section);
+        }
+    }
+    kept
+}
+
 fn curves(sections: &[&Section]) -> usize {
     sections.iter().map(|section| section.curves.len()).sum()
 }
 
 /// Windows of as many sections as a function has room for; one where sections have several directions.
-fn split(sections: &[&Section], ends: Option<Ends>) -> Vec<Window> {
+fn split(sections: &[&Section], ends: Option<Ends>, most: usize) -> Vec<Window> {
     let offsets: Vec<f64> = sections.iter().map(|section| section.plane.offset).collect();
     let each = 3 * ALONG[1] * curves(sections).div_ceil(sections.len().max(1));
-    windows(&offsets, if ends.is_some() { MOST_SAMPLES / each } else { usize::MAX })
+    windows(&offsets, if ends.is_some() { most / each } else { usize::MAX })
 }
 
-fn sampled(sections: &[&Section], least: f64) -> Samples {
+/// About `most` samples of sections.
+fn sampled(sections: &[&Section], most: usize, least: f64) -> Samples {
     // Of many sections every n-th and the last.
-    let every = (3 * ALONG[0] * curves(sections)).div_ceil(MOST_SAMPLES).max(1);
+    let every = (3 * ALONG[0] * curves(sections)).div_ceil(most).max(1);
     let last = sections.len().saturating_sub(1);
     let kept = sections.iter().enumerate().filter(|(n, _)| n % every == 0 || *n == last).map(|(_, s)| *s);
     let kept: Vec<&Section> = kept.collect();
-    let count = (MOST_SAMPLES / (3 * curves(&kept)).max(1)).clamp(ALONG[0], ALONG[1]);
+    let count = (most / (3 * curves(&kept)).max(1)).clamp(ALONG[0], ALONG[1]);
     let mut samples = Samples::default();
     for section in &kept {
         samples.add_section(section, count, least);
     }
     samples
-}
-
-/// The function through the samples of sections that is positive so far beyond the first and last of them, where they
-/// have round ends.
-fn fit(sections: &[&Section], [low, high]: [Option<f64>; 2], least: f64, smoothing: f64) -> Option<RadialBasis> {
-    let mut samples = sampled(sections, least);
-    let through = |samples: &Samples| RadialBasis::through(&samples.points, &samples.values, smoothing);
-    // A single plane tells nothing of what is beside it.
-    let open = (sections.len() > 1).then(|| through(&samples)).flatten();
-    let before = samples.points.len();
-    let is_open = |place: [f64; 3]| open.as_ref().is_none_or(|function| function.value(place).0 < 0.0);
-    if let (Some(height), Some(first)) = (low, sections.first()) {
-        samples.add_end(first, -height, is_open);
-    }
-    if let (Some(height), Some(last)) = (high, sections.last()) {
-        samples.add_end(last, height, is_open);
-    }
-    if samples.points.len() == before { open } else { through(&samples) }
 }
 
 #[cfg(test)]
@@ -179,7 +199,7 @@ mod tests {
     fn a_few_sections_of_a_ball_make_the_ball() {
         let heights = [-7.0, 0.0, 7.0];
         let sections: Vec<Section> = heights.iter().map(|&h: &f64| section(h, (100.0 - h * h).sqrt())).collect();
-        let fitted = Fitted::new(&sections.iter().collect::<Vec<_>>(), 0.75).unwrap();
+        let fitted = Fitted::new(&sections.iter().collect::<Vec<_>>(), MOST_SAMPLES, 0.75).unwrap();
         for n in 0..200 {
             let (t, z) = (f64::from(n) * 2.4, f64::from(n) / 100.0 - 0.995);
             let across = (1.0f64 - z * z).sqrt();
@@ -194,7 +214,7 @@ mod tests {
     fn a_single_section_however_small_is_a_body() {
         for radius in [1.5, 2.5, 12.0, 300.0] {
             let alone = section(4.0, radius);
-            let fitted = Fitted::new(&[&alone], 0.75).unwrap();
+            let fitted = Fitted::new(&[&alone], MOST_SAMPLES, 0.75).unwrap();
             assert!(
                 fitted.distance([0.0, 0.0, 4.0]).0 < -0.3 * radius,
                 "{radius}: {:?}",

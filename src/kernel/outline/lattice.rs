@@ -11,11 +11,13 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice for a box of voxels with about `most` nodes, not yet filled.
+    /// The lattice for a box of voxels with about `most` nodes, two smallest spacings apart at least, not yet filled.
     #[must_use]
     pub fn for_box(shape: [i64; 3], spacing: [f64; 3], most: f64) -> Self {
         let extents: [f64; 3] = std::array::from_fn(|a| shape[a] as f64 * spacing[a]);
-        let length = (extents.iter().product::<f64>() / most).cbrt();
+        let length = (extents.iter().product::<f64>() / most)
+            .cbrt()
+            .max(2.0 * spacing.into_iter().fold(f64::INFINITY, f64::min));
         let step = spacing.map(|h| ((length / h).ceil() as i64).max(1));
         let counts = std::array::from_fn(|a| ((shape[a] - 1) / step[a]) as usize + 4);
         Self { step, counts, values: Vec::new() }

@@ -1,8 +1,8 @@
 //! What an object covers in one plane: closed polygons, filled by the even-odd rule, and the signed distance to their
 //! border, negative inside. An outline inside another is a hole, one beside another a branch.
 //!
-//! Edges lie in square buckets, so that a query looks at a few of them: those near the point for its distance, those of
-//! its row for its side.
+//! Square buckets know the edges that can be nearest to their points, told level by level from those of the square that
+//! was divided into them; rows of buckets know the edges that cross them, which tell a point's side.
 
 use super::curve::{Curve, area};
 use super::plane::Plane;
@@ -19,19 +19,25 @@ pub struct Section {
     buckets: Buckets,
 }
 
-/// Edges by square; `[first, second]` ends of each.
+/// Edges by place; `[first, second]` ends of each.
 #[derive(Clone, Debug)]
 struct Buckets {
     edges: Vec<[[f64; 2]; 2]>,
+    /// The lowest corner of the square that is divided, and the side of a bucket of it.
     low: [f64; 2],
     size: f64,
-    counts: [usize; 2],
-    squares: Vec<Vec<u32>>,
+    /// Buckets along a side.
+    side: usize,
+    /// By bucket where the edges that can be nearest to a point of it start in `nearest`.
+    starts: Vec<u32>,
+    nearest: Vec<u32>,
+    /// By row of buckets the edges that cross it.
     rows: Vec<Vec<u32>>,
 }
 
-/// Buckets along the longer side.
-const MOST_BUCKETS: f64 = 64.0;
+/// Edges for each bucket along a side, about, and the most of these, a power of two.
+const EDGES_ALONG: usize = 8;
+const MOST_ALONG: usize = 32;
 
 impl Section {
     /// The section that curves bound, which go through marks.
@@ -102,91 +108,104 @@ fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> [[f64; 2]; 2] {
 
 impl Buckets {
     fn new(curves: &[Curve]) -> Self {
+        let edges_of = |curve: &Curve| -> Vec<[[f64; 2]; 2]> {
+            let next = curve.points.iter().cycle().skip(1);
+            curve.points.iter().zip(next).map(|(&from, &to)| [from, to]).collect()
+        };
+        let edges: Vec<[[f64; 2]; 2]> = curves.iter().flat_map(edges_of).collect();
         let [low, high] = bounds(curves.iter().flat_map(|curve| &curve.points));
         let longest = (high[0] - low[0]).max(high[1] - low[1]).max(f64::MIN_POSITIVE);
-        let size = longest / MOST_BUCKETS;
-        let counts = [0, 1].map(|a| ((high[a] - low[a]) / size) as usize + 1);
-        let mut buckets = Self {
-            edges: Vec::new(),
-            low,
-            size,
-            counts,
-            squares: vec![Vec::new(); counts[0] * counts[1]],
-            rows: vec![Vec::new(); counts[1]],
-        };
-        for curve in curves {
-            for (n, &from) in curve.points.iter().enumerate() {
-                buckets.add([from, curve.points[(n + 1) % curve.points.len()]]);
-            }
+        // Twice as long as the outlines: most of what is asked for lies beside them.
+        let whole = Square { centre: [0, 1].map(|a| 0.5 * (low[a] + high[a])), half: longest };
+        let side = (edges.len() / EDGES_ALONG).clamp(1, MOST_ALONG).next_power_of_two();
+        let size = 2.0 * whole.half / side as f64;
+        let low = whole.centre.map(|c| c - whole.half);
+        let mut buckets =
+            Self { edges, low, size, side, starts: Vec::new(), nearest: Vec::new(), rows: vec![Vec::new(); side] };
+        buckets.divide(whole);
+        for (number, edge) in buckets.edges.iter().enumerate() {
+            let rows = [edge[0], edge[1]].map(|end| buckets.row(end[1]));
+            (rows[0].min(rows[1])..=rows[0].max(rows[1])).for_each(|row| buckets.rows[row].push(number as u32));
         }
         buckets
     }
 
-    fn add(&mut self, edge: [[f64; 2]; 2]) {
-        let number = self.edges.len() as u32;
-        let first = self.bucket([edge[0][0].min(edge[1][0]), edge[0][1].min(edge[1][1])]);
-        let last = self.bucket([edge[0][0].max(edge[1][0]), edge[0][1].max(edge[1][1])]);
-        for j in first[1]..=last[1] {
-            self.rows[j].push(number);
-            for i in first[0]..=last[0] {
-                self.squares[j * self.counts[0] + i].push(number);
-            }
-        }
-        self.edges.push(edge);
-    }
-
-    /// The bucket of a point, or the one nearest to it.
-    fn bucket(&self, point: [f64; 2]) -> [usize; 2] {
-        [0, 1].map(|a| (((point[a] - self.low[a]) / self.size).max(0.0) as usize).min(self.counts[a] - 1))
-    }
-
-    /// The distance to the nearest edge, or `limit`: rings of buckets until none that is left can hold a nearer one.
-    fn distance(&self, point: [f64; 2], limit: f64) -> f64 {
-        let [i, j] = self.bucket(point);
-        let centre = [i, j].map(|n| n as i64);
-        // How far the point lies outside of its bucket's square, at most.
-        let beyond = (0..2).map(|a| {
-            let low = self.low[a] + centre[a] as f64 * self.size;
-            (low - point[a]).max(point[a] - low - self.size).max(0.0)
-        });
-        let beyond = beyond.fold(0.0, f64::max);
-        let mut nearest = limit * limit;
-        for ring in 0..=self.counts[0].max(self.counts[1]) as i64 {
-            if nearest <= ((ring - 1) as f64 * self.size - beyond).max(0.0).powi(2) && ring > 0 {
-                break;
-            }
-            for square in self.ring(centre, ring) {
-                for &edge in square {
-                    nearest = nearest.min(distance_squared(self.edges[edge as usize], point));
+    /// Finds the edges that can be nearest to points of each bucket.
+    fn divide(&mut self, whole: Square) {
+        let mut squares = vec![(whole, (0..self.edges.len() as u32).collect::<Vec<u32>>())];
+        let mut side = 1;
+        while side < self.side {
+            let mut divided = Vec::with_capacity(4 * squares.len());
+            for j in 0..2 * side {
+                for i in 0..2 * side {
+                    let (of, edges) = &squares[j / 2 * side + i / 2];
+                    let part = of.part([i % 2, j % 2]);
+                    divided.push((part, part.nearest(&self.edges, edges)));
                 }
             }
+            (squares, side) = (divided, 2 * side);
         }
-        nearest.sqrt().min(limit)
+        self.starts = Vec::with_capacity(squares.len() + 1);
+        for (_, edges) in squares {
+            self.starts.push(self.nearest.len() as u32);
+            self.nearest.extend(edges);
+        }
+        self.starts.push(self.nearest.len() as u32);
     }
 
-    /// The buckets of a square ring.
-    fn ring(&self, [i, j]: [i64; 2], ring: i64) -> impl Iterator<Item = &Vec<u32>> {
-        let counts = self.counts.map(|n| n as i64);
-        let rows = (j - ring).max(0)..=(j + ring).min(counts[1] - 1);
-        rows.flat_map(move |row| {
-            let step = if (row - j).abs() == ring || ring == 0 { 1 } else { 2 * ring };
-            (i - ring..=i + ring)
-                .step_by(step as usize)
-                .filter(move |n| (0..counts[0]).contains(n))
-                .map(move |n| (n, row))
-        })
-        .map(move |(n, row)| &self.squares[(row * counts[0] + n) as usize])
+    fn row(&self, y: f64) -> usize {
+        (((y - self.low[1]) / self.size).max(0.0) as usize).min(self.side - 1)
+    }
+
+    /// The distance to the nearest edge, or `limit`.
+    fn distance(&self, point: [f64; 2], limit: f64) -> f64 {
+        let [i, j] = [0, 1].map(|a| ((point[a] - self.low[a]) / self.size).floor());
+        let inside = 0.0..self.side as f64;
+        let squared = if inside.contains(&i) && inside.contains(&j) {
+            let bucket = j as usize * self.side + i as usize;
+            let near = &self.nearest[self.starts[bucket] as usize..self.starts[bucket + 1] as usize];
+            let squares = near.iter().map(|&edge| distance_squared(self.edges[edge as usize], point));
+            squares.fold(f64::INFINITY, f64::min)
+        } else {
+            self.edges.iter().map(|&edge| distance_squared(edge, point)).fold(f64::INFINITY, f64::min)
+        };
+        squared.sqrt().min(limit)
     }
 
     fn holds(&self, point: [f64; 2]) -> bool {
-        let [_, j] = self.bucket(point);
-        let row = &self.rows[j];
+        let row = &self.rows[self.row(point[1])];
         let crossings = row.iter().filter(|&&edge| {
             let [a, b] = self.edges[edge as usize];
             (a[1] <= point[1]) != (b[1] <= point[1])
                 && a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > point[0]
         });
         crossings.count() % 2 == 1
+    }
+}
+
+/// A square of the plane.
+#[derive(Clone, Copy)]
+struct Square {
+    centre: [f64; 2],
+    half: f64,
+}
+
+impl Square {
+    fn part(&self, corner: [usize; 2]) -> Self {
+        let half = 0.5 * self.half;
+        let centre = std::array::from_fn(|a| self.centre[a] + if corner[a] == 1 { half } else { -half });
+        Self { centre, half }
+    }
+
+    /// Those of the edges that can be nearest to a point of the square: a point is no farther from its nearest edge than
+    /// the centre from its own, and what lies between both.
+    fn nearest(&self, edges: &[[[f64; 2]; 2]], among: &[u32]) -> Vec<u32> {
+        let away: Vec<f64> =
+            among.iter().map(|&edge| distance_squared(edges[edge as usize], self.centre).sqrt()).collect();
+        let least = away.iter().copied().fold(f64::INFINITY, f64::min);
+        // Twice half the diagonal, and a little for rounding.
+        let most = least + 2.0 * self.half * std::f64::consts::SQRT_2 * (1.0 + 1e-9);
+        among.iter().zip(away).filter(|(_, away)| *away <= most).map(|(&edge, _)| edge).collect()
     }
 }
 

@@ -14,7 +14,7 @@ pub struct Window {
 }
 
 /// Sections that neighbouring windows share: over those one fades into the other.
-const SHARED: usize = 3;
+const SHARED: usize = 2;
 
 /// Windows of at most `most` sections (but two more than are shared, at least) with these offsets, in order.
 #[must_use]
@@ -58,7 +58,7 @@ mod tests {
             let offsets: Vec<f64> = (0..count).map(|n| 1.5 * f64::from(n) + 0.01 * f64::from(n * n)).collect();
             let found = windows(&offsets, most);
             assert!((0..offsets.len()).all(|n| found.iter().any(|w| w.sections.contains(&n))), "{count} {most}");
-            assert!(found.iter().all(|w| w.sections.len() <= most.max(5)));
+            assert!(found.iter().all(|w| w.sections.len() <= most.max(4)));
             for n in -5..200 {
                 let at = f64::from(n) * 0.83;
                 let weights: Vec<f64> = found.iter().map(|w| w.weight(at)).collect();

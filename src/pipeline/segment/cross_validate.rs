@@ -7,8 +7,8 @@ use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::Geometry;
 use crate::kernel::outline::cross_validation::leave_out;
-use crate::kernel::outline::section::Section;
 use crate::kernel::outline::fitted::LEAST_BESIDE;
+use crate::kernel::outline::section::Section;
 
 /// Leaves out each section of an object; none where fewer than three tell no shape without one.
 pub(super) fn cross_validate(engine: &Engine, object: &Outlined, image: &Geometry) -> Result<Option<CrossValidation>> {

@@ -4,7 +4,7 @@ use super::cross_validate::cross_validate;
 use super::object::{ObjectReport, Picture, Solution, solve};
 use super::outlines::scatter_of;
 use super::settings::{ImageModel, SegmentSettings, Start};
-use super::survey::{Outlined, Trust, trust};
+use super::survey::{Looking, Outlined, Trust, trust};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
 use crate::grid::Geometry;
@@ -116,8 +116,9 @@ fn survey<T: Element>(
 ) -> Result<Surveyed> {
     let scatter = scatter_of(objects, picture.geometry);
     let looks = settings.uses_image() && settings.image != ImageModel::Edge;
+    let by = Looking { scatter, looks, objects: objects.len() };
     let outlined = engine.side_by_side(objects, most, |engine, marks| match settings.start {
-        Start::Auto if marks.seed.is_none() => Outlined::new(engine, picture, marks, scatter, looks),
+        Start::Auto if marks.seed.is_none() => Outlined::new(engine, picture, marks, by),
         _ => Ok(None),
     })?;
     let trusts = trust(&outlined, picture.geometry, scatter, settings.image);
@@ -178,17 +179,24 @@ const MOST_OFF: f64 = 4.0;
 /// Refuses a surface that is not that of the marks.
 fn check_surface(marks: &ObjectMarks, geometry: &Geometry, hausdorff: Option<Hausdorff>) -> Result<()> {
     let object = marks.object;
-    let wrong = |what: String| {
-        Error::input(format!(
-            "object {object}: {what}; leave out --beta, --theta and --rho where they were given, or mark more outlines"
-        ))
-    };
     match hausdorff {
-        None if marks.seed.is_none() => Err(wrong("its surface vanished".into())),
-        Some(found) if found.mean > MOST_OFF * geometry.max_spacing() => {
-            let off = found.mean;
-            Err(wrong(format!("its marks lie {off:.3} from the surface that was found, in the mean")))
+        None if marks.seed.is_none() => {
+            let points = marks.contours.concat();
+            let bound = |a: usize, of: fn(f64, f64) -> f64| points.iter().map(|p| p[a]).reduce(of).unwrap_or(0.0);
+            let [low, high] = [f64::min, f64::max].map(|of| [0, 1, 2].map(|a| bound(a, of)));
+            let [x, y, z] = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
+            let [width, height, depth] = [0, 1, 2].map(|a| high[a] - low[a]);
+            let [h, k, l] = geometry.spacing;
+            Err(Error::input(format!(
+                "object {object} encloses nothing: its marks around ({x:.6}, {y:.6}, {z:.6}) span {width:.3} x {height:.3} \
+                 x {depth:.3}, where voxels are {h} x {k} x {l}; mark its border all around, on every few slices"
+            )))
         }
+        Some(found) if found.mean > MOST_OFF * geometry.max_spacing() => Err(Error::input(format!(
+            "object {object}: its marks lie {:.3} from the surface that was found, in the mean; leave out --beta, --theta \
+             and --rho where they were given, or mark more outlines",
+            found.mean
+        ))),
         _ => Ok(()),
     }
 }

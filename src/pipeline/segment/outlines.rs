@@ -1,6 +1,8 @@
 //! Marks become outlines: contours that lie in a plane and run around something, as smooth curves, by the planes that
 //! they were drawn in.
 
+use std::cmp::Ordering;
+
 use crate::grid::Geometry;
 use crate::kernel::outline::crossing::crosses_itself;
 use crate::kernel::outline::curve::{Curve, Scatter};
@@ -53,11 +55,19 @@ pub(super) fn scatter_of(objects: &[ObjectMarks], image: &Geometry) -> Scatter {
 /// outlines.
 pub(super) fn drawn_by_plane<'a>(marks: &'a ObjectMarks, image: &Geometry) -> Option<Vec<Vec<Drawn<'a>>>> {
     let mut outlines = drawn(marks, image)?;
-    outlines.sort_by(|a, b| {
-        let key = |d: &Drawn| (d.plane.normal.map(|v| -v), d.plane.offset);
-        let ((a, at_a), (b, at_b)) = (key(a), key(b));
-        a.iter().zip(&b).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(at_a.total_cmp(&at_b))
+    // Planes of one direction differ in their last digits: they share the first one's.
+    let mut directions: Vec<Plane> = Vec::new();
+    for outline in &outlines {
+        if !directions.iter().any(|plane| plane.is_parallel_to(&outline.plane)) {
+            directions.push(outline.plane);
+        }
+    }
+    directions.sort_by(|a, b| {
+        let order = |axis: &usize| b.normal[*axis].total_cmp(&a.normal[*axis]);
+        [0, 1, 2].iter().map(order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
     });
+    let direction = |outline: &Drawn| directions.iter().position(|plane| plane.is_parallel_to(&outline.plane));
+    outlines.sort_by(|a, b| direction(a).cmp(&direction(b)).then(a.plane.offset.total_cmp(&b.plane.offset)));
     let same = SAME_PLANE * image.min_spacing();
     let mut groups: Vec<Vec<Drawn>> = Vec::new();
     for outline in outlines {

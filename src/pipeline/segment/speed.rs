@@ -8,11 +8,8 @@
 //! how far the image says that the border is away, outwards; U is how uncertain the shape is, the more the farther
 //! from the outlines and their planes (d) and beyond the last of them (e), V how uncertain the image. The surface rests where both agree, weighed by their variances.
 
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
-
 use super::shape_field::ShapeField;
-use super::survey::{FADE, MOST_OFF, Outlined, Sampled, Trust};
+use super::survey::{MOST_OFF, Outlined, Sampled, Trust, fade, weighted};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{Box3, Geometry};
@@ -22,9 +19,7 @@ use crate::kernel::outline::lattice::Lattice;
 use crate::store::{BoxSink, BoxSource, BrickArray};
 
 /// Nodes of the lattices of grey values, about.
-const NODES: f64 = 30_000.0;
-/// Samples that a node's grey value is made of.
-const NEAREST: usize = 8;
+const NODES: f64 = 4000.0;
 
 /// What the speed is made of.
 pub(super) struct Pulls<'a> {
@@ -59,7 +54,12 @@ pub(super) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
     stage.run(&one_wave(set), &Workers::new(Buffers::default), |buffers, &slot| {
         let part = set.grid().brick_box(set.id(slot));
         buffers.fill(&part, by, geometry, levels.as_ref())?;
-        let at = Places { shape: &buffers.shape, distance: &buffers.distance, planes: &buffers.planes, beyond: &buffers.beyond };
+        let at = Places {
+            shape: &buffers.shape,
+            distance: &buffers.distance,
+            planes: &buffers.planes,
+            beyond: &buffers.beyond,
+        };
         speeds(at, &buffers.offsets, &buffers.doubts, weights, &mut buffers.speed);
         field.write_box(&part, &buffers.speed)?;
         field.refresh_faces(slot);
@@ -138,8 +138,7 @@ fn levels(stage: &Stage<'_>, geometry: &Geometry, object: &Outlined, trust: &Tru
         let half = 0.5 * (s.profile.inside() + s.profile.outside());
         [if on_level { s.profile.at(shift) } else { half }, s.profile.fall(shift)]
     };
-    let samples = object.profiles.iter().map(|s| GeomWithData::new(s.point, value(s)));
-    let tree = RTree::bulk_load(samples.collect());
+    let samples: Vec<([f64; 3], [f64; 2])> = object.profiles.iter().map(|s| (s.point, value(s))).collect();
     let count = object.profiles.len().max(1) as f64;
     // Beside a border that the marks miss the fall at the marks is none.
     let mean_fall = if on_level {
@@ -147,18 +146,10 @@ fn levels(stage: &Stage<'_>, geometry: &Geometry, object: &Outlined, trust: &Tru
     } else {
         0.25 * trust.reading.contrast
     };
-    let fade = 2.0 * (FADE * geometry.min_spacing()).powi(2);
+    let fade = fade(trust.outlines, geometry.min_spacing());
     let at = |point: [f64; 3]| -> [f64; 2] {
-        let mut nearest = None;
-        let mut sums = [0.0; 3];
-        for (sample, square) in tree.nearest_neighbor_iter_with_distance_2(point).take(NEAREST) {
-            let first = *nearest.get_or_insert(square);
-            let weight = ((first - square) / fade).exp();
-            sums[0] += weight * sample.data[0];
-            sums[1] += weight * sample.data[1];
-            sums[2] += weight;
-        }
-        [sums[0] / sums[2], if on_level { sums[1] / sums[2] } else { mean_fall }]
+        let [level, fall] = weighted(&samples, point, fade).unwrap_or([0.0, mean_fall]);
+        [level, if on_level { fall } else { mean_fall }]
     };
     let mut lattices = [0, 1].map(|_| Lattice::for_box(geometry.shape, geometry.spacing, NODES));
     let planes: Vec<usize> = (0..lattices[0].planes()).collect();

@@ -11,8 +11,8 @@ use crate::kernel::image::border_model::{BorderModel, Reading, median};
 use crate::kernel::image::profiles::{LEN, Profile, REACH, STEP, interpolate};
 use crate::kernel::outline::cross_validation::{HeldOut, leave_out};
 use crate::kernel::outline::curve::Scatter;
+use crate::kernel::outline::fitted::{Fit, Fitted, LEAST_BESIDE, MOST_SAMPLES};
 use crate::kernel::outline::section::Section;
-use crate::kernel::outline::fitted::{Fit, Fitted, LEAST_BESIDE};
 use crate::kernel::vector::{dot, sub};
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::ObjectMarks;
@@ -25,8 +25,9 @@ const APART: f64 = 1.5;
 const MOST_PROFILES: usize = 3000;
 /// The image is smoothed by so many smallest spacings before profiles are taken.
 const SIGMA: f64 = 1.0;
-/// Sections of an object that are left out in turn, at most.
-const MOST_LEFT_OUT: usize = 8;
+/// Sections that are left out in turn, of all objects together about, and of one at least and at most.
+const LEFT_OUT: usize = 32;
+const LEFT_OUT_OF_ONE: [usize; 2] = [2, 8];
 /// With fewer profiles an object is read together with the others.
 const ENOUGH_PROFILES: usize = 36;
 /// How far a shape is off a smallest spacing from the outlines, of it, where nothing could be left out.
@@ -39,6 +40,17 @@ pub(super) struct Outlined {
     pub profiles: Vec<Sampled>,
     /// Marks of sections that were left out.
     pub held_out: Vec<HeldOut>,
+}
+
+/// How objects are looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Looking {
+    /// How marks scatter around their outlines.
+    pub scatter: Scatter,
+    /// Whether the image has a say.
+    pub looks: bool,
+    /// Objects of the run.
+    pub objects: usize,
 }
 
 /// A profile, and where it was taken.
@@ -56,6 +68,8 @@ pub(super) struct Trust {
     pub reading: Reading,
     /// Standard deviation of where the image shows the border.
     pub image: f64,
+    /// Standard deviation of the outlines.
+    pub outlines: f64,
     /// Standard deviation of the shape at an outline.
     pub shape: f64,
     /// How much that grows with the square of the distance from outlines.
@@ -68,25 +82,26 @@ impl Outlined {
         engine: &Engine,
         picture: &Picture<'_, T>,
         marks: &ObjectMarks,
-        scatter: Scatter,
-        looks: bool,
+        by: Looking,
     ) -> Result<Option<Self>> {
         let image = picture.geometry;
         let Some(groups) = outlines::drawn_by_plane(marks, image) else { return Ok(None) };
         let stage = engine.stage(&name("marks", marks), 0);
-        let sections = stage
-            .run(&groups, &Workers::none(), |(), group| Ok(outlines::section(group, scatter, image.min_spacing())))?;
+        let sections = stage.run(&groups, &Workers::none(), |(), group| {
+            Ok(outlines::section(group, by.scatter, image.min_spacing()))
+        })?;
         let all: Vec<&Section> = sections.iter().collect();
         let least = LEAST_BESIDE * image.min_spacing();
-        let fit = Fit::new(&all, least);
+        let fit = Fit::new(&all, MOST_SAMPLES, least);
         let functions = stage.run(fit.windows(), &Workers::none(), |(), window| Ok(fit.solve(window)))?;
-        let every = sections.len().div_ceil(MOST_LEFT_OUT);
+        let most = (LEFT_OUT / by.objects.max(1)).clamp(LEFT_OUT_OF_ONE[0], LEFT_OUT_OF_ONE[1]);
+        let every = sections.len().div_ceil(most);
         let left_out: Vec<usize> = (0..sections.len()).step_by(every).filter(|_| sections.len() > 2).collect();
         let held_out = stage.run(&left_out, &Workers::none(), |(), &n| Ok(leave_out(&all, n, least)))?;
         stage.finish();
         let Some(fitted) = fit.join(functions) else { return Ok(None) };
         let held_out = held_out.into_iter().flatten().flatten().collect();
-        let profiles = if looks { profiles(engine, picture, marks, &sections, &fitted)? } else { Vec::new() };
+        let profiles = if by.looks { profiles(engine, picture, marks, &sections, &fitted)? } else { Vec::new() };
         Ok(Some(Self { sections, fitted, profiles, held_out }))
     }
 
@@ -174,6 +189,7 @@ pub(super) fn trust(
         Trust {
             reading,
             image: image_deviation(&object.profiles, &reading, object.deviation(), h),
+            outlines: object.deviation() / h,
             shape: (object.deviation() / h).hypot(0.2).hypot(reading.bias),
             growth,
         }
@@ -217,7 +233,7 @@ fn image_deviation(profiles: &[Sampled], reading: &Reading, deviation: f64, h: f
             let fall = profiles.iter().map(|s| s.profile.fall(at)).sum::<f64>() / profiles.len().max(1) as f64;
             let every = profiles.len().div_ceil(ENOUGH_COMPARED);
             let off = profiles.iter().step_by(every.max(1)).filter_map(|s| {
-                let grey = grey_of_others(profiles, s, at, h)?;
+                let grey = grey_of_others(profiles, s, at, fade(deviation / h, h))?;
                 Some(((s.profile.at(at) - grey) / fall).clamp(-MOST_OFF, MOST_OFF).powi(2))
             });
             let (sum, count) = off.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1));
@@ -228,19 +244,42 @@ fn image_deviation(profiles: &[Sampled], reading: &Reading, deviation: f64, h: f
 
 /// The image moves the border by so many smallest spacings at most.
 pub(super) const MOST_OFF: f64 = 3.0;
-/// Grey values are carried over from the nearest outlines; others fade over so many smallest spacings more.
-pub(super) const FADE: f64 = 3.0;
+/// Grey values are carried over from the outlines, others than the nearest fading over so many smallest spacings more,
+/// and over as many times again as the outlines are unsure of theirs.
+const FADE: [f64; 2] = [6.0, 8.0];
 
-/// The grey value at a place beside the border that the outlines of other sections tell for a point.
-fn grey_of_others(profiles: &[Sampled], of: &Sampled, at: f64, h: f64) -> Option<f64> {
-    let square = |s: &Sampled| {
-        let by = sub(s.point, of.point);
+/// What the squares of distances are divided by for how unsure outlines are, in smallest spacings.
+pub(super) fn fade(outlines: f64, h: f64) -> f64 {
+    2.0 * ((FADE[0] + FADE[1] * outlines) * h).powi(2)
+}
+
+/// The mean of values at places near a point, the nearest counting most; none of none.
+pub(super) fn weighted<const N: usize>(
+    values: &[([f64; 3], [f64; N])],
+    point: [f64; 3],
+    fade: f64,
+) -> Option<[f64; N]> {
+    /// What counts less than e^-12 does not count.
+    const LEAST: f64 = 12.0;
+    let square = |place: [f64; 3]| {
+        let by = sub(place, point);
         dot(by, by)
     };
-    let others = || profiles.iter().filter(|s| s.section != of.section);
-    let nearest = others().map(square).fold(f64::INFINITY, f64::min);
-    let fade = 2.0 * (FADE * h).powi(2);
-    let weighted = others().map(|s| ((nearest - square(s)) / fade).exp()).zip(others().map(|s| s.profile.at(at)));
-    let (sum, weights) = weighted.fold((0.0, 0.0), |(sum, all), (w, grey)| (sum + w * grey, all + w));
-    (weights > 0.0).then(|| sum / weights)
+    let nearest = values.iter().map(|(place, _)| square(*place)).fold(f64::INFINITY, f64::min);
+    let (mut sums, mut weights) = ([0.0; N], 0.0);
+    for (place, value) in values {
+        let away = (square(*place) - nearest) / fade;
+        if away < LEAST {
+            let weight = (-away).exp();
+            (0..N).for_each(|n| sums[n] += weight * value[n]);
+            weights += weight;
+        }
+    }
+    (weights > 0.0).then(|| sums.map(|sum| sum / weights))
+}
+
+/// The grey value at a place beside the border that the outlines of other sections tell for a point.
+fn grey_of_others(profiles: &[Sampled], of: &Sampled, at: f64, fade: f64) -> Option<f64> {
+    let others = profiles.iter().filter(|s| s.section != of.section).map(|s| (s.point, [s.profile.at(at)]));
+    weighted(&others.collect::<Vec<_>>(), of.point, fade).map(|[grey]| grey)
 }
