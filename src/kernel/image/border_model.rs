@@ -30,8 +30,8 @@ pub struct Reading {
     pub significance: f64,
     /// The mean place of the value under the outlines between outside (0) and inside (1).
     pub share: f64,
-    /// How far outside of the border its grey value is looked for, in smallest spacings: 0 but where the outlines run so
-    /// high on a border that what is inside would be taken for outside.
+    /// How far outside of the border what tells it is looked for, in smallest spacings: the crest of a wall, or a grey
+    /// value, that of the border itself but where outlines run so high on it that what is inside would be taken for outside.
     pub shift: f64,
     /// Profiles that were read.
     pub profiles: usize,
@@ -42,6 +42,8 @@ const WALL_OVER_STEP: f64 = 0.45;
 /// Its flanks are so many smallest spacings from its crest, and that so far from the marks at most.
 const WALL_FLANK: f64 = 2.5;
 const FARTHEST_CREST: f64 = 3.5;
+/// Outlines that near to a crest were drawn along it.
+const ON_CREST: f64 = 0.5;
 /// A contrast counts from so many standard errors on.
 const SIGNIFICANT: f64 = 4.0;
 /// Marks that run at such a share of the contrast were drawn along that level on purpose; beyond, beside the border.
@@ -96,7 +98,12 @@ impl Reading {
             let is_wall = height > WALL_OVER_STEP * step.abs() && height > SIGNIFICANT * error;
             if is_wall && crest.abs() <= FARTHEST_CREST {
                 let significance = height / error;
-                return Self { model: BorderModel::Wall(sign), bias: crest, contrast: height, significance, ..found };
+                // Half a voxel is what blur and what joins a wall make of its crest, not where the outlines run.
+                let mean = profiles.iter().map(|p| p.crest(sign).clamp(-FARTHEST_CREST, FARTHEST_CREST)).sum::<f64>();
+                let shift = (mean / profiles.len() as f64).clamp(-ON_CREST, ON_CREST);
+                let (bias, shift) = if crest.abs() < ON_CREST { (0.0, shift) } else { (crest, 0.0) };
+                let model = BorderModel::Wall(sign);
+                return Self { model, bias, shift, contrast: height, significance, ..found };
             }
         }
         if found.significance > SIGNIFICANT {

@@ -6,7 +6,8 @@
 //!
 //! phi is the signed distance to the shape of the outlines, b how far outside of the marks the image's border lies, D
 //! how far the image says that the border is away, outwards; U is how uncertain the shape is, the more the farther
-//! from the outlines and their planes (d) and beyond the last of them (e), V how uncertain the image. The surface rests where both agree, weighed by their variances.
+//! from the outlines and their planes (d) and beyond the last of them (e), V how uncertain the image. The surface rests
+//! where both agree, weighed by their variances.
 
 use super::shape_field::ShapeField;
 use super::survey::{MOST_OFF, Outlined, Sampled, Trust, fade, weighted};
@@ -118,6 +119,8 @@ impl Buffers {
             let height = sign * reading.contrast as f32;
             let fields = [&self.grey[..], &self.around[..]];
             wall_offsets(fields, &around, part, geometry.spacing, height, &mut self.offsets);
+            let shift = reading.shift as f32 * h;
+            self.offsets.iter_mut().for_each(|offset| *offset -= shift);
             self.doubts.fill(1.0);
         }
         Ok(())

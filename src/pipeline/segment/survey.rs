@@ -225,7 +225,8 @@ fn image_deviation(profiles: &[Sampled], reading: &Reading, deviation: f64, h: f
     match reading.model {
         BorderModel::None => f64::INFINITY,
         BorderModel::Wall(sign) => {
-            let off = profiles.iter().map(|s| (s.profile.crest(sign) - reading.bias).abs());
+            let usual = reading.bias + reading.shift;
+            let off = profiles.iter().map(|s| (s.profile.crest(sign) - usual).abs());
             apart(1.4826 * median(off.collect()))
         }
         BorderModel::Level => {
