@@ -28,16 +28,20 @@ struct Buckets {
     size: f64,
     /// Buckets along a side.
     side: usize,
-    /// By bucket where the edges that can be nearest to a point of it start in `nearest`.
+    /// By bucket where the edges that can be nearest to a point of it start in `nearest`, which has them as runs from
+    /// one edge up to another.
     starts: Vec<u32>,
-    nearest: Vec<u32>,
+    nearest: Vec<Run>,
     /// By row of buckets the edges that cross it.
     rows: Vec<Vec<u32>>,
 }
 
+/// Edges one after the other.
+type Run = [u32; 2];
+
 /// Edges for each bucket along a side, about, and the most of these, a power of two.
 const EDGES_ALONG: usize = 8;
-const MOST_ALONG: usize = 32;
+const MOST_ALONG: usize = 64;
 
 impl Section {
     /// The section that curves bound, which go through marks.
@@ -132,7 +136,7 @@ impl Buckets {
 
     /// Finds the edges that can be nearest to points of each bucket.
     fn divide(&mut self, whole: Square) {
-        let mut squares = vec![(whole, (0..self.edges.len() as u32).collect::<Vec<u32>>())];
+        let mut squares = vec![(whole, vec![[0, self.edges.len() as u32]])];
         let mut side = 1;
         while side < self.side {
             let mut divided = Vec::with_capacity(4 * squares.len());
@@ -153,6 +157,11 @@ impl Buckets {
         self.starts.push(self.nearest.len() as u32);
     }
 
+    fn nearest_squared(&self, [from, to]: Run, point: [f64; 2]) -> f64 {
+        let edges = &self.edges[from as usize..to as usize];
+        edges.iter().map(|&edge| distance_squared(edge, point)).fold(f64::INFINITY, f64::min)
+    }
+
     fn row(&self, y: f64) -> usize {
         (((y - self.low[1]) / self.size).max(0.0) as usize).min(self.side - 1)
     }
@@ -163,11 +172,10 @@ impl Buckets {
         let inside = 0.0..self.side as f64;
         let squared = if inside.contains(&i) && inside.contains(&j) {
             let bucket = j as usize * self.side + i as usize;
-            let near = &self.nearest[self.starts[bucket] as usize..self.starts[bucket + 1] as usize];
-            let squares = near.iter().map(|&edge| distance_squared(self.edges[edge as usize], point));
-            squares.fold(f64::INFINITY, f64::min)
+            let runs = &self.nearest[self.starts[bucket] as usize..self.starts[bucket + 1] as usize];
+            runs.iter().map(|&run| self.nearest_squared(run, point)).fold(f64::INFINITY, f64::min)
         } else {
-            self.edges.iter().map(|&edge| distance_squared(edge, point)).fold(f64::INFINITY, f64::min)
+            self.nearest_squared([0, self.edges.len() as u32], point)
         };
         squared.sqrt().min(limit)
     }
@@ -199,13 +207,20 @@ impl Square {
 
     /// Those of the edges that can be nearest to a point of the square: a point is no farther from its nearest edge than
     /// the centre from its own, and what lies between both.
-    fn nearest(&self, edges: &[[[f64; 2]; 2]], among: &[u32]) -> Vec<u32> {
-        let away: Vec<f64> =
-            among.iter().map(|&edge| distance_squared(edges[edge as usize], self.centre).sqrt()).collect();
-        let least = away.iter().copied().fold(f64::INFINITY, f64::min);
+    fn nearest(&self, edges: &[[[f64; 2]; 2]], among: &[Run]) -> Vec<Run> {
+        let numbers = || among.iter().flat_map(|&[from, to]| from..to);
+        let away = |edge: u32| distance_squared(edges[edge as usize], self.centre).sqrt();
+        let least = numbers().map(away).fold(f64::INFINITY, f64::min);
         // Twice half the diagonal, and a little for rounding.
         let most = least + 2.0 * self.half * std::f64::consts::SQRT_2 * (1.0 + 1e-9);
-        among.iter().zip(away).filter(|(_, away)| *away <= most).map(|(&edge, _)| edge).collect()
+        let mut runs: Vec<Run> = Vec::new();
+        for edge in numbers().filter(|&edge| away(edge) <= most) {
+            match runs.last_mut().filter(|run| run[1] == edge) {
+                Some(run) => run[1] = edge + 1,
+                None => runs.push([edge, edge + 1]),
+            }
+        }
+        runs
     }
 }
 

@@ -40,6 +40,12 @@ pub struct Estimate {
 /// Seconds of one thread for a voxel of the image.
 const SECONDS_PER_VOXEL: f64 = 6e-8;
 
+/// Memory that an outline takes: its curve, its edges and where they lie; and what an object's profiles and shape take.
+const OUTLINE_BYTES: u64 = 256 << 10;
+const OUTLINED_BYTES: u64 = 2 << 20;
+/// Memory that a thread takes to fit outlines.
+const FIT_BYTES: u64 = 8 << 20;
+
 /// Estimates the segmentation of `crop` with `threads` threads; `writes` says whether there is an output.
 ///
 /// The search for what a cloud encloses is taken to end where it begins, at its first reach.
@@ -54,7 +60,7 @@ pub fn estimate(
 ) -> Estimate {
     let size = stack.element().size() as u64;
     let plane = stack.shape()[0].unsigned_abs() * stack.shape()[1].unsigned_abs() * size;
-    let (mut points, mut grid_cells, mut largest, mut near) = (0, 0, 0, 0);
+    let (mut points, mut grid_cells, mut largest, mut near, mut outlines) = (0, 0, 0, 0, 0);
     let objects = split_and_seed(guides.cloud, guides.seeds);
     for marks in &objects {
         if marks.seed.is_some() {
@@ -70,6 +76,7 @@ pub fn estimate(
         grid_cells = grid_cells.max(cells.grid().len());
         largest = largest.max(cells.len() as u64);
         near += cells.len() as u64;
+        outlines += marks.contours.len() as u64 * OUTLINE_BYTES + OUTLINED_BYTES;
     }
     let voxels = crop.volume();
     let grid = BrickGrid::new(crop.shape(), settings.brick);
@@ -77,7 +84,11 @@ pub fn estimate(
     let (largest_voxels, near_voxels) = (largest * CELL_LEN as u64, near * CELL_LEN as u64);
     // While planes come in: the plane, its cropped copy, and what is decoded; the latter two bounded by the plane.
     let reading = threads * (3 * plane + (2 << 20));
-    let solving = points * POINT_BYTES + grid_cells * GRID_CELL_BYTES + largest * STORED_CELL_BYTES;
+    let solving = outlines
+        + threads * FIT_BYTES
+        + points * POINT_BYTES
+        + grid_cells * GRID_CELL_BYTES
+        + largest * STORED_CELL_BYTES;
     let writing = if writes { threads * COARSE_VOXELS * size.max(4) } else { 0 };
     // Decoders keep their buffers.
     let decoders = threads * plane;
