@@ -11,7 +11,7 @@ from pathlib import Path
 from common import page
 from common.program import METHODS, Program
 
-from . import cube, middle, sponge, surface, teddy
+from . import cube, embryo, middle, sponge, surface, teddy
 from .setting import Setting
 
 SECTIONS = {
@@ -20,12 +20,13 @@ SECTIONS = {
     "sponge": sponge.section,
     "middle": middle.section,
     "surface": surface.section,
+    "embryo": embryo.section,
 }
 TITLE = """# Reproduction
 
 B. Kósa, K. Mikula: *Direct simple computation of middle surface between 3D point clouds and/or discrete surfaces by
 tracking sources in distance function calculation algorithms*, 2023: the tables of its experiments; B. Kósa, K. Mikula,
-2015, and B. Kósa's PhD thesis: surfaces from point clouds; and what this program gives. Tables are numbered as printed.
+2015, and B. Kósa's PhD thesis: surfaces from point clouds and images; and what this program gives. Tables are numbered as printed.
 `scripts/reproduce` runs the experiments and writes this page, part by part.
 
     scripts/reproduce --data FOLDER            # all grids, up to 893 x 1279 x 482
@@ -42,7 +43,7 @@ def arguments():
     parser.add_argument("--only", choices=SECTIONS, action="append", help="only this experiment; may be repeated (all)")
     data = os.environ.get("STRANDLINE_DATA")
     parser.add_argument(
-        "--data", type=Path, default=data and Path(data), help=f"folder that holds {teddy.FILE} ($STRANDLINE_DATA)"
+        "--data", type=Path, default=data and Path(data), help=f"folder that holds {teddy.FILE} and embryo-like ($STRANDLINE_DATA)"
     )
     parser.add_argument("--scratch", type=Path, help="folder for temporary fields (the system's)")
     parser.add_argument(
