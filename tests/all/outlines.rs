@@ -177,6 +177,24 @@ fn holes_and_branches_are_kept() {
     }
 }
 
+/// Clicked around twice, or saved twice, an outline is the same outline.
+#[test]
+fn an_outline_is_no_hole_in_itself() {
+    let bench = Bench::bare();
+    stack(&bench, |_| 100.0);
+    let planes: Vec<(usize, f64)> = [-6.0, -2.0, 2.0, 6.0].map(|h| (2, h)).into();
+    let once = circles(&planes, 14, 0.0, 0.0);
+    let (_, wanted) = solved(&bench, &once, "");
+    let rows: Vec<&str> = once.lines().skip(1).collect();
+    let around_twice: String =
+        rows.chunks(14).map(|outline| format!("{0}\n{0}\n", outline.join("\n"))).collect::<String>();
+    let (_, found) = solved(&bench, &format!("{HEADER}{around_twice}"), "");
+    assert!((found - wanted).abs() < 0.01 && wanted > 0.95, "twice around: {found} for {wanted}");
+    let again: String = rows[..14].iter().map(|row| format!("{}\n", row.replacen("1,1,", "1,77,", 1))).collect();
+    let (_, found) = solved(&bench, &format!("{once}{again}"), "");
+    assert!(found == wanted, "saved twice: {found} for {wanted}");
+}
+
 #[test]
 fn what_is_wrong_with_marks_is_told() {
     let bench = Bench::bare();

@@ -1,5 +1,6 @@
-//! What an object covers in one plane: closed polygons, filled by the even-odd rule, and the signed distance to their
-//! border, negative inside. An outline inside another is a hole, one beside another a branch.
+//! What an object covers in one plane: closed polygons, and the signed distance to their border, negative inside. What a
+//! polygon runs around is inside of it, however often it does; what is inside of an even number of them is a hole: an
+//! outline inside another is one, one beside another is a branch.
 //!
 //! Square buckets know the edges that can be nearest to their points, told level by level from those of the square that
 //! was divided into them; rows of buckets know the edges that cross them, which tell a point's side.
@@ -32,8 +33,10 @@ struct Buckets {
     /// one edge up to another.
     starts: Vec<u32>,
     nearest: Vec<Run>,
-    /// By row of buckets the edges that cross it.
+    /// By row of buckets the edges that cross it, in order.
     rows: Vec<Vec<u32>>,
+    /// Where each curve's edges end.
+    ends: Vec<u32>,
 }
 
 /// Edges one after the other.
@@ -117,6 +120,11 @@ impl Buckets {
             curve.points.iter().zip(next).map(|(&from, &to)| [from, to]).collect()
         };
         let edges: Vec<[[f64; 2]; 2]> = curves.iter().flat_map(edges_of).collect();
+        let ends = curves.iter().scan(0, |end, curve| {
+            *end += curve.points.len() as u32;
+            Some(*end)
+        });
+        let ends = ends.collect();
         let [low, high] = bounds(curves.iter().flat_map(|curve| &curve.points));
         let longest = (high[0] - low[0]).max(high[1] - low[1]).max(f64::MIN_POSITIVE);
         // Twice as long as the outlines: most of what is asked for lies beside them.
@@ -124,8 +132,16 @@ impl Buckets {
         let side = (edges.len() / EDGES_ALONG).clamp(1, MOST_ALONG).next_power_of_two();
         let size = 2.0 * whole.half / side as f64;
         let low = whole.centre.map(|c| c - whole.half);
-        let mut buckets =
-            Self { edges, low, size, side, starts: Vec::new(), nearest: Vec::new(), rows: vec![Vec::new(); side] };
+        let mut buckets = Self {
+            edges,
+            low,
+            size,
+            side,
+            starts: Vec::new(),
+            nearest: Vec::new(),
+            rows: vec![Vec::new(); side],
+            ends,
+        };
         buckets.divide(whole);
         for (number, edge) in buckets.edges.iter().enumerate() {
             let rows = [edge[0], edge[1]].map(|end| buckets.row(end[1]));
@@ -182,12 +198,18 @@ impl Buckets {
 
     fn holds(&self, point: [f64; 2]) -> bool {
         let row = &self.rows[self.row(point[1])];
-        let crossings = row.iter().filter(|&&edge| {
+        let (mut curve, mut turns, mut holding) = (0, 0, false);
+        for &edge in row {
+            while edge >= self.ends[curve] {
+                (curve, holding, turns) = (curve + 1, holding != (turns != 0), 0);
+            }
             let [a, b] = self.edges[edge as usize];
-            (a[1] <= point[1]) != (b[1] <= point[1])
-                && a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > point[0]
-        });
-        crossings.count() % 2 == 1
+            let crosses = (a[1] <= point[1]) != (b[1] <= point[1]);
+            if crosses && a[0] + (point[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > point[0] {
+                turns += if a[1] <= point[1] { 1 } else { -1 };
+            }
+        }
+        holding != (turns != 0)
     }
 }
 
@@ -255,6 +277,9 @@ mod tests {
                 assert!((section.distance(p) - sign * slow(p)).abs() < 1e-12, "{p:?}");
             }
         }
+        let twice = |points: Vec<[f64; 2]>| Curve { points: [points.clone(), points].concat(), deviation: 0.0 };
+        let around = Section::new(plane, vec![twice(square(0.0, 10.0).points)], Vec::new());
+        assert!(around.distance([5.0, 5.0]) == -5.0 && around.distance([12.0, 5.0]) == 2.0, "twice around");
         assert!((section.radius() - (100.0f64 / std::f64::consts::PI).sqrt()).abs() < 1e-12);
         assert!((section.deepest().unwrap().1 - 2.3).abs() < 0.3, "{:?}", section.deepest());
     }

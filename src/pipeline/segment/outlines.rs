@@ -40,7 +40,10 @@ fn drawn<'a>(marks: &'a ObjectMarks, image: &Geometry) -> Option<Vec<Drawn<'a>>>
         let in_plane = marks.iter().map(|&p| plane.project(p)).collect();
         Some(Drawn { plane, marks, in_plane })
     };
-    let found: Vec<Drawn> = marks.contours.iter().filter(|c| c.len() > 2).map(outline).collect::<Option<_>>()?;
+    // An outline that was saved twice is one outline, no hole in itself.
+    let repeats = |n: usize| marks.contours[..n].contains(&marks.contours[n]);
+    let told = (0..marks.contours.len()).filter(|&n| marks.contours[n].len() > 2 && !repeats(n));
+    let found: Vec<Drawn> = told.map(|n| outline(&marks.contours[n])).collect::<Option<_>>()?;
     (!found.is_empty()).then_some(found)
 }
 
