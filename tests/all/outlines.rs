@@ -186,11 +186,12 @@ fn an_outline_is_no_hole_in_itself() {
     let once = circles(&planes, 14, 0.0, 0.0);
     let (_, wanted) = solved(&bench, &once, "");
     let rows: Vec<&str> = once.lines().skip(1).collect();
-    let around_twice: String =
-        rows.chunks(14).map(|outline| format!("{0}\n{0}\n", outline.join("\n"))).collect::<String>();
+    let around_twice: Vec<String> = rows.chunks(14).map(|outline| [outline, outline].concat().join("\n")).collect();
+    let around_twice = around_twice.join("\n");
     let (_, found) = solved(&bench, &format!("{HEADER}{around_twice}"), "");
     assert!((found - wanted).abs() < 0.01 && wanted > 0.95, "twice around: {found} for {wanted}");
-    let again: String = rows[..14].iter().map(|row| format!("{}\n", row.replacen("1,1,", "1,77,", 1))).collect();
+    let again: Vec<String> = rows[..14].iter().map(|row| row.replacen("1,1,", "1,77,", 1)).collect();
+    let again = again.join("\n");
     let (_, found) = solved(&bench, &format!("{once}{again}"), "");
     assert!(found == wanted, "saved twice: {found} for {wanted}");
 }
