@@ -169,9 +169,10 @@ fn outputs_that_cannot_be_written_end_with_code_1() {
     assert!(complaint.contains("/proc/x.zarr"), "{complaint}");
     // No file may grow beyond 8 KiB: the store cannot be written, nor what does not fit memory.
     let larger = Bench::new(&Ball::large());
-    for (bench, arguments, reasons) in
-        [(&bench, "-o out/x.zarr", ["out/", ".zarr"]), (&larger, "-o none --threads 2 --memory 152MiB", ["--scratch", "scratch:"])]
-    {
+    for (bench, arguments, reasons) in [
+        (&bench, "-o out/x.zarr", ["out/", ".zarr"]),
+        (&larger, "-o none --threads 2 --memory 152MiB", ["--scratch", "scratch:"]),
+    ] {
         let program = env!("CARGO_BIN_EXE_strandline");
         let limited = format!("ulimit -f 8; exec {program} segment image.tif --points marks.csv {arguments}");
         let mut command = std::process::Command::new("bash");
