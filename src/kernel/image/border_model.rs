@@ -57,13 +57,14 @@ impl Reading {
         match (wall, found.model) {
             (false, BorderModel::Level) | (true, BorderModel::Wall(_)) => found,
             (false, _) => {
-                Self { model: BorderModel::Level, bias: 0.0, share: 0.5, contrast: mean_step(profiles), ..found }
+                let contrast = mean_step(profiles);
+                Self { model: BorderModel::Level, bias: 0.0, shift: 0.0, share: 0.5, contrast, ..found }
             }
             (true, _) => {
                 let above = |p: &Profile| p.here() - 0.5 * (p.inside() + p.outside());
                 let height = profiles.iter().map(above).sum::<f64>() / profiles.len().max(1) as f64;
                 let model = BorderModel::Wall(if height < 0.0 { -1.0 } else { 1.0 });
-                Self { model, bias: 0.0, contrast: height.abs().max(1e-6), ..found }
+                Self { model, bias: 0.0, shift: 0.0, contrast: height.abs().max(1e-6), ..found }
             }
         }
     }
@@ -204,6 +205,10 @@ mod tests {
         assert!(beside.model == BorderModel::Level && (beside.bias + 2.0).abs() < 0.2, "{beside:?}");
         let wall = Reading::of(&profiles(|t, w| (-(t - 1.0 - w).powi(2) / 2.0).exp() + 0.2 * blurred(t)));
         assert!(wall.model == BorderModel::Wall(1.0) && (wall.bias - 1.0).abs() < 0.2, "{wall:?}");
+        let near = profiles(|t, w| (-(t - 0.3 - 0.1 * w).powi(2) / 2.0).exp());
+        let (crest, level) = (Reading::of(&near), Reading::forced(&near, false));
+        assert!(crest.bias == 0.0 && (crest.shift - 0.3).abs() < 0.1, "{crest:?}");
+        assert_eq!((level.model, level.shift), (BorderModel::Level, 0.0), "a crest is no level");
         let dark = Reading::of(&profiles(|t, _| 1.0 - (-t * t / 2.0).exp()));
         assert_eq!(dark.model, BorderModel::Wall(-1.0));
         let nothing = Reading::of(&profiles(|t, w| 0.5 + (13.0 * t * (1.0 + w)).sin() * w));
