@@ -48,7 +48,16 @@ const WALL: f32 = 2.0;
 /// Slopes below this part of the steepest that a wall has are none.
 const FLAT: f32 = 0.12;
 
-/// The distance to the crest of a wall of some height (negative where it is dark), by the slope of the grey values
+/// The wall that is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Wall {
+    /// How far its crest stands out, negative where it is dark.
+    pub height: f32,
+    /// How far outside of the border its crest is, in smallest spacings.
+    pub shift: f32,
+}
+
+/// The distance to the crest of a wall, less what that lies outside of the border, by the slope of the grey values
 /// along the shape's normal: `D = I' s^2 / A` near the crest of `A exp(-t^2 / 2 s^2)`, held at s beyond. The fields,
 /// grey values and signed distance, reach a voxel around the box but for the domain's end.
 pub fn wall_offsets(
@@ -56,12 +65,12 @@ pub fn wall_offsets(
     around: &Box3,
     part: &Box3,
     spacing: [f64; 3],
-    height: f32,
+    wall: Wall,
     offsets: &mut [f32],
 ) {
     let h = spacing.iter().copied().fold(f64::INFINITY, f64::min) as f32;
     let width = WALL * h;
-    let steepest = height.abs() * (-0.5f32).exp() / width;
+    let steepest = wall.height.abs() * (-0.5f32).exp() / width;
     let strides = [1, around.shape()[0] as usize, (around.shape()[0] * around.shape()[1]) as usize];
     let voxels = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
     for (offset, voxel) in offsets.iter_mut().zip(voxels) {
@@ -73,9 +82,9 @@ pub fn wall_offsets(
         };
         let normal: [f32; 3] = std::array::from_fn(|a| slope(shape, a));
         let norm = normal.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
-        let rise = (0..3).map(|a| slope(grey, a) * normal[a]).sum::<f32>() / norm * height.signum();
+        let rise = (0..3).map(|a| slope(grey, a) * normal[a]).sum::<f32>() / norm * wall.height.signum();
         let seen = (rise.abs() / steepest - FLAT).max(0.0) * rise.signum();
-        *offset = (1.5 * width * seen).clamp(-width, width);
+        *offset = (1.5 * width * seen).clamp(-width, width) - wall.shift * h;
     }
 }
 

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::border_model::{BorderModel, ON_LEVEL};
-use crate::kernel::image::speed::{Grey, Places, Step, Weights, level_offsets, speeds, wall_offsets};
+use crate::kernel::image::speed::{Grey, Places, Step, Wall, Weights, level_offsets, speeds, wall_offsets};
 use crate::kernel::outline::lattice::Lattice;
 use crate::store::{BoxSink, BoxSource, BrickArray};
 
@@ -116,11 +116,9 @@ impl Buffers {
             self.around.resize(around.len(), 0.0);
             image.read_box(&around, &mut self.grey)?;
             by.field.read(&around, &mut self.around);
-            let height = sign * reading.contrast as f32;
+            let wall = Wall { height: sign * reading.contrast as f32, shift: reading.shift as f32 };
             let fields = [&self.grey[..], &self.around[..]];
-            wall_offsets(fields, &around, part, geometry.spacing, height, &mut self.offsets);
-            let shift = reading.shift as f32 * h;
-            self.offsets.iter_mut().for_each(|offset| *offset -= shift);
+            wall_offsets(fields, &around, part, geometry.spacing, wall, &mut self.offsets);
             self.doubts.fill(1.0);
         }
         Ok(())
