@@ -1,5 +1,5 @@
 //! Kernel speed in voxels per second, in cache, on one thread.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::disallowed_methods)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use strandline::kernel::image::gaussian::{Block, Gaussian, Smoothed};

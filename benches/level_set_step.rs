@@ -4,7 +4,7 @@
 //! lists, SOR along the band's list. Both stop a step at the same root mean square of corrections; both have the
 //! image's term. Prints nanoseconds for each band voxel and step, and errors against the plain program solved to 1e-9.
 //! `cargo bench --bench level_set_step [-- RADIUS]`
-#![allow(missing_docs, dead_code)]
+#![allow(missing_docs, dead_code, clippy::disallowed_methods)]
 
 #[path = "../tests/common/lab.rs"]
 mod lab;

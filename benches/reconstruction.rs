@@ -3,7 +3,7 @@
 //! The plain program runs once, on one thread, and stops at u; ours draws and measures the surface too. Both surfaces
 //! are compared: mean and largest distance of the plain one's vertices from ours.
 //! `cargo bench --bench reconstruction [-- SCALE]`: 1 is 277 x 457 x 377 voxels and 43,000 points.
-#![allow(missing_docs, dead_code)]
+#![allow(missing_docs, dead_code, clippy::disallowed_methods)]
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -1,4 +1,5 @@
 //! strandline finds surfaces in 3-D volumes larger than memory.
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 pub mod cli;
 pub mod error;
 pub mod exec;

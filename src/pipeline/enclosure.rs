@@ -130,7 +130,7 @@ pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
 /// The watershed of the distance, within a reach that grows until most points have both sides beside them.
 fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     let grid = search.grid;
-    let half_width = BAND_VOXELS * grid.voxel_volume().cbrt();
+    let half_width = BAND_VOXELS * libm::cbrt(grid.voxel_volume());
     let mut farthest = search.first_reach.max(half_width + 3.0 * grid.max_spacing());
     let enough = |sides: &Sides| sides.lost.len() as f64 <= MOST_LOST * search.cloud.len() as f64;
     loop {
@@ -163,7 +163,7 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
 /// The flood from outside, to a start surface at one distance from all of the cloud.
 fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     let grid = search.grid;
-    let mean = grid.voxel_volume().cbrt();
+    let mean = libm::cbrt(grid.voxel_volume());
     let mut farthest = search.first_reach;
     loop {
         let around = Around::new(engine, search, farthest)?;

@@ -1,5 +1,5 @@
 //! The integration suite: one binary, so that it links once.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::disallowed_methods)]
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -223,7 +223,7 @@ pub fn solid_angle(corners: [[f64; 3]; 3], point: [f64; 3]) -> f64 {
         return 0.0;
     }
     let [la, lb, lc] = [a, b, c].map(|side| dot(side, side).sqrt());
-    2.0 * determinant.atan2(la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+    2.0 * libm::atan2(determinant, la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
 }
 
 #[cfg(test)]

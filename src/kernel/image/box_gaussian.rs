@@ -21,7 +21,7 @@ impl Gaussian {
     /// A Gaussian of a width in voxels.
     #[must_use]
     pub fn new(sigma: f64) -> Self {
-        let value = |n: usize| (-0.5 * (n as f64 / sigma).powi(2)).exp();
+        let value = |n: usize| libm::exp(-0.5 * (n as f64 / sigma).powi(2));
         let radius = (CUT * sigma).ceil() as usize;
         let sum: f64 = value(0) + 2.0 * (1..=radius).map(value).sum::<f64>();
         let weight = |n: usize| value(n) / sum * if n == 0 { 0.5 } else { 1.0 };

@@ -59,7 +59,7 @@ fn side(sigma: f64) -> Vec<f32> {
 
 fn sample(k: i32, width: f64) -> f64 {
     let x = f64::from(k) / width;
-    (-0.5 * x * x).exp()
+    libm::exp(-0.5 * x * x)
 }
 
 /// The width at which samples of a Gaussian have this variance (voxels squared, at most `WIDE^2`), by bisection.

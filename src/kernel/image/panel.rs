@@ -168,7 +168,7 @@ fn keeps_its_label(labels: &[[u32; 5]; 5]) -> bool {
 /// The label of the largest share at a point that lies `offset` from the middle pixel.
 fn largest_share(labels: &[[u32; 5]; 5], offset: [f64; 2]) -> u32 {
     // Standard deviation 0.9 pixels: steps of one pixel become slopes, and nothing moves further than half a pixel.
-    let [across, down] = offset.map(|at| AROUND.map(|step| (-(step as f64 - at).powi(2) / (2.0 * 0.9 * 0.9)).exp()));
+    let [across, down] = offset.map(|at| AROUND.map(|step| libm::exp(-(step as f64 - at).powi(2) / (2.0 * 0.9 * 0.9))));
     let mut shares = BTreeMap::new();
     for (row, down) in labels.iter().zip(down) {
         for (&label, across) in row.iter().zip(across) {

@@ -45,6 +45,8 @@ pub fn level_offsets(grey: Grey<'_>, by: Step, offsets: &mut [f32], doubts: &mut
 
 /// Half the width of a wall, in smallest spacings, as it is seen through the smoothing.
 const WALL: f32 = 2.0;
+/// The steepest slope of `exp(-t^2 / 2)`: e^(-1/2), at t = 1.
+const STEEPEST: f32 = 0.606_530_66;
 /// Slopes below this part of the steepest that a wall has are none.
 const FLAT: f32 = 0.12;
 
@@ -70,7 +72,7 @@ pub fn wall_offsets(
 ) {
     let h = spacing.iter().copied().fold(f64::INFINITY, f64::min) as f32;
     let width = WALL * h;
-    let steepest = wall.height.abs() * (-0.5f32).exp() / width;
+    let steepest = wall.height.abs() * STEEPEST / width;
     let strides = [1, around.shape()[0] as usize, (around.shape()[0] * around.shape()[1]) as usize];
     let voxels = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
     for (offset, voxel) in offsets.iter_mut().zip(voxels) {

@@ -65,13 +65,13 @@ impl Marked {
 }
 
 fn basis(t: f64) -> [f64; 3] {
-    let (sin, cos) = (std::f64::consts::TAU * t).sin_cos();
+    let (sin, cos) = libm::sincos(std::f64::consts::TAU * t);
     [1.0, cos, sin]
 }
 
 /// `sum over k from 2 of 2 cos(2 pi k t) / (k^2 - 1)^2`.
 fn wave_sum(t: f64) -> f64 {
-    let cos = (std::f64::consts::TAU * t).cos();
+    let cos = libm::cos(std::f64::consts::TAU * t);
     // Chebyshev's recurrence gives the cosines of multiples.
     let (mut before, mut now, mut sum) = (1.0, cos, 0.0);
     for k in 2..=MOST_WAVES {
@@ -96,7 +96,7 @@ impl Waves {
             let square = (k * k - 1) as f64;
             let mut wave = [[0.0; 2]; 2];
             for (i, place) in places.iter().enumerate() {
-                let (sin, cos) = (std::f64::consts::TAU * k as f64 * place).sin_cos();
+                let (sin, cos) = libm::sincos(std::f64::consts::TAU * k as f64 * place);
                 for a in 0..2 {
                     wave[0][a] += scale * 2.0 / (square * square) * weights[(i, a)] * cos;
                     wave[1][a] += scale * 2.0 / (square * square) * weights[(i, a)] * sin;
@@ -108,7 +108,7 @@ impl Waves {
     }
 
     fn at(&self, t: f64) -> [f64; 2] {
-        let (sin, cos) = (std::f64::consts::TAU * t).sin_cos();
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * t);
         let mut turn = [1.0, 0.0];
         self.0.iter().fold([0.0; 2], |sum, [c, s]| {
             let here = std::array::from_fn(|a| sum[a] + c[a] * turn[0] + s[a] * turn[1]);
@@ -173,5 +173,5 @@ pub fn area(polygon: &[[f64; 2]]) -> f64 {
 }
 
 pub(crate) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }

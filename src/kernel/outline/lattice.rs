@@ -15,9 +15,8 @@ impl Lattice {
     #[must_use]
     pub fn for_box(shape: [i64; 3], spacing: [f64; 3], most: f64) -> Self {
         let extents: [f64; 3] = std::array::from_fn(|a| shape[a] as f64 * spacing[a]);
-        let length = (extents.iter().product::<f64>() / most)
-            .cbrt()
-            .max(2.0 * spacing.into_iter().fold(f64::INFINITY, f64::min));
+        let least = 2.0 * spacing.into_iter().fold(f64::INFINITY, f64::min);
+        let length = libm::cbrt(extents.iter().product::<f64>() / most).max(least);
         let step = spacing.map(|h| ((length / h).ceil() as i64).max(1));
         let counts = std::array::from_fn(|a| ((shape[a] - 1) / step[a]) as usize + 4);
         Self { step, counts, values: Vec::new() }

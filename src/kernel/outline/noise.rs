@@ -69,7 +69,7 @@ impl Prepared {
 
 /// Half the log determinant of the matrix that a triangle is the root of.
 fn log_determinant(root: &DMatrix<f64>) -> f64 {
-    (0..root.nrows()).map(|n| root[(n, n)].ln()).sum()
+    (0..root.nrows()).map(|n| libm::log(root[(n, n)])).sum()
 }
 
 #[cfg(test)]

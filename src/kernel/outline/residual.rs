@@ -101,7 +101,7 @@ impl<F: Fn([f64; 3]) -> f64> Residuals<'_, F> {
         if above == 0 || above == sections.len() {
             let n = above.saturating_sub(1);
             let (fade, away) = ((0.5 * self.family.gap).max(h), away(n));
-            return (self.of(n, voxel, point) * (-(away / fade).powi(2)).exp(), away);
+            return (self.of(n, voxel, point) * libm::exp(-(away / fade).powi(2)), away);
         }
         let (below, over) = (away(above - 1), away(above));
         let (low, high) = (self.of(above - 1, voxel, point), self.of(above, voxel, point));

@@ -70,6 +70,6 @@ fn normal(points: &[[f64; 2]], n: usize) -> [f64; 2] {
     let len = points.len();
     let (before, after) = (points[(n + len - 1) % len], points[(n + 1) % len]);
     let along = [after[0] - before[0], after[1] - before[1]];
-    let length = along[0].hypot(along[1]).max(f64::MIN_POSITIVE);
+    let length = libm::hypot(along[0], along[1]).max(f64::MIN_POSITIVE);
     [along[1] / length, -along[0] / length]
 }

@@ -35,7 +35,7 @@ pub(super) fn corner(triangle: [[f64; 3]; 3], [one, other]: [Crossing; 2]) -> Op
     let ([a, b, e], [c, d, f]) = (line(one), line(other));
     let determinant = a * d - b * c;
     // Lines that are nearly one meet anywhere.
-    if size <= 0.0 || determinant.abs() <= 0.1 * (a.hypot(b) * c.hypot(d)) {
+    if size <= 0.0 || determinant.abs() <= 0.1 * (libm::hypot(a, b) * libm::hypot(c, d)) {
         return None;
     }
     let (s, t) = ((e * d - b * f) / determinant, (a * f - e * c) / determinant);

@@ -72,7 +72,7 @@ impl Indicators {
             narrow.smooth(rows.map(|&label| indicator(label)), &near, part, seen);
             wide.smooth(labels.iter().map(|&label| indicator(label)), around, part, excess);
             for ((excess, &narrow), label) in excess.iter_mut().zip(&*seen).zip(&mut self.labels) {
-                *excess = (narrow.max(LEAST) / excess.max(LEAST)).ln();
+                *excess = libm::logf(narrow.max(LEAST) / excess.max(LEAST));
                 if narrow > 0.5 {
                     *label = name;
                 }
@@ -108,7 +108,7 @@ impl Indicators {
 /// The argument at which the normal distribution has a value, to 5e-4 (Abramowitz & Stegun 1964, 26.2.23).
 fn normal_quantile(value: f64) -> f64 {
     let tail = value.min(1.0 - value);
-    let t = (-2.0 * tail.ln()).sqrt();
+    let t = (-2.0 * libm::log(tail)).sqrt();
     let upper = 2.515_517 + t * (0.802_853 + t * 0.010_328);
     let lower = 1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308));
     // A half has the argument 0, which the formula misses by its error.

@@ -23,7 +23,7 @@ const PATCH_BYTES: u64 = 600;
 /// Memory that drawing holds: patches, and what is remembered of the layer that is drawn. Surfaces that are larger than a
 /// few planes through the grid take more.
 pub(super) fn held(geometry: &Geometry) -> u64 {
-    let plane = (geometry.domain().volume() as f64).powf(2.0 / 3.0) as u64;
+    let plane = libm::cbrt(geometry.domain().volume() as f64).powi(2) as u64;
     BATCH as u64 * (EDGE * EDGE) as u64 * PATCH_BYTES + 64 * plane
 }
 

@@ -116,7 +116,7 @@ fn band_reach(object: &Outlined, trust: &Trust, h: f64) -> f64 {
     let radius = object.sections.iter().map(Section::radius).fold(0.0, f64::max);
     let farthest = if gap > 0.0 { 0.5 * gap } else { radius };
     let end = f64::from(OF_AN_END) * object.fitted.ends().map_or(0.0, |ends| ends.height()) / h;
-    let unsure = trust.shape.hypot(trust.growth * (farthest / h).powi(2)).hypot(end);
+    let unsure = libm::hypot(libm::hypot(trust.shape, trust.growth * (farthest / h).powi(2)), end);
     (BAND_DEVIATIONS * unsure + trust.reading.bias.abs()).clamp(BAND[0], BAND[1])
 }
 

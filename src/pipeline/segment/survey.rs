@@ -190,7 +190,7 @@ pub(super) fn trust(
             reading,
             image: image_deviation(&object.profiles, &reading, object.deviation(), h),
             outlines: object.deviation() / h,
-            shape: (object.deviation() / h).hypot(0.2).hypot(reading.bias),
+            shape: libm::hypot(libm::hypot(object.deviation() / h, 0.2), reading.bias),
             growth,
         }
     };
@@ -271,7 +271,7 @@ pub(super) fn weighted<const N: usize>(
     for (place, value) in values {
         let away = (square(*place) - nearest) / fade;
         if away < LEAST {
-            let weight = (-away).exp();
+            let weight = libm::exp(-away);
             (0..N).for_each(|n| sums[n] += weight * value[n]);
             weights += weight;
         }
