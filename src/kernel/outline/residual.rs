@@ -1,12 +1,19 @@
 //! What a function leaves to the sections' own signed distances, shared out linearly between neighbouring sections of a
-//! direction (Raya & Udupa 1990); directions count by how near their sections are.
+//! direction (Raya & Udupa 1990) and fading with the distance from them: far from sections a smooth function is nearer
+//! to the truth than one that carries the corners of an outline straight on. Directions count by how near their sections
+//! are.
 
-use super::section::{Section, widest_gap};
+use super::section::Section;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::vector::dot;
 
 /// What is left to a section's own distance counts up to so many smallest spacings.
 pub(super) const MOST_LEFT: f64 = 6.0;
+/// It fades over this part of the sections' radius. In a made tissue marked on every fourth slice Dice without the image
+/// is 0.929 without fading, 0.936, 0.941, 0.945, 0.945 with 0.5, 0.25, 0.12, 0.06; dense sections need no more.
+const FADE: f64 = 0.1;
+/// What counts less is nothing.
+const LEAST_SHARE: f64 = 1e-3;
 
 /// Sections of one direction in order of their offsets.
 #[derive(Clone, Debug)]
@@ -14,8 +21,8 @@ pub(super) struct Family<'a> {
     sections: Vec<&'a Section>,
     /// The axis that they lie across; none where they are oblique.
     axis: Option<usize>,
-    /// Their widest distance.
-    gap: f64,
+    /// How far from a section what is left to it counts.
+    fade: f64,
 }
 
 impl Family<'_> {
@@ -34,14 +41,15 @@ pub(super) fn families<'a>(sections: &[&'a Section]) -> Vec<Family<'a>> {
     for &section in sections {
         match families.iter_mut().find(|family| family.sections[0].plane.is_parallel_to(&section.plane)) {
             Some(family) => family.sections.push(section),
-            None => families.push(Family { sections: vec![section], axis: None, gap: 0.0 }),
+            None => families.push(Family { sections: vec![section], axis: None, fade: 0.0 }),
         }
     }
     for family in &mut families {
         family.sections.sort_by(|a, b| a.plane.offset.total_cmp(&b.plane.offset));
         let lies_across = |a: &usize| family.sections.iter().all(|section| section.plane.normal[*a] == 1.0);
         family.axis = (0..3).find(lies_across);
-        family.gap = widest_gap(&family.sections);
+        let radii = family.sections.iter().map(|section| section.radius());
+        family.fade = FADE * radii.sum::<f64>() / family.sections.len() as f64;
     }
     families
 }
@@ -98,14 +106,19 @@ impl<F: Fn([f64; 3]) -> f64> Residuals<'_, F> {
         let along = dot(sections[0].plane.normal, point);
         let above = sections.partition_point(|section| section.plane.offset <= along);
         let away = |n: usize| (sections[n].plane.offset - along).abs();
+        let share = |away: f64| libm::exp(-(away / self.family.fade.max(h)).powi(2));
         if above == 0 || above == sections.len() {
             let n = above.saturating_sub(1);
-            let (fade, away) = ((0.5 * self.family.gap).max(h), away(n));
-            return (self.of(n, voxel, point) * libm::exp(-(away / fade).powi(2)), away);
+            let (away, share) = (away(n), share(away(n)));
+            return (if share < LEAST_SHARE { 0.0 } else { share * self.of(n, voxel, point) }, away);
         }
         let (below, over) = (away(above - 1), away(above));
+        let (away, share) = (below.min(over), share(below.min(over)));
+        if share < LEAST_SHARE {
+            return (0.0, away);
+        }
         let (low, high) = (self.of(above - 1, voxel, point), self.of(above, voxel, point));
-        ((low * over + high * below) / (below + over), below.min(over))
+        (share * (low * over + high * below) / (below + over), away)
     }
 
     /// What is left of section `n` at the point of its plane below a voxel.
