@@ -16,3 +16,4 @@ pub mod palette;
 pub mod panel;
 pub mod profiles;
 pub mod speed;
+pub mod wall;

@@ -1,8 +1,6 @@
 //! How far the image says that a border is away, and the speed that follows from it and the shape of the outlines.
 //! Dense arrays over a box of voxels; lengths physical, outwards positive.
 
-use crate::grid::Box3;
-
 /// Grey values of voxels, that of the border near them, and how it falls outwards across it per smallest spacing.
 #[derive(Clone, Copy, Debug)]
 pub struct Grey<'a> {
@@ -40,53 +38,6 @@ pub fn level_offsets(grey: Grey<'_>, by: Step, offsets: &mut [f32], doubts: &mut
         let away = (sign * (grey.values[n] - grey.level[n]) / fall).clamp(-by.most, by.most);
         offsets[n] = (away - by.shift) * by.h;
         doubts[n] = (grey.mean_fall.abs() / fall).max(1.0);
-    }
-}
-
-/// Half the width of a wall, in smallest spacings, as it is seen through the smoothing.
-const WALL: f32 = 2.0;
-/// The steepest slope of `exp(-t^2 / 2)`: e^(-1/2), at t = 1.
-const STEEPEST: f32 = 0.606_530_66;
-/// Slopes below this part of the steepest that a wall has are none.
-const FLAT: f32 = 0.12;
-
-/// The wall that is looked for.
-#[derive(Clone, Copy, Debug)]
-pub struct Wall {
-    /// How far its crest stands out, negative where it is dark.
-    pub height: f32,
-    /// How far outside of the border its crest is, in smallest spacings.
-    pub shift: f32,
-}
-
-/// The distance to the crest of a wall, less what that lies outside of the border, by the slope of the grey values
-/// along the shape's normal: `D = I' s^2 / A` near the crest of `A exp(-t^2 / 2 s^2)`, held at s beyond. The fields,
-/// grey values and signed distance, reach a voxel around the box but for the domain's end.
-pub fn wall_offsets(
-    [grey, shape]: [&[f32]; 2],
-    around: &Box3,
-    part: &Box3,
-    spacing: [f64; 3],
-    wall: Wall,
-    offsets: &mut [f32],
-) {
-    let h = spacing.iter().copied().fold(f64::INFINITY, f64::min) as f32;
-    let width = WALL * h;
-    let steepest = wall.height.abs() * STEEPEST / width;
-    let strides = [1, around.shape()[0] as usize, (around.shape()[0] * around.shape()[1]) as usize];
-    let voxels = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
-    for (offset, voxel) in offsets.iter_mut().zip(voxels) {
-        let at = around.offset_of(voxel);
-        let slope = |field: &[f32], a: usize| {
-            let (down, up) = (usize::from(voxel[a] > around.lo[a]), usize::from(voxel[a] + 1 < around.hi[a]));
-            let by = (down + up).max(1) as f32 * spacing[a] as f32;
-            (field[at + up * strides[a]] - field[at - down * strides[a]]) / by
-        };
-        let normal: [f32; 3] = std::array::from_fn(|a| slope(shape, a));
-        let norm = normal.iter().map(|v| v * v).sum::<f32>().sqrt().max(1e-6);
-        let rise = (0..3).map(|a| slope(grey, a) * normal[a]).sum::<f32>() / norm * wall.height.signum();
-        let seen = (rise.abs() / steepest - FLAT).max(0.0) * rise.signum();
-        *offset = (1.5 * width * seen).clamp(-width, width) - wall.shift * h;
     }
 }
 

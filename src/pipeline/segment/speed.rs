@@ -15,7 +15,8 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::border_model::{BorderModel, ON_LEVEL};
-use crate::kernel::image::speed::{Grey, Places, Step, Wall, Weights, level_offsets, speeds, wall_offsets};
+use crate::kernel::image::speed::{Grey, Places, Step, Weights, level_offsets, speeds};
+use crate::kernel::image::wall::{Fields, Wall, wall_offsets};
 use crate::kernel::outline::lattice::Lattice;
 use crate::store::{BoxSink, BoxSource, BrickArray};
 
@@ -117,9 +118,8 @@ impl Buffers {
             image.read_box(&around, &mut self.grey)?;
             by.field.read(&around, &mut self.around);
             let wall = Wall { height: sign * reading.contrast as f32, shift: reading.shift as f32 };
-            let fields = [&self.grey[..], &self.around[..]];
-            wall_offsets(fields, &around, part, geometry.spacing, wall, &mut self.offsets);
-            self.doubts.fill(1.0);
+            let fields = Fields { grey: &self.grey, shape: &self.around, around, spacing: geometry.spacing };
+            wall_offsets(fields, part, wall, &mut self.offsets, &mut self.doubts);
         }
         Ok(())
     }
