@@ -27,6 +27,8 @@ OBJECTS = {"mouse": real.mouse, "nuclei": nuclei.make, "tissue": tissue.make, "e
 TOUCHING = {"foam": foam.make}
 STACKS = {"objects": OBJECTS, "surfaces": made.names(), "touching": TOUCHING, "pictures": OBJECTS | TOUCHING}
 OURS = ["default=", "image none=--image none"]
+# Of cells that touch, as a tissue is to come out.
+FILLED = "fill gaps=--fill-gaps auto"
 
 
 def comma(text):
@@ -75,8 +77,8 @@ def arguments():
     return parser.parse_args()
 
 
-def methods(settings, program):
-    """What to compare, by name."""
+def methods(settings, program, part):
+    """What to compare on a part of the page, by name."""
     found = {}
     if not settings.no_peers:
         # What peers import takes seconds that a quick look does not need.
@@ -85,7 +87,7 @@ def methods(settings, program):
         wanted = [name for name in peers.PEERS if not settings.peers or name in settings.peers]
         peers.load(wanted)
         found = {name: partial(peers.solve, peers.PEERS[name]) for name in wanted}
-    for text in settings.ours or OURS:
+    for text in settings.ours or OURS + [FILLED] * (part == "touching"):
         name, _, flags = text.partition("=")
         found[name] = partial(run_ours, program, f"{flags} --threads {settings.jobs}")
     return found
@@ -122,13 +124,13 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         place = settings.keep or Path(scratch)
         pictures = settings.out.parent / "pictures"
-        setting = parts.Setting(methods(settings, program), settings.marks, settings.seeds, place, pictures)
         # A quick look draws nothing unless it is told to.
         wanted = settings.only or [name for name in STACKS if name != "pictures" or not settings.print]
         for name in wanted:
             if not chosen(STACKS[name], settings.data, name):
                 continue
             started = time.monotonic()
+            setting = parts.Setting(methods(settings, program, name), settings.marks, settings.seeds, place, pictures)
             text = parts.PARTS[name](setting, volumes(settings, name))
             if settings.print:
                 print(f"\n{text}\n", flush=True)

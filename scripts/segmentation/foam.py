@@ -33,13 +33,15 @@ def between(volume, answer):
 
 
 def contact_error(volume, found):
-    """Sum of the differences of areas by the sum of areas; how many contacts of a size were missed; how many made up."""
+    """Sum of the differences of areas, and the difference of their sums, by the sum of areas; how many contacts of a
+    size were missed; how many made up."""
     true = volume.cells.contacts()
     difference = sum(abs(found.get(pair, 0.0) - area) for pair, area in true.items())
     difference += sum(area for pair, area in found.items() if pair not in true)
     large = np.median(list(true.values())) / 4
     missed = sum(pair not in found for pair, area in true.items() if area > large)
-    return difference / sum(true.values()), missed, sum(pair not in true for pair in found)
+    whole = sum(true.values())
+    return difference / whole, sum(found.values()) / whole - 1, missed, sum(pair not in true for pair in found)
 
 
 def read_contacts(store):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from . import foam, scores
 from .marks import kind, mark
-from .report import Table, dice_cell, radial_cell, seconds_cell, share_cell, worst_cell
+from .report import Table, dice_cell, radial_cell, seconds_cell, share_cell, signed_share_cell, worst_cell
 from .volume import write_outlines
 
 STANDARD = ["every2", "every4", "every8", "three", "planes", "every2-p8", "every2-p20", "every2-j1.5"]
@@ -97,13 +97,14 @@ def touching(setting, volumes):
                 table.add((*row, label), method, (share_cell, value))
             found = foam.read_contacts(answer.store)
             if found is not None:
-                error, missed, made_up = foam.contact_error(volume, found)
+                error, together, missed, made_up = foam.contact_error(volume, found)
                 table.add((*row, "contact areas off by"), method, (share_cell, error))
+                table.add((*row, "all contacts together"), method, (signed_share_cell, together))
                 table.add((*row, "contacts missed"), method, (seconds_cell, missed))
                 table.add((*row, "contacts made up"), method, (seconds_cell, made_up))
     return (
         "## Touching cells\n\nOf the voxels of cells that lie within 3 voxels of a wall between two: without a label, with the label of a "
-        "wrong cell, held by two objects' level sets. Contact areas beside those of the true diagram, differences summed.\n\n"
+        "wrong cell, held by two objects' level sets. Contact areas beside those of the true diagram: differences of each, summed, and of all together.\n\n"
         f"{table.markdown(lambda runs: runs[0][0]([value for _, value in runs]))}"
     )
 

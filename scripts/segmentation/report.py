@@ -56,3 +56,8 @@ def radial_cell(runs):
 def share_cell(runs):
     value = mean(runs)
     return "-" if value is None else f"{100 * value:.1f} %"
+
+
+def signed_share_cell(runs):
+    value = mean(runs)
+    return "-" if value is None else f"{100 * value:+.1f} %"

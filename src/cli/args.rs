@@ -136,7 +136,7 @@ pub(super) struct MotionArgs {
     /// Weight of curvature, a length; smooths the surface [default: 0.1 of the smallest spacing]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(super) delta: Option<f64>,
-    /// Weight of the pull towards the points [default: 1]
+    /// Weight of the pull towards the points; of outlines it is shared with the image [default: 1]
     #[arg(long, value_name = "W", allow_hyphen_values = true)]
     pub(super) theta: Option<f64>,
     /// Distance of the start surface from the points, a length [default: just beyond their largest hole]
@@ -166,13 +166,14 @@ pub(super) struct MotionArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Level set")]
 pub(super) struct PullArgs {
-    /// Weight of the pull towards the image's edges; 0 leaves the image out [default: 0.3]
+    /// Weight of the image; 0 leaves it out [default: 4 with outlines, 0.3 where edges pull]
     #[arg(long, value_name = "W", allow_hyphen_values = true)]
     pub(super) rho: Option<f64>,
     /// Contrast of the edge detector, for intensities from 0 to 1 [default: 650]
     #[arg(long, value_name = "K", allow_hyphen_values = true)]
     pub(super) k: Option<f64>,
-    /// Width of the smoothing before edges are looked for, a length [default: 2 of the smallest spacing]
+    /// Width of the smoothing before borders are looked for, a length [default: 1 of the smallest spacing with outlines,
+    /// 2 where edges pull]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(super) sigma: Option<f64>,
 }
