@@ -136,7 +136,7 @@ pub(super) struct MotionArgs {
     /// Weight of curvature, a length; smooths the surface [default: 0.1 of the smallest spacing]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(super) delta: Option<f64>,
-    /// Weight of the pull towards the points; of outlines it is shared with the image [default: 1]
+    /// Weight of the pull towards the points [default: 1]
     #[arg(long, value_name = "W", allow_hyphen_values = true)]
     pub(super) theta: Option<f64>,
     /// Distance of the start surface from the points, a length [default: just beyond their largest hole]

@@ -7,7 +7,6 @@ use std::thread::available_parallelism;
 use super::args::{Edge, ImageArg, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, SmoothingArg, StartArg, StopArg};
 use super::console::Console;
 use super::text::bytes;
-use super::values::Output;
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress, machine_memory};
 use crate::pipeline::distance::Method;
@@ -217,33 +216,6 @@ pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Refuses what would be found out only when the work is done: outputs that are there, folders that are not.
-pub(super) fn check_outputs(store: &Output, extras: &[&Option<PathBuf>], overwrite: bool) -> Result<()> {
-    let extras = extras.iter().copied().flatten();
-    let mut seen: Vec<&Path> = store.path().into_iter().collect();
-    for path in extras {
-        if seen.contains(&path.as_path()) {
-            return Err(Error::usage("is named for two outputs; give each a name of its own").at(path));
-        }
-        seen.push(path);
-        // A device or a folder would be replaced by a file.
-        if path.exists() && !path.is_file() {
-            return Err(Error::usage("is no regular file; give another name").at(path));
-        }
-        if path.exists() && !overwrite {
-            let what = "exists already; choose another name, or give --overwrite to replace it";
-            return Err(Error::usage(what).at(path));
-        }
-    }
-    for path in seen {
-        let folder = folder_of(path);
-        if !folder.is_dir() {
-            return Err(Error::usage("the folder for the output does not exist; create it first").at(folder));
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use clap::Parser;
@@ -275,7 +247,6 @@ mod tests {
         let defaults = SegmentSettings::default();
         for (value, what) in [
             (defaults.motion.theta, "towards the points"),
-            (defaults.motion.rho, "leaves the image out"),
             (defaults.k, "intensities from 0 to 1"),
             (defaults.motion.omega, "between 0 and 2"),
             (f64::from(defaults.motion.max_steps), "Time steps at most"),

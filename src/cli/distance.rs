@@ -13,6 +13,7 @@ use super::distance_report::{Found, Settings, describe_found};
 use super::distance_sources::{Read, read_sets};
 use super::files::{export_mesh, mesh_format};
 use super::grid::grid;
+use super::outputs::Outputs;
 use super::report::{Ran, Report};
 use super::text::{bytes, duration, grouped, number, triple};
 use super::{print, signals, table};
@@ -64,7 +65,14 @@ impl Job {
         let cancel = signals::cancel_on_signals()?;
         let mut settings = settings(&args)?;
         let mesh = middle.as_ref().map_or(&None, |choice| &choice.mesh);
-        config::check_outputs(&args.job.output.output, &[&args.job.output.report, mesh], args.job.output.overwrite)?;
+        let output = &args.job.output;
+        let outputs = Outputs {
+            inputs: args.sources.iter().chain(&args.job.grid.like).map(PathBuf::as_path).collect(),
+            store: output.output.path(),
+            files: [&output.report, mesh].into_iter().flatten().map(PathBuf::as_path).collect(),
+            overwrite: output.overwrite,
+        };
+        outputs.check()?;
         let resources = config::resources(&args.job.resources, args.job.output.output.path())?;
         let console = Arc::new(Console::new(Voice::of(args.job.output.quiet, args.job.output.verbose)));
         let Read { sets, volume } = read_sets(&args, &console, &cancel)?;

@@ -3,18 +3,24 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::console::Console;
 use super::text::number;
 use super::values::Crop;
 use crate::error::{Error, Result};
+use crate::exec::Progress;
 use crate::grid::{Box3, Geometry, PointCloud};
 use crate::io::points::read_cloud;
 use crate::io::stacks::{self, Select, Stack, StackInfo};
+use crate::pipeline::marks::split;
+use crate::pipeline::segment::{Grids, check_marks, crossed};
 
 /// A stack and where it lies.
 pub(super) struct OpenStack {
     pub(super) stack: Box<dyn Stack>,
     /// The grid of the whole stack.
     pub(super) geometry: Geometry,
+    /// The axes along which the spacing was guessed.
+    pub(super) guessed: [bool; 3],
     /// What the user should know about how the file was understood.
     pub(super) notes: Vec<String>,
 }
@@ -34,9 +40,10 @@ pub(super) fn open_stack(path: &Path, select: Select, spacing: Option<[f64; 3]>)
         .at(path));
     }
     let mut notes: Vec<String> = info.notes.iter().map(|note| format!("{}: {note}", path.display())).collect();
+    let guessed = info.spacing.map(|told| told.is_none() && spacing.is_none());
     let spacing = spacing.unwrap_or_else(|| file_spacing(path, info, &mut notes));
     let geometry = Geometry { shape: info.shape, spacing, origin: [0.0; 3], unit: info.unit.clone() };
-    Ok(OpenStack { stack, geometry, notes })
+    Ok(OpenStack { stack, geometry, guessed, notes })
 }
 
 /// The file's spacing; what it does not tell is guessed, with a note.
@@ -122,6 +129,27 @@ impl Marks {
         self.cloud.positions.extend(cloud.positions);
         self.cloud.contours.extend(cloud.contours);
     }
+}
+
+/// Says what is odd about the marks; refuses them where no object's fit the image. Whether there are several objects.
+pub(super) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: usize, console: &Console) -> Result<bool> {
+    let objects = split(&marks.cloud);
+    let (mut bad, several) = (Vec::new(), objects.len() + seeds > 1);
+    for object in &objects {
+        let label = object.object;
+        match check_marks(object, grids) {
+            Ok(notes) => notes.iter().for_each(|note| console.note(note)),
+            Err(error) => bad.push(error.at(&marks.files[&label])),
+        }
+        for number in crossed(object, grids.part) {
+            console.note(&format!("outline {number} of object {label} crosses itself: are its marks in order?"));
+        }
+    }
+    // One of several that does not fit is refused by itself.
+    if seeds == 0 && bad.len() == objects.len() && !bad.is_empty() {
+        return Err(bad.swap_remove(0));
+    }
+    Ok(several)
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ mod measure;
 mod middle;
 mod middle_args;
 mod neighbours_report;
+mod outputs;
 mod picture;
 mod reconstruct;
 mod reconstruct_args;

@@ -11,6 +11,7 @@ use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::files::{export_mesh, mesh_format};
 use super::grid::check_counts;
+use super::outputs::Outputs;
 use super::reconstruct_args::ReconstructArgs;
 use super::report::{Hausdorff, Hole, Moves, Ran, Report};
 use super::text::{bytes, duration, grouped, number, triple};
@@ -77,7 +78,13 @@ impl Job {
         let settings = config::reconstruct_settings(&args.motion, args.distance.method)?;
         let spacing = config::spacing("--spacing", args.grid.spacing)?;
         config::check_ranks(args.ranks)?;
-        config::check_outputs(&args.output.output, &[&args.output.report, &args.mesh], args.output.overwrite)?;
+        let outputs = Outputs {
+            inputs: vec![&args.cloud],
+            store: args.output.output.path(),
+            files: [&args.output.report, &args.mesh].into_iter().flatten().map(PathBuf::as_path).collect(),
+            overwrite: args.output.overwrite,
+        };
+        outputs.check()?;
         args.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));

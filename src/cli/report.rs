@@ -59,10 +59,14 @@ pub(super) struct Solver {
     method: &'static str,
     #[serde(flatten)]
     motion: Moves,
-    rho: f64,
+    image_model: &'static str,
+    start: &'static str,
+    /// Null when it follows from what each object shows; it is then in the results.
+    rho: Option<f64>,
     k: f64,
     smoothing: &'static str,
-    sigma: f64,
+    /// Null when it follows from what each object shows.
+    sigma: Option<f64>,
     /// Null when it was found for each object; it is then in the results.
     beta: Option<f64>,
     edge: &'static str,
@@ -241,13 +245,15 @@ impl Solver {
         Self {
             method: settings.method.name(),
             motion: Moves::new(&settings.motion, geometry),
-            rho: settings.motion.rho,
+            image_model: settings.image.name(),
+            start: settings.start.name(),
+            rho: settings.rho,
             k: settings.k,
             smoothing: match settings.smoothing {
                 Smoothing::Gaussian => "gaussian",
                 Smoothing::Heat => "heat",
             },
-            sigma: settings.sigma_on(geometry),
+            sigma: settings.sigma,
             beta: settings.beta,
             edge: if settings.motion.normalised { "normalised" } else { "plain" },
             caps: settings.caps,

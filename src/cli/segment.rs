@@ -8,7 +8,8 @@ use super::args::SegmentArgs;
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::files::{export_mesh, mesh_format};
-use super::input::{Marks, crop_box, open_stack, read_marks};
+use super::input::{Marks, crop_box, look_at_marks, open_stack, read_marks};
+use super::outputs::{Outputs, numbered};
 use super::report::{Found, Ran, Report, Settings, Solver, crop_xyz};
 use super::text::{bytes, duration, grouped, number, triple};
 use super::{picture, print, signals, table};
@@ -17,10 +18,10 @@ use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stacks::{Select, Stack};
-use crate::pipeline::marks::split;
+use crate::pipeline::marks::{split, split_and_seed};
 use crate::pipeline::segment::{
-    Estimate, Guides, Outcome, Refused, SegmentSettings, check_marks, check_seed, check_smoothing, crossed, estimate,
-    segment,
+    Estimate, Grids, Guides, ImageModel, ObjectReport, Outcome, Refused, SegmentSettings, check_lengths, check_seed,
+    check_smoothing, estimate, segment,
 };
 use crate::store::free_space;
 
@@ -69,11 +70,18 @@ impl Job {
         let cancel = signals::cancel_on_signals()?;
         let settings = config::settings(&args)?;
         let spacing = config::spacing("--image-spacing", args.picture.image_spacing)?;
-        config::check_outputs(
-            &args.output.output,
-            &[&args.output.report, &args.output.mesh, &args.output.picture],
-            args.output.overwrite,
-        )?;
+        let output = &args.output;
+        let outputs = Outputs {
+            inputs: std::iter::once(&args.image).chain(&args.points).map(PathBuf::as_path).collect(),
+            store: output.store(),
+            files: [&output.report, &output.mesh, &output.picture]
+                .into_iter()
+                .flatten()
+                .map(PathBuf::as_path)
+                .collect(),
+            overwrite: output.overwrite,
+        };
+        outputs.check()?;
         args.output.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = config::resources(&args.resources, args.output.store())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
@@ -83,14 +91,13 @@ impl Job {
         let crop = crop_box(args.picture.crop, opened.geometry.shape)?;
         let marks = read_marks(&args.points)?;
         let geometry = opened.geometry.crop(&crop);
-        for object in split(&marks.cloud) {
-            let checked = check_marks(&object, &geometry);
-            let file = &marks.files[&object.object];
-            checked.map_err(|error| error.at(file))?.iter().for_each(|note| console.note(note));
-            for number in crossed(&object, &geometry) {
-                let label = object.object;
-                console.note(&format!("outline {number} of object {label} crosses itself: are its marks in order?"));
-            }
+        check_lengths(&settings, &geometry)?;
+        let grids = Grids { whole: &opened.geometry, part: &geometry, guessed: opened.guessed };
+        let several = look_at_marks(&marks, &grids, args.seed.len(), &console)?;
+        if let Some(path) = args.output.mesh.as_deref().filter(|_| several) {
+            let objects = split_and_seed(&marks.cloud, &args.seed);
+            let meshes: Vec<PathBuf> = objects.iter().map(|object| numbered(path, object.object)).collect();
+            Outputs { store: None, files: meshes.iter().map(PathBuf::as_path).collect(), ..outputs }.check()?;
         }
         check_smoothing(&settings, &geometry)?;
         args.seed.iter().try_for_each(|seed| check_seed(seed, &geometry))?;
@@ -230,6 +237,11 @@ impl Job {
             self.console.note(&format!("object {label}: {off} {verb} more than a voxel from the surface"));
         }
         for object in &outcome.objects {
+            self.tell_odd(object, outcome.label_voxels.get(&object.label).copied().unwrap_or(0));
+            if self.settings.cross_validate && object.cross_validation.is_none() {
+                let label = object.label;
+                self.console.note(&format!("object {label}: --cross-validate needs three outlines in parallel planes"));
+            }
             let Some(found) = object.cross_validation else { continue };
             let next = found.next_slice.map_or(String::new(), |(axis, slice)| {
                 format!("; the next outline helps most on slice {slice} across {}", ["x", "y", "z"][axis])
@@ -242,12 +254,29 @@ impl Job {
         }
     }
 
+    /// What a good result would not show.
+    fn tell_odd(&self, object: &ObjectReport, voxels: u64) {
+        let (label, pieces) = (object.label, object.measures.components);
+        if voxels == 0 {
+            self.console.note(&format!("object {label}: all of its voxels went to others that lie where it does"));
+        }
+        if pieces > 1 {
+            self.console.note(&format!("object {label}: its surface is in {pieces} pieces"));
+        }
+        if self.settings.image == ImageModel::Auto && self.settings.uses_image() && object.image_model == "none" {
+            self.console.note(&format!(
+                "object {label}: the image shows no border at its outlines, which alone decide; are they where they were \
+                 drawn (--image-spacing, --channel, the order of x, y, z)?"
+            ));
+        }
+    }
+
     /// The files beside the store.
     fn write_copies(&self, engine: &Engine, outcome: &Outcome, folder: &Path) -> Result<()> {
         let output = &self.args.output;
         if let Some(path) = &output.mesh {
             for object in &outcome.objects {
-                let several = outcome.objects.len() > 1;
+                let several = outcome.objects.len() + outcome.refused.len() > 1;
                 let name = if several { format!("object-{}.ply", object.label) } else { "surface.ply".into() };
                 let target = if several { numbered(path, object.label) } else { path.clone() };
                 export_mesh(&folder.join("meshes").join(name), &target)?;
@@ -307,10 +336,10 @@ impl Job {
             triple(g.spacing),
             triple(g.origin),
             number(s.motion.theta),
-            number(s.motion.rho),
+            s.rho.map_or("automatic".into(), number),
             number(s.motion.delta_on(g)),
             number(s.k),
-            number(s.sigma_on(g)),
+            s.sigma.map_or("automatic".into(), number),
             s.beta.map_or("automatic".into(), number),
             number(s.motion.tau_on(g)),
             number(s.motion.epsilon_on(g)),
@@ -352,27 +381,9 @@ fn refusal(refused: &[Refused], solved: usize) -> Error {
     Error::partly(format!("{} of {all} objects could not be solved: {}", refused.len(), reasons.join("\n")))
 }
 
-/// `FILE.ply` as `FILE-3.ply`.
-fn numbered(path: &Path, label: u32) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let extension = path.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
-    path.with_file_name(format!("{stem}-{label}{extension}"))
-}
-
 impl super::args::OutputArgs {
     /// The store's path, where there is to be one.
     pub(super) fn store(&self) -> Option<&Path> {
         self.output.path()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn several_meshes_are_numbered() {
-        assert_eq!(numbered(Path::new("a/b.ply"), 3), Path::new("a/b-3.ply"));
-        assert_eq!(numbered(Path::new("b"), 12), Path::new("b-12"));
     }
 }

@@ -56,6 +56,7 @@ fn help_and_version_are_complete() {
 #[test]
 fn wrong_usage_is_told_with_code_2() {
     let bench = Bench::new(&Ball::small());
+    bench.write("plain.txt", "plain");
     for (arguments, reason) in [
         ("segment", "--points"),
         ("segment image.tif --points marks.csv", "--output"),
@@ -82,10 +83,12 @@ fn wrong_usage_is_told_with_code_2() {
         ("segment image.tif --points marks.csv -o out/x.zarr --scratch nowhere", "--scratch"),
         ("segment image.tif --points marks.csv -o nowhere/x.zarr", "create it first"),
         ("segment image.tif --points marks.csv -o out/x.zarr --report nowhere/r.json", "create it first"),
-        ("segment image.tif --points marks.csv -o out/x.zarr --mesh marks.csv", "--overwrite"),
+        ("segment image.tif --points marks.csv -o out/x.zarr --beta 1e9", "--beta is 1000000000"),
+        ("segment image.tif --points marks.csv -o out/x.zarr --fill-gaps 1e9", "--fill-gaps is 1000000000"),
+        ("segment image.tif --points marks.csv -o out/x.zarr --image-spacing 1,1,1e9", "give --image-spacing"),
         ("segment image.tif --points marks.csv -o out/x.zarr --mesh /dev/null --overwrite", "no regular file"),
         ("segment image.tif --points marks.csv -o scratch", "exists already"),
-        ("segment image.tif --points marks.csv -o marks.csv --overwrite", "no Zarr store"),
+        ("segment image.tif --points marks.csv -o plain.txt --overwrite", "no Zarr store"),
         ("info nothing", "no such file"),
     ] {
         let complaint = bench.fail(arguments, 2);
@@ -111,7 +114,6 @@ fn unusable_marks_are_told_with_code_2() {
     for (marks, reason) in [
         (String::new(), "no point"),
         (format!("{one}\n"), "object 1 has one point"),
-        (format!("{rows}7,1,1,1,1\n7,1,2,1,1\n"), "object 7 has 2 points"),
         (format!("{rows}1,4,nan,1,1\n"), "line "),
         (scaled([2.0, 2.0, 1.0]), "multiply them by the spacing (0.5, 0.5, 1)"),
         (scaled([1e3; 3]), "divided by 1000"),
@@ -160,6 +162,30 @@ fn unusable_images_are_told_with_code_2() {
     }
     // The marks alone are enough when the image has no say.
     bench.succeed("segment constant.tif --points marks.csv -o none --rho 0");
+}
+
+#[test]
+fn inputs_are_never_outputs() {
+    let bench = Bench::new(&Ball::small());
+    fs::copy(bench.path("marks.csv"), bench.path("scan.csv")).unwrap();
+    std::os::unix::fs::symlink(bench.path("image.tif"), bench.path("out/link.tif")).unwrap();
+    let before = ["image.tif", "marks.csv", "scan.csv"].map(|name| fs::read(bench.path(name)).unwrap());
+    for arguments in [
+        "segment image.tif --points marks.csv -o none --report marks.csv",
+        "segment image.tif --points marks.csv -o none --picture out/link.tif",
+        "segment image.tif --points marks.csv -o image.tif",
+        "segment image.tif --points scan.csv --points marks.csv -o none --mesh out/../scan.csv",
+        "distance scan.csv -o none --report out/../scan.csv",
+        "distance scan.csv --like image.tif -o none --report image.tif",
+        "reconstruct scan.csv -o none --report scan.csv",
+    ] {
+        for overwrite in ["", " --overwrite"] {
+            let complaint = bench.fail(&format!("{arguments} -q{overwrite}"), 2);
+            assert!(complaint.contains("is an input of this run"), "{arguments}{overwrite}: {complaint}");
+            assert_eq!(complaint.lines().count(), 1, "{complaint}");
+        }
+    }
+    assert!(before == ["image.tif", "marks.csv", "scan.csv"].map(|name| fs::read(bench.path(name)).unwrap()));
 }
 
 #[test]
@@ -304,6 +330,10 @@ fn nested_objects_become_rings_and_files_number_on() {
     bench.succeed("segment image.tif --points both.csv -q -o out/both.zarr --rho 0");
     same(&contents(&bench.path("out/files.zarr")), &contents(&bench.path("out/both.zarr")), "files or one file");
     assert_eq!(bench.entries("out"), ["both.zarr", "files.zarr", "m-1.ply", "m-2.ply"]);
+    let meshes = fs::read(bench.path("out/m-1.ply")).unwrap();
+    let complaint = bench.fail("segment image.tif --points both.csv -q -o none --mesh out/m.ply", 2);
+    assert!(complaint.contains("m-1.ply") && complaint.contains("--overwrite"), "{complaint}");
+    assert_eq!(fs::read(bench.path("out/m-1.ply")).unwrap(), meshes);
     let shape = outer.geometry.shape;
     let labels = volume(&bench.path("out/both.zarr/labels/segmentation"));
     let ring = dice(&labels, 1.0, shape, |v| outer.holds(v) && !inner.holds(v));

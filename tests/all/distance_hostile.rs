@@ -239,6 +239,7 @@ fn grids_that_make_no_sense_are_refused() {
 #[test]
 fn settings_that_contradict_are_refused() {
     let bench = Bench::bare();
+    bench.write("there.json", "{}");
     bench.write("a.xyz", "0 0 0\n1 1 1\n");
     for (flags, word) in [
         ("--signed", "--signed"),
@@ -249,7 +250,7 @@ fn settings_that_contradict_are_refused() {
         ("--scratch nowhere", "--scratch"),
         ("--report nowhere/r.json", "create it first"),
         ("--report /dev/null --overwrite", "no regular file"),
-        ("--report a.xyz", "--overwrite"),
+        ("--report there.json", "--overwrite"),
     ] {
         let complaint = refusal(&bench, &format!("distance a.xyz --spacing 0.1 {flags} -q -o out/x.zarr"), 2);
         assert!(complaint.contains(word), "{flags}: {complaint}");

@@ -213,6 +213,22 @@ fn what_is_wrong_with_marks_is_told() {
     assert_eq!(report["result"]["refused"][0]["label"], 2);
     assert!(!bench.path("out/bad.zarr/meshes/object-2.ply").exists() && bench.path("out/bad.zarr/meshes").exists());
     assert!(dice(&volume(&bench.path("out/bad.zarr/labels/segmentation")), is_ball) > 0.95);
+    bench.write("two.csv", &format!("{good}7,1,1,1,1\n7,1,2,1,1\n"));
+    let complaint = bench.fail("segment image.tif --points two.csv -q -o none", 3);
+    assert!(complaint.contains("object 7 has 2 points"), "{complaint}");
+    // What is missing in the table is told.
+    let columns = |names: &str, kept: [usize; 4]| {
+        let rows = good.lines().skip(1).map(|line| line.split(',').collect::<Vec<_>>());
+        rows.fold(format!("{names}\n"), |text, row| text + &kept.map(|n| row[n]).join(",") + "\n")
+    };
+    bench.write("slice.csv", &columns("slice,x,y,z", [1, 2, 3, 4]));
+    let complaint = bench.fail("segment image.tif --points slice.csv -q -o none", 2);
+    assert!(complaint.contains("a column named contour"), "{complaint}");
+    bench.write("same.csv", &columns("contour,x,y,z", [0, 2, 3, 4]));
+    let complaint = bench.fail("segment image.tif --points same.csv -q -o none", 2);
+    assert!(complaint.contains("contour 1 of object 1 lies in no plane"), "{complaint}");
+    let complaint = bench.fail("segment image.tif --points bad.csv --crop 0:5,0:5,: -q -o none", 2);
+    assert!(complaint.contains("--crop leaves out"), "{complaint}");
     // An outline that crosses itself is told by its number.
     let mut lines: Vec<&str> = good.lines().collect();
     lines.swap(3, 8);

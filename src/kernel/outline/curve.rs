@@ -164,6 +164,16 @@ impl Curve {
     }
 }
 
+impl Curve {
+    /// Whether both curves run within `apart` of each other all along.
+    #[must_use]
+    pub fn repeats(&self, other: &Self, apart: f64) -> bool {
+        let near = |p: &[f64; 2], of: &Self| of.points.iter().any(|q| distance(*p, *q) <= apart);
+        let follows = |a: &Self, b: &Self| a.points.iter().step_by(3).all(|p| near(p, b));
+        follows(self, other) && follows(other, self)
+    }
+}
+
 /// The longest outline that is made round, in widths.
 const LONGEST: f64 = 10.0;
 

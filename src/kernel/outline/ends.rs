@@ -38,6 +38,12 @@ impl Ends {
         Some(Self { normal: first.plane.normal, marked: [first.plane.offset, last.plane.offset], height, reach })
     }
 
+    /// How far the object reaches along the normal, at the most.
+    #[must_use]
+    pub fn extent(&self) -> f64 {
+        self.marked[1] - self.marked[0] + self.reach[0] + self.reach[1]
+    }
+
     /// How far beyond its sections an object may reach at the farthest.
     #[must_use]
     pub fn height(&self) -> f64 {

@@ -15,6 +15,10 @@ pub struct Plane {
 /// Outlines whose normals differ by less than this angle's cosine are parallel (about half a degree).
 const PARALLEL: f64 = 0.999_96;
 
+/// Points that scatter around a plane lie so many tolerances from it at most, and in the root mean square. Those of two
+/// neighbouring slices do not.
+const LOOSE: [f64; 2] = [2.0, 0.7];
+
 impl Plane {
     fn new(normal: [f64; 3], offset: f64) -> Self {
         let largest = (0..3).max_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs())).unwrap_or(0);
@@ -26,8 +30,9 @@ impl Plane {
         Self { normal, offset: sign * offset, axes: [first, cross(normal, first)] }
     }
 
-    /// The plane of a closed outline, if it is flat within `tolerance` of an axis' planes (a length for each axis), or
-    /// within the smallest of these of any plane.
+    /// The plane of a closed outline: of an axis, if it is flat within half of `tolerance` (a length for each axis); else
+    /// its own, if it is flat within the smallest of these in that, or the axis' again, if it is only loosely flat there
+    /// and hardly flatter in its own: its points scatter.
     #[must_use]
     pub fn of(outline: &[[f64; 3]], tolerance: [f64; 3]) -> Option<Self> {
         if outline.len() < 3 {
@@ -36,8 +41,9 @@ impl Plane {
         let count = outline.len() as f64;
         let mean: [f64; 3] = std::array::from_fn(|a| outline.iter().map(|p| p[a]).sum::<f64>() / count);
         let flat = |axis: &usize| outline.iter().all(|p| (p[*axis] - mean[*axis]).abs() <= 0.5 * tolerance[*axis]);
+        let across = |axis: usize| Self::new(std::array::from_fn(|a| if a == axis { 1.0 } else { 0.0 }), mean[axis]);
         if let Some(axis) = [2, 1, 0].into_iter().find(flat) {
-            return Some(Self::new(std::array::from_fn(|a| if a == axis { 1.0 } else { 0.0 }), mean[axis]));
+            return Some(across(axis));
         }
         // Newell's normal: the sum of the areas that the edges span with a point.
         let area = outline.iter().enumerate().fold([0.0; 3], |sum, (n, &p)| {
@@ -48,7 +54,19 @@ impl Plane {
         let plane = Self::new(normal, dot(normal, mean));
         let smallest = tolerance.into_iter().fold(f64::INFINITY, f64::min);
         let is_flat = normal != [0.0; 3] && outline.iter().all(|&p| plane.height(p).abs() <= smallest);
-        is_flat.then_some(plane)
+        let scatter =
+            |off: &dyn Fn(&[f64; 3]) -> f64| (outline.iter().map(|p| off(p).powi(2)).sum::<f64>() / count).sqrt();
+        let own = scatter(&|&p| plane.height(p));
+        let loosely = |axis: &usize| {
+            let off = |p: &[f64; 3]| p[*axis] - mean[*axis];
+            let most = outline.iter().map(|p| off(p).abs()).fold(0.0, f64::max);
+            let around = scatter(&off);
+            most <= LOOSE[0] * tolerance[*axis] && around <= LOOSE[1] * tolerance[*axis] && own > 0.5 * around
+        };
+        match [2, 1, 0].into_iter().find(loosely) {
+            Some(axis) => Some(across(axis)),
+            None => (is_flat && own <= LOOSE[1] * smallest).then_some(plane),
+        }
     }
 
     /// How far a point lies from the plane, along its normal.
@@ -103,5 +121,20 @@ mod tests {
         assert!(!plane.is_parallel_to(&Plane::of(&flat, tolerance).unwrap()));
         assert!(Plane::of(&circle(&|a, b| [a, b, a * b]), tolerance).is_none(), "a saddle is no plane");
         assert!(Plane::of(&[[0.0; 3], [1.0, 1.0, 1.0], [2.0, 2.0, 2.0]], tolerance).is_none(), "a line has none");
+    }
+
+    #[test]
+    fn points_that_scatter_are_in_their_slice_and_two_slices_are_none() {
+        let off = [0.3, -0.2, 0.1, -0.4, 0.25, 0.0, -0.3, 0.4, -0.15, 0.1, 0.35, -0.25];
+        let ring = |height: &dyn Fn(usize) -> f64| -> Vec<[f64; 3]> {
+            let at = |n: usize| n as f64 * std::f64::consts::TAU / 12.0;
+            (0..12).map(|n| [9.0 * at(n).cos(), 9.0 * at(n).sin(), height(n)]).collect()
+        };
+        let plane = Plane::of(&ring(&|n| 4.0 + off[n]), [0.5; 3]).unwrap();
+        assert_eq!(plane.normal, [0.0, 0.0, 1.0]);
+        assert_eq!(Plane::of(&ring(&|n| 4.0 + (n % 2) as f64), [0.5; 3]), None);
+        let tilted =
+            Plane::of(&ring(&|n| 4.0 + 0.9 * (n as f64 * std::f64::consts::TAU / 12.0).cos()), [0.5; 3]).unwrap();
+        assert!(tilted.normal[2] < 1.0);
     }
 }

@@ -1,5 +1,6 @@
 //! Do the marks fit the image? Wrong units and wrong axes are the mistakes that happen, and each can be told.
 
+use super::neighbours::FillGaps;
 use super::settings::SegmentSettings;
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
@@ -12,11 +13,47 @@ const FEWEST_POINTS: usize = 4;
 /// When this part of an object's marks would fit under another reading, that reading is offered.
 const FITTING: f64 = 0.9;
 
+/// Grids that marks are looked at on.
+#[derive(Clone, Copy, Debug)]
+pub struct Grids<'a> {
+    /// That of the image.
+    pub whole: &'a Geometry,
+    /// That of the part of it that is segmented.
+    pub part: &'a Geometry,
+    /// The axes along which the spacing is a guess.
+    pub guessed: [bool; 3],
+}
+
 /// Checks one object's marks against the grid of the image; returns what the user should know all the same.
 ///
 /// # Errors
 /// With too few marks, when more than half of them lie outside of the image, or when they look like voxel indices.
-pub fn check_marks(marks: &ObjectMarks, image: &Geometry) -> Result<Vec<String>> {
+pub fn check_marks(marks: &ObjectMarks, grids: &Grids<'_>) -> Result<Vec<String>> {
+    let mut notes = check_on(marks, grids.whole, grids.guessed)?;
+    let (object, points) = (marks.object, marks.contours.concat());
+    if let Some(point) = points.iter().find(|&&p| is_far(grids.whole, p)) {
+        return Err(Error::input(format!(
+            "the mark ({}, {}, {}) of object {object} lies farther from the image than this is long ({}); correct it, or \
+             leave it out",
+            brief(point[0]),
+            brief(point[1]),
+            brief(point[2]),
+            spans(&extent(grids.whole), grids.whole)
+        )));
+    }
+    if grids.part.shape != grids.whole.shape {
+        let outside = points.iter().filter(|&&p| !holds(grids.part, p)).count();
+        if 2 * outside > points.len() {
+            return Err(Error::input(format!("--crop leaves out most marks of object {object}; widen it")));
+        }
+        if outside > 0 {
+            notes.push(format!("--crop leaves out {outside} of the {} marks of object {object}", points.len()));
+        }
+    }
+    Ok(notes)
+}
+
+fn check_on(marks: &ObjectMarks, image: &Geometry, guessed: [bool; 3]) -> Result<Vec<String>> {
     let points = marks.contours.concat();
     let object = marks.object;
     if points.len() < FEWEST_POINTS {
@@ -26,7 +63,7 @@ pub fn check_marks(marks: &ObjectMarks, image: &Geometry) -> Result<Vec<String>>
         )));
     }
     let outside = points.iter().filter(|&&p| !holds(image, p)).count();
-    let hint = other_reading(&points, image);
+    let hint = wrong_guess(&points, image, guessed).or_else(|| other_reading(&points, image));
     if 2 * outside > points.len() || (outside > 0 && hint.is_some() && whole_numbers(&points)) {
         let advice = hint.unwrap_or(
             "give physical coordinates (voxel index times spacing), or correct the spacing with --image-spacing".into(),
@@ -80,6 +117,35 @@ pub fn check_seed(seed: &Seed, image: &Geometry) -> Result<()> {
     )))
 }
 
+/// Spacings may differ by this factor: more is a slip, and lengths along one axis would be that many voxels along another.
+const LONGEST_VOXEL: f64 = 1000.0;
+/// Gaps are filled up to so many smallest spacings.
+const WIDEST_GAP: f64 = 64.0;
+
+/// Checks lengths of the settings against the image's.
+///
+/// # Errors
+/// When voxels are needles, or a length is out of all proportion to the image.
+pub fn check_lengths(settings: &SegmentSettings, image: &Geometry) -> Result<()> {
+    let (h, most) = (image.min_spacing(), image.length(image.shape));
+    if image.max_spacing() > LONGEST_VOXEL * h {
+        return Err(Error::input(format!(
+            "the image's spacing is {}: voxels so much longer than wide cannot be right; give --image-spacing HX,HY,HZ",
+            triple(image.spacing)
+        )));
+    }
+    if let Some(beta) = settings.beta.filter(|&beta| beta > most) {
+        return Err(Error::usage(format!("--beta is {beta}, and the image no longer than {most:.3}; give less")));
+    }
+    match settings.fill_gaps {
+        Some(FillGaps::Width(width)) if width > WIDEST_GAP * h => Err(Error::usage(format!(
+            "--fill-gaps is {width}; gaps are filled up to {} wide, {WIDEST_GAP} of the smallest spacing",
+            WIDEST_GAP * h
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Checks that the image can be smoothed as wanted.
 ///
 /// # Errors
@@ -111,8 +177,34 @@ fn holds(image: &Geometry, point: [f64; 3]) -> bool {
     (0..3).all(|a| voxel[a] >= -0.5 - 1e-6 && voxel[a] <= image.shape[a] as f64 - 0.5 + 1e-6)
 }
 
+/// True farther away than the image is long.
+fn is_far(image: &Geometry, point: [f64; 3]) -> bool {
+    let [low, high] = extent(image);
+    let longest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);
+    (0..3).any(|a| !(low[a] - longest..=high[a] + longest).contains(&point[a]))
+}
+
+/// A number in few characters, however large.
+fn brief(value: f64) -> String {
+    if value.abs() < 1e7 { short(value).to_string() } else { format!("{value:e}") }
+}
+
 fn whole_numbers(points: &[[f64; 3]]) -> bool {
     points.iter().flatten().all(|v| v.fract() == 0.0)
+}
+
+/// That the marks lie outside along axes alone whose spacing was guessed.
+fn wrong_guess(points: &[[f64; 3]], image: &Geometry, guessed: [bool; 3]) -> Option<String> {
+    let leaves = |a: usize| {
+        let last = image.shape[a] as f64 - 0.5;
+        points.iter().any(|&p| !(-0.5 - 1e-6..=last + 1e-6).contains(&image.to_voxels(p)[a]))
+    };
+    let axes: Vec<usize> = (0..3).filter(|&a| leaves(a)).collect();
+    let names: Vec<&str> = axes.iter().map(|&a| ["x", "y", "z"][a]).collect();
+    (!axes.is_empty() && axes.iter().all(|&a| guessed[a])).then(|| {
+        let along = names.join(" and ");
+        format!("the spacing along {along} is a guess, as the file does not tell it: give --image-spacing HX,HY,HZ")
+    })
 }
 
 /// What the marks would mean if they were read in another unit or order, where they would fit then.
@@ -171,12 +263,13 @@ mod tests {
     }
 
     fn said(points: Vec<[f64; 3]>, spacing: [f64; 3]) -> String {
-        check_marks(&marks(points), &image(spacing)).unwrap_err().to_string()
+        check_on(&marks(points), &image(spacing), [false; 3]).unwrap_err().to_string()
     }
 
     #[test]
     fn marks_in_the_image_pass_in_silence() {
-        let notes = check_marks(&marks(ring([25.0, 20.0, 20.0], [10.0, 10.0])), &image([0.5, 0.5, 1.0])).unwrap();
+        let notes =
+            check_on(&marks(ring([25.0, 20.0, 20.0], [10.0, 10.0])), &image([0.5, 0.5, 1.0]), [false; 3]).unwrap();
         assert!(notes.is_empty(), "{notes:?}");
     }
 
@@ -195,21 +288,43 @@ mod tests {
     }
 
     #[test]
+    fn a_guessed_spacing_is_doubted_before_the_marks_are() {
+        let above = ring([25.0, 20.0, 60.0], [10.0, 10.0]);
+        let told = |guessed| check_on(&marks(above.clone()), &image([0.5, 0.5, 1.0]), guessed).unwrap_err().to_string();
+        assert!(
+            told([false, false, true]).ends_with(
+                "the spacing along z is a guess, as the file does not tell it: give --image-spacing HX,HY,HZ"
+            )
+        );
+        assert!(!told([true, true, false]).contains("guess"));
+    }
+
+    #[test]
+    fn a_mark_far_away_is_named() {
+        let mut points = ring([25.0, 20.0, 20.0], [10.0, 10.0]);
+        points.push([25.0, 20.0, 1e9]);
+        let whole = image([0.5, 0.5, 1.0]);
+        let grids = Grids { whole: &whole, part: &whole, guessed: [false; 3] };
+        let text = check_marks(&marks(points), &grids).unwrap_err().to_string();
+        assert!(text.contains("the mark (25, 20, 1e9) of object 3 lies farther"), "{text}");
+    }
+
+    #[test]
     fn whole_numbers_that_reach_out_are_voxel_indices_even_when_few_do() {
         let mut points: Vec<[f64; 3]> = (0..20).map(|n| [f64::from(n % 24), f64::from(n % 7), 3.0]).collect();
         points.push([90.0, 10.0, 3.0]);
         assert!(said(points.clone(), [0.25, 0.25, 1.0]).contains("voxel indices"));
         points.pop();
-        let notes = check_marks(&marks(points.clone()), &image([0.25, 0.25, 1.0])).unwrap();
+        let notes = check_on(&marks(points.clone()), &image([0.25, 0.25, 1.0]), [false; 3]).unwrap();
         assert!(notes[0].contains("whole numbers"), "{notes:?}");
-        assert!(check_marks(&marks(points), &image([1.0; 3])).unwrap().is_empty());
+        assert!(check_on(&marks(points), &image([1.0; 3]), [false; 3]).unwrap().is_empty());
     }
 
     #[test]
     fn a_few_outside_are_noted_and_too_few_refused() {
         let mut points = ring([25.3, 20.0, 20.0], [10.0, 10.0]);
         points.push([80.5, 10.0, 10.0]);
-        let notes = check_marks(&marks(points), &image([0.5, 0.5, 1.0])).unwrap();
+        let notes = check_on(&marks(points), &image([0.5, 0.5, 1.0]), [false; 3]).unwrap();
         assert_eq!(notes, ["1 mark lies outside of the image (object 3, 25 in all)"]);
         assert!(said(vec![[1.0; 3]], [1.0; 3]).starts_with("object 3 has one point;"));
         assert!(said(vec![[1.0; 3]; 3], [1.0; 3]).starts_with("object 3 has 3 points;"));

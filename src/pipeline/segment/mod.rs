@@ -24,7 +24,7 @@ mod speed;
 mod survey;
 mod tissue;
 
-pub use check::{check_marks, check_seed, check_smoothing};
+pub use check::{Grids, check_lengths, check_marks, check_seed, check_smoothing};
 pub use estimate::{Estimate, estimate};
 pub use labels::{Overlap, Placed};
 pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_faces, join};

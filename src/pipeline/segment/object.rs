@@ -1,5 +1,6 @@
 //! One object: from its marks to the segmentation function on a box of its own.
 
+use super::outlines::not_flat;
 use super::reach::first_reach;
 use super::seed::grow;
 use super::settings::{ImageModel, SegmentSettings, Start};
@@ -145,7 +146,7 @@ pub(super) fn solve<T: Element>(
     let enclosure = match enclose(engine, &search)? {
         Found::Enclosed(enclosure) => enclosure,
         Found::Leaks(saddle) => return Err(leak(marks, settings, saddle, picture.geometry)),
-        Found::Nothing => return Err(encloses_nothing(marks)),
+        Found::Nothing => return Err(encloses_nothing(marks, picture.geometry)),
     };
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
     let beta = enclosure.beta;
@@ -292,8 +293,21 @@ fn leak(marks: &ObjectMarks, settings: &SegmentSettings, saddle: f32, image: &Ge
     ))
 }
 
-fn encloses_nothing(marks: &ObjectMarks) -> Error {
+fn encloses_nothing(marks: &ObjectMarks, image: &Geometry) -> Error {
     let object = marks.object;
+    if !marks.drawn {
+        return Error::input(format!(
+            "the points of object {object} enclose nothing at this spacing; where they are outlines, give each a number in \
+             a column named contour (object,contour,x,y,z): without it they are one loose cloud, which needs points all \
+             around"
+        ));
+    }
+    if let Some(number) = not_flat(marks, image) {
+        return Error::input(format!(
+            "contour {number} of object {object} lies in no plane, so it is no outline, and as points its marks enclose \
+             nothing; give the outline of each slice a contour number of its own"
+        ));
+    }
     Error::input(format!(
         "the marks of object {object} enclose nothing at this spacing; mark its border all around, on every few \
          slices, in the order of the contour"

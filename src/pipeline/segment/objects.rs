@@ -1,5 +1,6 @@
 //! All objects: looked at together, solved each for itself, small ones side by side; their surfaces drawn and checked.
 
+use super::check::{Grids, check_marks};
 use super::cross_validate::cross_validate;
 use super::object::{ObjectReport, Picture, Solution, solve};
 use super::outlines::scatter_of;
@@ -32,7 +33,7 @@ pub(super) struct Objects {
     pub refused: Vec<Refused>,
 }
 
-/// Solves all objects. They are solved on a grid whose first voxel is the origin, so that where the image lies in the
+/// Solves all objects; `whole` is the grid of the image that the picture is a part of. They are solved on a grid whose first voxel is the origin, so that where the image lies in the
 /// world changes nothing but their place.
 ///
 /// # Errors
@@ -40,10 +41,13 @@ pub(super) struct Objects {
 pub(super) fn solve_all<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
+    whole: &Geometry,
     objects: &[ObjectMarks],
     settings: &SegmentSettings,
     store: Option<&StoreWriter>,
 ) -> Result<Objects> {
+    let several = objects.len() > 1;
+    let (objects, mut refused) = sifted(objects, &Grids { whole, part: picture.geometry, guessed: [false; 3] })?;
     let origin = picture.geometry.origin;
     let grid = Geometry { origin: [0.0; 3], ..picture.geometry.clone() };
     let picture = Picture { geometry: &grid, ..*picture };
@@ -55,7 +59,7 @@ pub(super) fn solve_all<T: Element>(
         let outlined = outlined[n].as_ref();
         let solved = solve(engine, &picture, &local[n], outlined.zip(trusts[n]), settings).and_then(|solution| {
             let solution = solution.moved(origin);
-            let mut report = draw(engine, &solution, &objects[n], store, objects.len() > 1)?;
+            let mut report = draw(engine, &solution, &objects[n], store, several)?;
             if let Some(outlined) = outlined.filter(|_| settings.cross_validate) {
                 report.cross_validation = cross_validate(engine, outlined, &grid)?;
             }
@@ -63,24 +67,40 @@ pub(super) fn solve_all<T: Element>(
         });
         match solved {
             // One object that cannot be solved does not stop the others.
-            Err(error) if error.kind() == ErrorKind::Input && objects.len() > 1 => {
+            Err(error) if error.kind() == ErrorKind::Input && several => {
                 Ok(Err(Refused { label: objects[n].object, reason: error.to_string() }))
             }
             other => other.map(Ok),
         }
     })?;
-    let (mut solved, mut refused) = (Vec::new(), Vec::new());
+    let mut solved = Vec::new();
     for object in found {
         match object {
             Ok(object) => solved.push(object),
             Err(object) => refused.push(object),
         }
     }
+    refused.sort_by_key(|refused: &Refused| refused.label);
     if solved.is_empty() {
         let reasons: Vec<String> = refused.into_iter().map(|refused| refused.reason).collect();
         return Err(Error::input(reasons.join("; ")));
     }
     Ok(Objects { solved, refused })
+}
+
+/// The objects whose marks can be those of the image, and the others. A single object that cannot is an error.
+fn sifted(objects: &[ObjectMarks], grids: &Grids<'_>) -> Result<(Vec<ObjectMarks>, Vec<Refused>)> {
+    let (mut fit, mut refused) = (Vec::new(), Vec::new());
+    for marks in objects {
+        match check_marks(marks, grids) {
+            Err(error) if marks.seed.is_none() && objects.len() > 1 => {
+                refused.push(Refused { label: marks.object, reason: error.to_string() });
+            }
+            Err(error) if marks.seed.is_none() => return Err(error),
+            _ => fit.push(marks.clone()),
+        }
+    }
+    Ok((fit, refused))
 }
 
 /// Voxels of the largest box around an object that is small: larger ones keep all cores busy.

@@ -18,6 +18,10 @@ const CURVE_STEP: f64 = 0.5;
 /// Planes nearer to each other than this part of the smallest spacing are one.
 const SAME_PLANE: f64 = 0.25;
 
+/// An outline that runs so near to another of its plane all along, in smallest spacings, is that one drawn again: what
+/// lies between both could not be seen on the grid.
+const REPEATED: f64 = 1.5;
+
 /// An outline as it was marked.
 pub(super) struct Drawn<'a> {
     plane: Plane,
@@ -45,6 +49,12 @@ fn drawn<'a>(marks: &'a ObjectMarks, image: &Geometry) -> Option<Vec<Drawn<'a>>>
     let told = (0..marks.contours.len()).filter(|&n| marks.contours[n].len() > 2 && !repeats(n));
     let found: Vec<Drawn> = told.map(|n| outline(&marks.contours[n])).collect::<Option<_>>()?;
     (!found.is_empty()).then_some(found)
+}
+
+/// The number of the first contour that is not flat.
+pub(super) fn not_flat(marks: &ObjectMarks, image: &Geometry) -> Option<i64> {
+    let numbered = marks.numbers.iter().zip(&marks.contours);
+    numbered.filter(|(_, contour)| contour.len() > 2).find(|(_, c)| plane_of(c, image).is_none()).map(|(n, _)| *n)
 }
 
 /// How the marks of all objects scatter around their outlines.
@@ -89,7 +99,13 @@ pub(super) fn drawn_by_plane<'a>(marks: &'a ObjectMarks, image: &Geometry) -> Op
 /// The section that the outlines of a plane bound; `spacing` is the smallest one.
 pub(super) fn section(outlines: &[Drawn<'_>], scatter: Scatter, spacing: f64) -> Section {
     let step = CURVE_STEP * spacing;
-    let curves = outlines.iter().map(|outline| Curve::through(&outline.in_plane, scatter, step)).collect();
+    let mut curves: Vec<Curve> = Vec::new();
+    for outline in outlines {
+        let curve = Curve::through(&outline.in_plane, scatter, step);
+        if !curves.iter().any(|before| before.repeats(&curve, REPEATED * spacing)) {
+            curves.push(curve);
+        }
+    }
     let marks = outlines.iter().flat_map(|outline| outline.marks).copied().collect();
     Section::new(outlines[0].plane, curves, marks)
 }

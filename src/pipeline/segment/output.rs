@@ -81,7 +81,9 @@ fn run<T: Sample>(
         )));
     }
     let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry };
-    let Objects { solved, refused } = solve_all(engine, &picture, &objects, settings, store)?;
+    let origin = guides.geometry.position(crop.lo.map(|v| -v));
+    let whole = Geometry { shape: stack.shape(), origin, ..guides.geometry.clone() };
+    let Objects { solved, refused } = solve_all(engine, &picture, &whole, &objects, settings, store)?;
     let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
     let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, store)?;
     let contacts = match solved.len() {

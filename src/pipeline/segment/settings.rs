@@ -23,6 +23,20 @@ pub enum ImageModel {
     None,
 }
 
+impl ImageModel {
+    /// As it is typed.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Level => "level",
+            Self::Wall => "wall",
+            Self::Edge => "edge",
+            Self::None => "none",
+        }
+    }
+}
+
 /// Where objects start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
@@ -30,6 +44,17 @@ pub enum Start {
     Auto,
     /// Where a flood from outside ends, as the papers do it.
     Flood,
+}
+
+impl Start {
+    /// As it is typed.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Flood => "flood",
+        }
+    }
 }
 
 /// What the user may set; `None` leaves a length to the image's spacing.

@@ -105,6 +105,14 @@ impl Outlined {
         Ok(Some(Self { sections, fitted, profiles, held_out }))
     }
 
+    /// Half the thickness of the body, a length: how deep its deepest section is, or half of its extent across its
+    /// sections, if that is less.
+    fn half_thickness(&self) -> f64 {
+        let depths = self.sections.iter().filter_map(Section::deepest).map(|(_, depth)| depth);
+        let depth = depths.fold(0.0, f64::max);
+        self.fitted.ends().map_or(depth, |ends| depth.min(0.5 * ends.extent()))
+    }
+
     fn deviation(&self) -> f64 {
         let curves = || self.sections.iter().flat_map(|section| &section.curves);
         curves().map(|curve| curve.deviation).sum::<f64>() / curves().count().max(1) as f64
@@ -167,6 +175,10 @@ fn profile_at(
     Ok(Profile(std::array::from_fn(|n| interpolate(values, &part, place(n)))))
 }
 
+/// Profiles of bodies thinner than twice so many smallest spacings reach out of them on the other side: they tell no
+/// border from another.
+const THIN: f64 = 3.5;
+
 /// How far each object's image and shape are trusted.
 pub(super) fn trust(
     objects: &[Option<Outlined>],
@@ -175,15 +187,18 @@ pub(super) fn trust(
     model: ImageModel,
 ) -> Vec<Option<Trust>> {
     let h = image.min_spacing();
-    let all: Vec<Profile> = objects.iter().flatten().flat_map(|o| &o.profiles).map(|s| s.profile).collect();
+    let is_thin = |object: &Outlined| object.half_thickness() < THIN * h;
+    let thick = objects.iter().flatten().filter(|object| !is_thin(object));
+    let all: Vec<Profile> = thick.flat_map(|o| &o.profiles).map(|s| s.profile).collect();
     let held_out = objects.iter().flatten().flat_map(|object| &object.held_out);
     let growth = growth(held_out, scatter, h).unwrap_or(DEFAULT_GROWTH);
     let trust = |object: &Outlined| {
         let own: Vec<Profile> = object.profiles.iter().map(|s| s.profile).collect();
-        let profiles = if own.len() < ENOUGH_PROFILES { &all } else { &own };
+        let profiles = if own.len() < ENOUGH_PROFILES && !all.is_empty() { &all } else { &own };
         let reading = match model {
             ImageModel::Level if !profiles.is_empty() => Reading::forced(profiles, false),
             ImageModel::Wall if !profiles.is_empty() => Reading::forced(profiles, true),
+            _ if is_thin(object) => Reading::of(&[]),
             _ => Reading::of(profiles),
         };
         Trust {
