@@ -1,8 +1,8 @@
 //! A smooth closed curve through noisy marks: universal kriging along the curve (Rasmussen & Williams 2006, eq. 2.41;
 //! Wahba 1990), each coordinate for itself.
 //!
-//! With the share t of the way around, measured where the outline's second moments are those of a circle (an ellipse is
-//! then run through as its angle does, however long it is), `q(t) = b0 + b1 cos 2 pi t + b2 sin 2 pi t + f(t)`: an ellipse, which costs
+//! With the share t of the way around, measured as it is or where the outline's second moments are those of a circle (an
+//! ellipse is then run through as its angle does, however long it is), as the marks are likelier, `q(t) = b0 + b1 cos 2 pi t + b2 sin 2 pi t + f(t)`: an ellipse, which costs
 //! nothing, and a Gaussian process f with covariance
 //!
 //! ```text
@@ -13,6 +13,8 @@
 //! In: marks in the plane, in order. Out: points on the curve, and how sure they are.
 
 use nalgebra::DMatrix;
+
+use super::noise::likelier;
 
 /// The highest number of waves around a curve.
 const MOST_WAVES: usize = 40;
@@ -39,8 +41,9 @@ pub(crate) struct Marked {
 }
 
 impl Marked {
-    pub(crate) fn new(marks: &[[f64; 2]]) -> Self {
-        let round = rounded(marks);
+    /// Places along the outline as it is, or as it is when made round.
+    pub(crate) fn new(marks: &[[f64; 2]], is_rounded: bool) -> Self {
+        let round = if is_rounded { rounded(marks) } else { marks.to_vec() };
         let lengths: Vec<f64> = (0..marks.len()).map(|n| distance(round[n], round[(n + 1) % marks.len()])).collect();
         let whole: f64 = lengths.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let mut place = 0.0;
@@ -137,7 +140,7 @@ impl Curve {
         if !(4..=MOST_MARKS).contains(&marks.len()) {
             return polygon();
         }
-        let marked = Marked::new(marks);
+        let marked = likelier(marks, scatter);
         if marked.radius <= scatter.sigma {
             return polygon();
         }

@@ -1,6 +1,8 @@
 //! How far marks scatter around the outlines that were meant: restricted maximum likelihood over all outlines of a run
 //! (Patterson & Thompson 1971; Rasmussen & Williams 2006, sec. 2.7), for the process of `curve.rs`.
 //!
+//! Of the two kinds of places along an outline (`curve.rs`) the one counts under which the marks of a run scatter less.
+//!
 //! For one outline with covariance `K = A^2 C + sigma^2 1` and the ellipse's columns B, for both coordinates y,
 //!
 //! ```text
@@ -23,21 +25,30 @@ const ENOUGH: usize = 40;
 pub fn estimate(outlines: &[Vec<[f64; 2]>], spacing: f64) -> Scatter {
     let telling: Vec<&Vec<[f64; 2]>> = outlines.iter().filter(|o| (6..=MOST_MARKS).contains(&o.len())).collect();
     let every = telling.len().div_ceil(ENOUGH).max(1);
-    let marked: Vec<Prepared> = telling.into_iter().step_by(every).map(|o| Prepared::new(o)).collect();
-    let mut best = (f64::INFINITY, Scatter { sigma: 0.5 * spacing, amplitude: 0.15 });
-    if marked.is_empty() {
-        return best.1;
+    let chosen: Vec<&Vec<[f64; 2]>> = telling.into_iter().step_by(every).collect();
+    if chosen.is_empty() {
+        return Scatter { sigma: 0.5 * spacing, amplitude: 0.15 };
     }
-    for amplitude in AMPLITUDES {
-        for sigma in DEVIATIONS.map(|d| d * spacing) {
-            let scatter = Scatter { sigma, amplitude };
-            let cost: f64 = marked.iter().map(|outline| outline.cost(scatter)).sum();
-            if cost < best.0 {
-                best = (cost, scatter);
-            }
-        }
-    }
-    best.1
+    let [plain, rounded] = [false, true].map(|is_rounded| likeliest(&chosen, is_rounded, spacing));
+    // Places under which the marks scatter less are nearer to how the outlines run.
+    if plain.sigma < rounded.sigma { plain } else { rounded }
+}
+
+/// The scatter under which marks are most likely with places of one kind.
+fn likeliest(outlines: &[&Vec<[f64; 2]>], is_rounded: bool, spacing: f64) -> Scatter {
+    let marked: Vec<Prepared> = outlines.iter().map(|outline| Prepared::new(outline, is_rounded)).collect();
+    let scatters = AMPLITUDES
+        .iter()
+        .flat_map(|&amplitude| DEVIATIONS.map(|deviation| Scatter { sigma: deviation * spacing, amplitude }));
+    let cost = |scatter: Scatter| marked.iter().map(|outline| outline.cost(scatter)).sum::<f64>();
+    let costs = scatters.map(|scatter| (cost(scatter), scatter));
+    costs.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Scatter { sigma: 0.5 * spacing, amplitude: 0.15 }, |best| best.1)
+}
+
+/// The marks of an outline with the places along it, of both kinds, that they are likelier with.
+pub(crate) fn likelier(outline: &[[f64; 2]], scatter: Scatter) -> Marked {
+    let [plain, rounded] = [false, true].map(|is_rounded| Prepared::new(outline, is_rounded).cost(scatter));
+    Marked::new(outline, rounded <= plain)
 }
 
 struct Prepared {
@@ -47,8 +58,8 @@ struct Prepared {
 }
 
 impl Prepared {
-    fn new(outline: &[[f64; 2]]) -> Self {
-        let marked = Marked::new(outline);
+    fn new(outline: &[[f64; 2]], is_rounded: bool) -> Self {
+        let marked = Marked::new(outline, is_rounded);
         let (covariance, ellipse) = (marked.covariance(), marked.ellipse());
         Self { values: marked.values, covariance, ellipse }
     }
