@@ -44,7 +44,7 @@ impl Outputs<'_> {
 }
 
 /// Refuses a file that is there, and what is none.
-pub(super) fn may_write(path: &Path, overwrite: bool) -> Result<()> {
+fn may_write(path: &Path, overwrite: bool) -> Result<()> {
     // A device or a folder would be replaced by a file.
     if path.exists() && !path.is_file() {
         return Err(Error::usage("is no regular file; give another name").at(path));

@@ -3,9 +3,8 @@
 //! From every voxel at the surface of an object the nearest other object is looked for; most of what faces a neighbour
 //! across a wall finds it one wall away, however the cells are placed. Three times the median of these widths takes
 //! in the walls where objects fell short, and the hollows where three or four walls meet: a ball between three cells at
-//! 120 degrees is 1.15 walls wide, between four 1.22, and more by what the solution rounds off their edges. In a foam of 30
-//! cells with walls of three voxels twice that left one voxel of 326 000 near walls, three times none. Where most touch
-//! already, two voxels: more would join what the tissue's outer surface keeps apart.
+//! 120 degrees is 1.15 walls wide, between four 1.22, and more by what the solution rounds off their edges. Where most
+//! touch already, two voxels: more would join what the tissue's outer surface keeps apart.
 
 use super::fields::{Roots, near_two};
 use super::survey::Survey;
