@@ -192,7 +192,7 @@ mod tests {
         let marks: Vec<[f64; 3]> = (0..48).map(circle).collect();
         let plane = Plane::of(&marks, [0.5; 3]).unwrap();
         let points = marks.iter().map(|&p| plane.project(p)).collect();
-        Section::new(plane, vec![Curve { points, deviation: 0.1 }], marks)
+        Section::new(plane, vec![Curve { points, deviation: 0.1 }], marks, 1e-3)
     }
 
     #[test]

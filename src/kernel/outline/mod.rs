@@ -5,6 +5,7 @@
 //! marks -> plane -> curve (noise estimated) -> section -> samples -> radial basis functions -> lattice -> shape
 //! ```
 
+pub mod chords;
 pub mod cross_validation;
 pub mod crossing;
 pub mod curve;

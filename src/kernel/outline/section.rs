@@ -5,6 +5,7 @@
 //! Square buckets know the edges that can be nearest to their points, told level by level from those of the square that
 //! was divided into them; rows of buckets know the edges that cross them, which tell a point's side.
 
+use super::chords::chords;
 use super::curve::{Curve, area};
 use super::plane::Plane;
 
@@ -47,10 +48,10 @@ const EDGES_ALONG: usize = 8;
 const MOST_ALONG: usize = 64;
 
 impl Section {
-    /// The section that curves bound, which go through marks.
+    /// The section that curves bound, which go through marks; distances may be off by `within`.
     #[must_use]
-    pub fn new(plane: Plane, curves: Vec<Curve>, marks: Vec<[f64; 3]>) -> Self {
-        let buckets = Buckets::new(&curves);
+    pub fn new(plane: Plane, curves: Vec<Curve>, marks: Vec<[f64; 3]>, within: f64) -> Self {
+        let buckets = Buckets::new(&curves, within);
         Self { plane, curves, marks, buckets }
     }
 
@@ -114,17 +115,13 @@ fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> [[f64; 2]; 2] {
 }
 
 impl Buckets {
-    fn new(curves: &[Curve]) -> Self {
-        let edges_of = |curve: &Curve| -> Vec<[[f64; 2]; 2]> {
-            let next = curve.points.iter().cycle().skip(1);
-            curve.points.iter().zip(next).map(|(&from, &to)| [from, to]).collect()
-        };
-        let edges: Vec<[[f64; 2]; 2]> = curves.iter().flat_map(edges_of).collect();
-        let ends = curves.iter().scan(0, |end, curve| {
-            *end += curve.points.len() as u32;
-            Some(*end)
-        });
-        let ends = ends.collect();
+    fn new(curves: &[Curve], within: f64) -> Self {
+        let (mut edges, mut ends) = (Vec::new(), Vec::new());
+        for curve in curves {
+            let corners = chords(&curve.points, within);
+            edges.extend((0..corners.len()).map(|n| [corners[n], corners[(n + 1) % corners.len()]]));
+            ends.push(edges.len() as u32);
+        }
         let [low, high] = bounds(curves.iter().flat_map(|curve| &curve.points));
         let longest = (high[0] - low[0]).max(high[1] - low[1]).max(f64::MIN_POSITIVE);
         // Twice as long as the outlines: most of what is asked for lies beside them.
@@ -231,12 +228,12 @@ impl Square {
     /// the centre from its own, and what lies between both.
     fn nearest(&self, edges: &[[[f64; 2]; 2]], among: &[Run]) -> Vec<Run> {
         let numbers = || among.iter().flat_map(|&[from, to]| from..to);
-        let away = |edge: u32| distance_squared(edges[edge as usize], self.centre).sqrt();
-        let least = numbers().map(away).fold(f64::INFINITY, f64::min);
+        let away: Vec<f64> = numbers().map(|edge| distance_squared(edges[edge as usize], self.centre)).collect();
+        let least = away.iter().copied().fold(f64::INFINITY, f64::min).sqrt();
         // Twice half the diagonal, and a little for rounding.
         let most = least + 2.0 * self.half * std::f64::consts::SQRT_2 * (1.0 + 1e-9);
         let mut runs: Vec<Run> = Vec::new();
-        for edge in numbers().filter(|&edge| away(edge) <= most) {
+        for (edge, _) in numbers().zip(away).filter(|(_, away)| *away <= most * most) {
             match runs.last_mut().filter(|run| run[1] == edge) {
                 Some(run) => run[1] = edge + 1,
                 None => runs.push([edge, edge + 1]),
@@ -264,7 +261,7 @@ mod tests {
     #[test]
     fn distances_and_sides_of_a_square_with_a_hole() {
         let plane = Plane::of(&[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]], [0.1; 3]).unwrap();
-        let section = Section::new(plane, vec![square(0.0, 10.0), square(4.0, 6.0)], Vec::new());
+        let section = Section::new(plane, vec![square(0.0, 10.0), square(4.0, 6.0)], Vec::new(), 1e-9);
         let slow = |p: [f64; 2]| {
             let edges = section.curves.iter().flat_map(|c| (0..4).map(|n| [c.points[n], c.points[(n + 1) % 4]]));
             edges.map(|edge| distance_squared(edge, p)).fold(f64::INFINITY, f64::min).sqrt()
@@ -278,7 +275,7 @@ mod tests {
             }
         }
         let twice = |points: Vec<[f64; 2]>| Curve { points: [points.clone(), points].concat(), deviation: 0.0 };
-        let around = Section::new(plane, vec![twice(square(0.0, 10.0).points)], Vec::new());
+        let around = Section::new(plane, vec![twice(square(0.0, 10.0).points)], Vec::new(), 1e-9);
         assert!(around.distance([5.0, 5.0]) == -5.0 && around.distance([12.0, 5.0]) == 2.0, "twice around");
         assert!((section.radius() - (100.0f64 / std::f64::consts::PI).sqrt()).abs() < 1e-12);
         assert!((section.deepest().unwrap().1 - 2.3).abs() < 0.3, "{:?}", section.deepest());

@@ -15,6 +15,8 @@ use crate::pipeline::marks::ObjectMarks;
 const FLATNESS: f64 = 0.5;
 /// Points of a curve are at most so many smallest spacings apart.
 const CURVE_STEP: f64 = 0.5;
+/// Distances to curves are exact to this part of the smallest spacing.
+const CURVE_WITHIN: f64 = 0.01;
 /// Planes nearer to each other than this part of the smallest spacing are one.
 const SAME_PLANE: f64 = 0.25;
 
@@ -107,7 +109,7 @@ pub(super) fn section(outlines: &[Drawn<'_>], scatter: Scatter, spacing: f64) ->
         }
     }
     let marks = outlines.iter().flat_map(|outline| outline.marks).copied().collect();
-    Section::new(outlines[0].plane, curves, marks)
+    Section::new(outlines[0].plane, curves, marks, CURVE_WITHIN * spacing)
 }
 
 /// The numbers of an object's contours that cross themselves.
