@@ -25,8 +25,10 @@ fn every_stage_heeds_signals() {
     let stages: Vec<&str> = lines.iter().filter_map(|line| Some(line.split_once("  done  ")?.0)).collect();
     let wanted = [
         "read stack",
+        "scatter of marks",
         "marks 1",
         "profiles 1",
+        "image model",
         "shape 1",
         "distance 1",
         "band 1",

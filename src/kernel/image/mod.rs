@@ -2,6 +2,7 @@
 
 pub mod border_model;
 pub mod box_gaussian;
+pub mod carried;
 pub mod downsample;
 pub mod edge_detector;
 pub mod gaps;

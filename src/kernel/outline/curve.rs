@@ -14,7 +14,7 @@
 
 use nalgebra::DMatrix;
 
-use super::noise::likelier;
+use super::noise::{Prepared, likelier};
 
 /// The highest number of waves around a curve.
 const MOST_WAVES: usize = 40;
@@ -60,7 +60,14 @@ impl Marked {
     /// Covariances without noise for an amplitude of 1 of the radius.
     pub(crate) fn covariance(&self) -> DMatrix<f64> {
         let n = self.places.len();
-        DMatrix::from_fn(n, n, |i, j| self.radius * self.radius * wave_sum(self.places[i] - self.places[j]))
+        let mut covariance = DMatrix::zeros(n, n);
+        for j in 0..n {
+            for i in j..n {
+                let value = self.radius * self.radius * wave_sum(self.places[i] - self.places[j]);
+                (covariance[(i, j)], covariance[(j, i)]) = (value, value);
+            }
+        }
+        covariance
     }
 
     /// What an ellipse is made of, at each mark.
@@ -140,13 +147,12 @@ impl Curve {
         if !(4..=MOST_MARKS).contains(&marks.len()) {
             return polygon();
         }
-        let marked = likelier(marks, scatter);
+        let Prepared { marked, covariance, ellipse } = likelier(marks, scatter);
         if marked.radius <= scatter.sigma {
             return polygon();
         }
         let (n, variance) = (marks.len(), scatter.sigma * scatter.sigma);
-        let shape = marked.covariance() * (scatter.amplitude * scatter.amplitude);
-        let ellipse = marked.ellipse();
+        let shape = covariance * (scatter.amplitude * scatter.amplitude);
         let mut system = DMatrix::zeros(n + 3, n + 3);
         system.view_mut((0, 0), (n, n)).copy_from(&shape);
         (0..n).for_each(|i| system[(i, i)] += variance.max(1e-9 * marked.radius * marked.radius));

@@ -11,11 +11,11 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice for a box of voxels with about `most` nodes, two smallest spacings apart at least, not yet filled.
+    /// The lattice for a box of voxels with about `most` nodes, `apart` smallest spacings apart at least, not yet filled.
     #[must_use]
-    pub fn for_box(shape: [i64; 3], spacing: [f64; 3], most: f64) -> Self {
+    pub fn for_box(shape: [i64; 3], spacing: [f64; 3], most: f64, apart: f64) -> Self {
         let extents: [f64; 3] = std::array::from_fn(|a| shape[a] as f64 * spacing[a]);
-        let least = 2.0 * spacing.into_iter().fold(f64::INFINITY, f64::min);
+        let least = apart * spacing.into_iter().fold(f64::INFINITY, f64::min);
         let length = libm::cbrt(extents.iter().product::<f64>() / most).max(least);
         let step = spacing.map(|h| ((length / h).ceil() as i64).max(1));
         let counts = std::array::from_fn(|a| ((shape[a] - 1) / step[a]) as usize + 4);
@@ -103,7 +103,7 @@ mod tests {
     fn quadratic_functions_are_read_exactly() {
         let geometry = Geometry { shape: [41, 30, 17], spacing: [0.5, 0.5, 2.0], origin: [3.0, 1.0, -2.0], unit: None };
         let of = |p: [f64; 3]| (0.1 * p[0] * p[0] - p[1] + 0.2 * p[2]) as f32;
-        let mut lattice = Lattice::for_box(geometry.shape, geometry.spacing, 300.0);
+        let mut lattice = Lattice::for_box(geometry.shape, geometry.spacing, 300.0, 2.0);
         assert!(lattice.step[0] > 2);
         let planes: Vec<_> = (0..lattice.planes()).map(|n| lattice.plane(n, &geometry, of)).collect();
         lattice.fill(&planes);

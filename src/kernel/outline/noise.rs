@@ -19,49 +19,75 @@ const DEVIATIONS: [f64; 9] = [0.02, 0.1, 0.2, 0.35, 0.5, 0.75, 1.1, 1.6, 2.4];
 /// So many outlines tell enough.
 const ENOUGH: usize = 40;
 
-/// The scatter under which the marks of `outlines` are most likely; `spacing` is the smallest one. Outlines of fewer
-/// than six marks say nothing about their noise.
+/// Those of the outlines that tell how their marks scatter, enough of them: fewer than six marks say nothing about their
+/// noise.
 #[must_use]
-pub fn estimate(outlines: &[Vec<[f64; 2]>], spacing: f64) -> Scatter {
-    let telling: Vec<&Vec<[f64; 2]>> = outlines.iter().filter(|o| (6..=MOST_MARKS).contains(&o.len())).collect();
-    let every = telling.len().div_ceil(ENOUGH).max(1);
-    let chosen: Vec<&Vec<[f64; 2]>> = telling.into_iter().step_by(every).collect();
-    if chosen.is_empty() {
-        return Scatter { sigma: 0.5 * spacing, amplitude: 0.15 };
-    }
-    let [plain, rounded] = [false, true].map(|is_rounded| likeliest(&chosen, is_rounded, spacing));
-    // Places under which the marks scatter less are nearer to how the outlines run.
-    if plain.sigma < rounded.sigma { plain } else { rounded }
+pub fn telling(outlines: &[Vec<[f64; 2]>]) -> Vec<&[[f64; 2]]> {
+    let telling = || outlines.iter().filter(|o| (6..=MOST_MARKS).contains(&o.len()));
+    let every = telling().count().div_ceil(ENOUGH).max(1);
+    telling().step_by(every).map(Vec::as_slice).collect()
 }
 
-/// The scatter under which marks are most likely with places of one kind.
-fn likeliest(outlines: &[&Vec<[f64; 2]>], is_rounded: bool, spacing: f64) -> Scatter {
-    let marked: Vec<Prepared> = outlines.iter().map(|outline| Prepared::new(outline, is_rounded)).collect();
-    let scatters = AMPLITUDES
+/// What each scatter costs, minus twice the log-likelihood, with places as they are and made round.
+pub type Costs = [Vec<f64>; 2];
+
+/// What an outline's marks cost under each scatter; `spacing` is the smallest one.
+#[must_use]
+pub fn costs(outline: &[[f64; 2]], spacing: f64) -> Costs {
+    [false, true].map(|is_rounded| {
+        let prepared = Prepared::new(outline, is_rounded);
+        scatters(spacing).map(|scatter| prepared.cost(scatter)).collect()
+    })
+}
+
+/// The scatter under which the marks of all outlines are most likely, from what it costs each.
+#[must_use]
+pub fn likeliest(costs: &[Costs], spacing: f64) -> Scatter {
+    let of = |kind: usize| {
+        let sums = scatters(spacing).enumerate().map(|(n, scatter)| {
+            let sum = costs.iter().map(|outline| outline[kind][n]).sum::<f64>();
+            (sum, scatter)
+        });
+        sums.min_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
+    };
+    match (of(0), of(1)) {
+        // Places under which the marks scatter less are nearer to how the outlines run.
+        (Some(plain), Some(rounded)) if !costs.is_empty() => {
+            if plain.sigma < rounded.sigma {
+                plain
+            } else {
+                rounded
+            }
+        }
+        _ => Scatter { sigma: 0.5 * spacing, amplitude: 0.15 },
+    }
+}
+
+fn scatters(spacing: f64) -> impl Iterator<Item = Scatter> {
+    AMPLITUDES
         .iter()
-        .flat_map(|&amplitude| DEVIATIONS.map(|deviation| Scatter { sigma: deviation * spacing, amplitude }));
-    let cost = |scatter: Scatter| marked.iter().map(|outline| outline.cost(scatter)).sum::<f64>();
-    let costs = scatters.map(|scatter| (cost(scatter), scatter));
-    costs.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Scatter { sigma: 0.5 * spacing, amplitude: 0.15 }, |best| best.1)
+        .flat_map(move |&amplitude| DEVIATIONS.map(|deviation| Scatter { sigma: deviation * spacing, amplitude }))
 }
 
 /// The marks of an outline with the places along it, of both kinds, that they are likelier with.
-pub(crate) fn likelier(outline: &[[f64; 2]], scatter: Scatter) -> Marked {
-    let [plain, rounded] = [false, true].map(|is_rounded| Prepared::new(outline, is_rounded).cost(scatter));
-    Marked::new(outline, rounded <= plain)
+pub(crate) fn likelier(outline: &[[f64; 2]], scatter: Scatter) -> Prepared {
+    let [plain, rounded] = [false, true].map(|is_rounded| Prepared::new(outline, is_rounded));
+    if rounded.cost(scatter) <= plain.cost(scatter) { rounded } else { plain }
 }
 
-struct Prepared {
-    values: DMatrix<f64>,
-    covariance: DMatrix<f64>,
-    ellipse: DMatrix<f64>,
+/// An outline's marks with what they are solved from.
+pub(crate) struct Prepared {
+    pub(crate) marked: Marked,
+    /// Without noise, for an amplitude of 1.
+    pub(crate) covariance: DMatrix<f64>,
+    pub(crate) ellipse: DMatrix<f64>,
 }
 
 impl Prepared {
     fn new(outline: &[[f64; 2]], is_rounded: bool) -> Self {
         let marked = Marked::new(outline, is_rounded);
         let (covariance, ellipse) = (marked.covariance(), marked.ellipse());
-        Self { values: marked.values, covariance, ellipse }
+        Self { marked, covariance, ellipse }
     }
 
     /// Minus twice the restricted log-likelihood.
@@ -71,7 +97,8 @@ impl Prepared {
         let Some(k) = Cholesky::new(k) else { return f64::INFINITY };
         let solved = k.solve(&self.ellipse);
         let Some(inner) = Cholesky::new(self.ellipse.transpose() * &solved) else { return f64::INFINITY };
-        let residual = &self.values - &self.ellipse * inner.solve(&(solved.transpose() * &self.values));
+        let values = &self.marked.values;
+        let residual = values - &self.ellipse * inner.solve(&(solved.transpose() * values));
         let squares = residual.dot(&k.solve(&residual));
         let determinants = 2.0 * (log_determinant(k.l_dirty()) + log_determinant(inner.l_dirty()));
         2.0 * determinants + squares
@@ -109,12 +136,16 @@ mod tests {
         (0..12).map(|n| outline(8.0 + f64::from(n), if n % 2 == 0 { 0.0 } else { 0.1 })).collect()
     }
 
+    fn estimate(outlines: &[Vec<[f64; 2]>]) -> Scatter {
+        likeliest(&telling(outlines).into_iter().map(|outline| costs(outline, 1.0)).collect::<Vec<_>>(), 1.0)
+    }
+
     #[test]
     fn the_scatter_of_marks_is_found() {
         for (sigma, marks) in [(0.5, 12), (1.5, 12), (0.5, 24), (1.0, 40)] {
-            let found = estimate(&outlines(sigma, marks), 1.0).sigma;
+            let found = estimate(&outlines(sigma, marks)).sigma;
             assert!((0.6 * sigma..1.55 * sigma).contains(&found), "{sigma} {marks}: {found}");
         }
-        assert!(estimate(&outlines(0.0, 16), 1.0).sigma < 0.25, "exact marks");
+        assert!(estimate(&outlines(0.0, 16)).sigma < 0.25, "exact marks");
     }
 }

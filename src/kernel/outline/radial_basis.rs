@@ -81,23 +81,34 @@ const LANES: usize = 8;
 #[inline(always)]
 fn sums_in_lanes(p: [f64; 3], x: &[f64], y: &[f64], z: &[f64], weights: &[f64]) -> [f64; 4] {
     let mut lanes = [[0.0; LANES]; 4];
-    let mut add = |lane: usize, n: usize| {
-        let by = [p[0] - x[n], p[1] - y[n], p[2] - z[n]];
-        let square = by[0] * by[0] + by[1] * by[1] + by[2] * by[2];
-        let slope = weights[n] * square.sqrt();
-        lanes[0][lane] += slope * square;
-        lanes[1][lane] += slope * by[0];
-        lanes[2][lane] += slope * by[1];
-        lanes[3][lane] += slope * by[2];
-    };
-    let whole = weights.len() / LANES * LANES;
-    for start in (0..whole).step_by(LANES) {
-        for lane in 0..LANES {
-            add(lane, start + lane);
+    let [(x, x_rest), (y, y_rest), (z, z_rest), (w, w_rest)] = [x, y, z, weights].map(<[f64]>::as_chunks);
+    for (((x, y), z), w) in x.iter().zip(y).zip(z).zip(w) {
+        // Whole arrays in, whole arrays out: that is what becomes vector instructions.
+        let terms = terms(p, [x, y, z], w);
+        for (lane, term) in lanes.iter_mut().zip(terms) {
+            (0..LANES).for_each(|n| lane[n] += term[n]);
         }
     }
-    (whole..weights.len()).for_each(|n| add(n - whole, n));
-    lanes.map(|lane| lane.iter().sum())
+    let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
+    for (list, rest) in [(&mut x, x_rest), (&mut y, y_rest), (&mut z, z_rest), (&mut w, w_rest)] {
+        list.iter_mut().zip(rest).for_each(|(value, rest)| *value = *rest);
+    }
+    // What is left over has a weight, the rest of the lanes none.
+    let terms = terms(p, [&x, &y, &z], &w);
+    std::array::from_fn(|m| (0..LANES).map(|n| lanes[m][n] + terms[m][n]).sum())
+}
+
+#[inline(always)]
+fn terms(p: [f64; 3], nodes: [&[f64; LANES]; 3], weights: &[f64; LANES]) -> [[f64; LANES]; 4] {
+    let by: [[f64; LANES]; 3] = std::array::from_fn(|a| std::array::from_fn(|n| p[a] - nodes[a][n]));
+    let square: [f64; LANES] = std::array::from_fn(|n| by[0][n] * by[0][n] + by[1][n] * by[1][n] + by[2][n] * by[2][n]);
+    let slope: [f64; LANES] = std::array::from_fn(|n| weights[n] * square[n].sqrt());
+    [
+        std::array::from_fn(|n| slope[n] * square[n]),
+        std::array::from_fn(|n| slope[n] * by[0][n]),
+        std::array::from_fn(|n| slope[n] * by[1][n]),
+        std::array::from_fn(|n| slope[n] * by[2][n]),
+    ]
 }
 
 #[cfg(test)]

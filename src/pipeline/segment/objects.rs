@@ -134,14 +134,18 @@ fn survey<T: Element>(
     settings: &SegmentSettings,
     most: usize,
 ) -> Result<Surveyed> {
-    let scatter = scatter_of(objects, picture.geometry);
+    let stage = engine.stage("scatter of marks", 0);
+    let scatter = scatter_of(&stage, objects, picture.geometry)?;
+    stage.finish();
     let looks = settings.uses_image() && settings.image != ImageModel::Edge;
     let by = Looking { scatter, looks, objects: objects.len() };
     let outlined = engine.side_by_side(objects, most, |engine, marks| match settings.start {
         Start::Auto if marks.seed.is_none() => Outlined::new(engine, picture, marks, by),
         _ => Ok(None),
     })?;
-    let trusts = trust(&outlined, picture.geometry, scatter, settings.image);
+    let stage = engine.stage("image model", 0);
+    let trusts = trust(&stage, &outlined, picture.geometry, scatter, settings.image)?;
+    stage.finish();
     Ok((outlined, trusts))
 }
 

@@ -3,6 +3,8 @@
 
 use std::cmp::Ordering;
 
+use crate::error::Result;
+use crate::exec::{Stage, Workers};
 use crate::grid::Geometry;
 use crate::kernel::outline::crossing::crosses_itself;
 use crate::kernel::outline::curve::{Curve, Scatter};
@@ -60,10 +62,15 @@ pub(super) fn not_flat(marks: &ObjectMarks, image: &Geometry) -> Option<i64> {
 }
 
 /// How the marks of all objects scatter around their outlines.
-#[must_use]
-pub(super) fn scatter_of(objects: &[ObjectMarks], image: &Geometry) -> Scatter {
+///
+/// # Errors
+/// When the run is interrupted.
+pub(super) fn scatter_of(stage: &Stage<'_>, objects: &[ObjectMarks], image: &Geometry) -> Result<Scatter> {
     let outlines = objects.iter().filter_map(|marks| drawn(marks, image)).flatten().map(|outline| outline.in_plane);
-    noise::estimate(&outlines.collect::<Vec<_>>(), image.min_spacing())
+    let (outlines, spacing) = (outlines.collect::<Vec<_>>(), image.min_spacing());
+    let costs =
+        stage.run(&noise::telling(&outlines), &Workers::none(), |(), outline| Ok(noise::costs(outline, spacing)))?;
+    Ok(noise::likeliest(&costs, spacing))
 }
 
 /// An object's outlines by the planes that they were drawn in, by direction and along it; none where its contours are no

@@ -15,6 +15,8 @@ use crate::store::{BoxSink, BrickArray};
 
 /// Nodes of the lattice that the function is laid out on, about.
 const NODES: f64 = 60_000.0;
+/// How many smallest spacings they are apart at least.
+const APART: f64 = 2.0;
 
 /// A fitted shape on the grid of its box.
 pub(super) struct ShapeField<'a> {
@@ -35,7 +37,7 @@ impl<'a> ShapeField<'a> {
         margin: f64,
     ) -> Result<Self> {
         let (geometry, window) = box_around(image, sections, fitted, margin);
-        let mut lattice = Lattice::for_box(geometry.shape, geometry.spacing, NODES);
+        let mut lattice = Lattice::for_box(geometry.shape, geometry.spacing, NODES, APART);
         let planes: Vec<usize> = (0..lattice.planes()).collect();
         let of = |point: [f64; 3]| fitted.distance(point).0 as f32;
         let filled = stage.run(&planes, &Workers::none(), |(), &n| Ok(lattice.plane(n, &geometry, of)))?;

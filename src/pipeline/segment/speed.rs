@@ -10,18 +10,21 @@
 //! where both agree, weighed by their variances.
 
 use super::shape_field::ShapeField;
-use super::survey::{MOST_OFF, Outlined, Sampled, Trust, fade, weighted};
+use super::survey::{MOST_OFF, Outlined, Sampled, Trust, fade};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::border_model::{BorderModel, ON_LEVEL};
+use crate::kernel::image::carried::Carried;
 use crate::kernel::image::speed::{Grey, Places, Step, Weights, level_offsets, speeds};
 use crate::kernel::image::wall::{Fields, Wall, wall_offsets};
 use crate::kernel::outline::lattice::Lattice;
 use crate::store::{BoxSink, BoxSource, BrickArray};
 
-/// Nodes of the lattices of grey values, about.
+/// Nodes of the lattices of grey values, about, and how many smallest spacings they are apart at least: grey values
+/// under outlines are averaged over more.
 const NODES: f64 = 4000.0;
+const APART: f64 = 4.0;
 
 /// What the speed is made of.
 pub(super) struct Pulls<'a> {
@@ -139,7 +142,7 @@ fn levels(stage: &Stage<'_>, geometry: &Geometry, object: &Outlined, trust: &Tru
         let half = 0.5 * (s.profile.inside() + s.profile.outside());
         [if on_level { s.profile.at(shift) } else { half }, s.profile.fall(shift)]
     };
-    let samples: Vec<([f64; 3], [f64; 2])> = object.profiles.iter().map(|s| (s.point, value(s))).collect();
+    let samples = Carried::new(object.profiles.iter().map(|s| (s.point, value(s))));
     let count = object.profiles.len().max(1) as f64;
     // Beside a border that the marks miss the fall at the marks is none.
     let mean_fall = if on_level {
@@ -149,10 +152,10 @@ fn levels(stage: &Stage<'_>, geometry: &Geometry, object: &Outlined, trust: &Tru
     };
     let fade = fade(trust.outlines, geometry.min_spacing());
     let at = |point: [f64; 3]| -> [f64; 2] {
-        let [level, fall] = weighted(&samples, point, fade).unwrap_or([0.0, mean_fall]);
+        let [level, fall] = samples.at(point, fade, 0..0).unwrap_or([0.0, mean_fall]);
         [level, if on_level { fall } else { mean_fall }]
     };
-    let mut lattices = [0, 1].map(|_| Lattice::for_box(geometry.shape, geometry.spacing, NODES));
+    let mut lattices = [0, 1].map(|_| Lattice::for_box(geometry.shape, geometry.spacing, NODES, APART));
     let planes: Vec<usize> = (0..lattices[0].planes()).collect();
     let nodes = stage.run(&planes, &Workers::none(), |(), &n| {
         let values = lattices[0].plane(n, geometry, at);

@@ -5,15 +5,15 @@ use super::object::{Picture, name};
 use super::outlines;
 use super::settings::ImageModel;
 use crate::error::Result;
-use crate::exec::{Engine, Workers};
+use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::border_model::{BorderModel, Reading, median};
+use crate::kernel::image::carried::Carried;
 use crate::kernel::image::profiles::{LEN, Profile, REACH, STEP, interpolate};
 use crate::kernel::outline::cross_validation::{HeldOut, leave_out};
 use crate::kernel::outline::curve::Scatter;
 use crate::kernel::outline::fitted::{Fit, Fitted, LEAST_BESIDE, MOST_SAMPLES};
 use crate::kernel::outline::section::Section;
-use crate::kernel::vector::{dot, sub};
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::smoothing::smoothed;
@@ -105,12 +105,11 @@ impl Outlined {
         Ok(Some(Self { sections, fitted, profiles, held_out }))
     }
 
-    /// Half the thickness of the body, a length: how deep its deepest section is, or half of its extent across its
-    /// sections, if that is less.
-    fn half_thickness(&self) -> f64 {
-        let depths = self.sections.iter().filter_map(Section::deepest).map(|(_, depth)| depth);
-        let depth = depths.fold(0.0, f64::max);
-        self.fitted.ends().map_or(depth, |ends| depth.min(0.5 * ends.extent()))
+    /// Whether the body is less than twice `most` thick: so deep is no section of it, or so far does it not reach across
+    /// them.
+    fn is_thinner(&self, most: f64) -> bool {
+        let is_deep = |section: &Section| section.deepest().is_some_and(|(_, depth)| depth >= most);
+        self.fitted.ends().is_some_and(|ends| 0.5 * ends.extent() < most) || !self.sections.iter().any(is_deep)
     }
 
     fn deviation(&self) -> f64 {
@@ -181,13 +180,14 @@ const THIN: f64 = 3.5;
 
 /// How far each object's image and shape are trusted.
 pub(super) fn trust(
+    stage: &Stage<'_>,
     objects: &[Option<Outlined>],
     image: &Geometry,
     scatter: Scatter,
     model: ImageModel,
-) -> Vec<Option<Trust>> {
+) -> Result<Vec<Option<Trust>>> {
     let h = image.min_spacing();
-    let is_thin = |object: &Outlined| object.half_thickness() < THIN * h;
+    let is_thin = |object: &Outlined| object.is_thinner(THIN * h);
     let thick = objects.iter().flatten().filter(|object| !is_thin(object));
     let all: Vec<Profile> = thick.flat_map(|o| &o.profiles).map(|s| s.profile).collect();
     let held_out = objects.iter().flatten().flat_map(|object| &object.held_out);
@@ -209,7 +209,7 @@ pub(super) fn trust(
             growth,
         }
     };
-    objects.iter().map(|object| object.as_ref().map(trust)).collect()
+    stage.run(objects, &Workers::none(), |(), object| Ok(object.as_ref().map(trust)))
 }
 
 /// How the shape's error grows with the square of the distance from outlines: marks that were left out lie that far from it, their own
@@ -246,10 +246,14 @@ fn image_deviation(profiles: &[Sampled], reading: &Reading, deviation: f64, h: f
         }
         BorderModel::Level => {
             let at = reading.shift;
+            let grey = Carried::new(profiles.iter().map(|s| (s.point, [s.profile.at(at), 0.0])));
             let fall = profiles.iter().map(|s| s.profile.fall(at)).sum::<f64>() / profiles.len().max(1) as f64;
             let every = profiles.len().div_ceil(ENOUGH_COMPARED);
             let off = profiles.iter().step_by(every.max(1)).filter_map(|s| {
-                let grey = grey_of_others(profiles, s, at, fade(deviation / h, h))?;
+                // Profiles lie in order of their sections.
+                let own = profiles.partition_point(|p| p.section < s.section)
+                    ..profiles.partition_point(|p| p.section <= s.section);
+                let [grey, _] = grey.at(s.point, fade(deviation / h, h), own)?;
                 Some(((s.profile.at(at) - grey) / fall).clamp(-MOST_OFF, MOST_OFF).powi(2))
             });
             let (sum, count) = off.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1));
@@ -267,35 +271,4 @@ const FADE: [f64; 2] = [6.0, 8.0];
 /// What the squares of distances are divided by for how unsure outlines are, in smallest spacings.
 pub(super) fn fade(outlines: f64, h: f64) -> f64 {
     2.0 * ((FADE[0] + FADE[1] * outlines) * h).powi(2)
-}
-
-/// The mean of values at places near a point, the nearest counting most; none of none.
-pub(super) fn weighted<const N: usize>(
-    values: &[([f64; 3], [f64; N])],
-    point: [f64; 3],
-    fade: f64,
-) -> Option<[f64; N]> {
-    /// What counts less than e^-12 does not count.
-    const LEAST: f64 = 12.0;
-    let square = |place: [f64; 3]| {
-        let by = sub(place, point);
-        dot(by, by)
-    };
-    let nearest = values.iter().map(|(place, _)| square(*place)).fold(f64::INFINITY, f64::min);
-    let (mut sums, mut weights) = ([0.0; N], 0.0);
-    for (place, value) in values {
-        let away = (square(*place) - nearest) / fade;
-        if away < LEAST {
-            let weight = libm::exp(-away);
-            (0..N).for_each(|n| sums[n] += weight * value[n]);
-            weights += weight;
-        }
-    }
-    (weights > 0.0).then(|| sums.map(|sum| sum / weights))
-}
-
-/// The grey value at a place beside the border that the outlines of other sections tell for a point.
-fn grey_of_others(profiles: &[Sampled], of: &Sampled, at: f64, fade: f64) -> Option<f64> {
-    let others = profiles.iter().filter(|s| s.section != of.section).map(|s| (s.point, [s.profile.at(at)]));
-    weighted(&others.collect::<Vec<_>>(), of.point, fade).map(|[grey]| grey)
 }
