@@ -17,6 +17,14 @@ const LONGEST_SIDE: i64 = 1200;
 /// The slices: the axis across, then the axes along the picture's rows and columns.
 const VIEWS: [[usize; 3]; 3] = [[2, 0, 1], [1, 0, 2], [0, 1, 2]];
 
+/// Refuses a name that says the picture is something else than a PNG.
+pub(super) fn check_name(file: &Path) -> Result<()> {
+    match file.extension() {
+        Some(extension) if extension.eq_ignore_ascii_case("png") => Ok(()),
+        _ => Err(Error::usage("pictures are PNG files; give a name that ends in .png").at(file)),
+    }
+}
+
 /// Draws the store in `folder`, cut at the world position `centre`, into a PNG file.
 pub(super) fn draw(folder: &Path, centre: [f64; 3], file: &Path) -> Result<()> {
     let image = ImageReader::open(folder)?;

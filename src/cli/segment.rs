@@ -83,6 +83,7 @@ impl Job {
         };
         outputs.check()?;
         args.output.mesh.as_deref().map(mesh_format).transpose()?;
+        args.output.picture.as_deref().map(picture::check_name).transpose()?;
         let resources = config::resources(&args.resources, args.output.store())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
         let select = Select { channel: args.picture.channel, time: args.picture.time };
@@ -97,7 +98,9 @@ impl Job {
         if let Some(path) = args.output.mesh.as_deref().filter(|_| several) {
             let objects = split_and_seed(&marks.cloud, &args.seed);
             let meshes: Vec<PathBuf> = objects.iter().map(|object| numbered(path, object.object)).collect();
-            Outputs { store: None, files: meshes.iter().map(PathBuf::as_path).collect(), ..outputs }.check()?;
+            let others = [&output.report, &output.picture].into_iter().flatten();
+            let files = meshes.iter().chain(others).map(PathBuf::as_path).collect();
+            Outputs { store: None, files, ..outputs }.check()?;
         }
         check_smoothing(&settings, &geometry)?;
         args.seed.iter().try_for_each(|seed| check_seed(seed, &geometry))?;

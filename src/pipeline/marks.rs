@@ -66,11 +66,14 @@ pub fn split(cloud: &PointCloud) -> Vec<ObjectMarks> {
         .collect()
 }
 
-/// The objects of a cloud, and one for each seed, numbered on.
+/// The objects of a cloud, and one for each seed, numbered on; with numbers that are free where the last is the largest
+/// there is.
 #[must_use]
 pub fn split_and_seed(cloud: &PointCloud, seeds: &[Seed]) -> Vec<ObjectMarks> {
     let mut objects = split(cloud);
-    let first = objects.last().map_or(1, |marks| marks.object + 1);
+    let taken: Vec<u32> = objects.iter().map(|marks| marks.object).collect();
+    let on = taken.last().map_or(0, |&last| last);
+    let numbers = (on..=u32::MAX).skip(1).chain(1..on).filter(|number| !taken.contains(number));
     let seeded = |(object, &seed)| ObjectMarks {
         object,
         contours: Vec::new(),
@@ -78,7 +81,7 @@ pub fn split_and_seed(cloud: &PointCloud, seeds: &[Seed]) -> Vec<ObjectMarks> {
         drawn: false,
         seed: Some(seed),
     };
-    objects.extend((first..).zip(seeds).map(seeded));
+    objects.extend(numbers.zip(seeds).map(seeded));
     objects
 }
 
@@ -205,6 +208,22 @@ mod tests {
 
     fn grid() -> Geometry {
         Geometry { shape: [12, 12, 12], spacing: [0.5, 0.5, 2.0], origin: [0.0; 3], unit: None }
+    }
+
+    #[test]
+    fn seeds_are_numbered_on_and_never_as_another_object() {
+        let cloud = |objects: &[u32]| PointCloud {
+            positions: objects.iter().map(|&n| [f64::from(n % 7), 0.0, 0.0]).collect(),
+            objects: objects.to_vec(),
+            ..PointCloud::default()
+        };
+        let seed = Seed { centre: [0.0; 3], radius: 1.0 };
+        let numbers = |objects: &[u32]| -> Vec<u32> {
+            split_and_seed(&cloud(objects), &[seed; 2]).iter().map(|marks| marks.object).collect()
+        };
+        assert_eq!(numbers(&[2, 5]), [2, 5, 6, 7]);
+        assert_eq!(numbers(&[]), [1, 2]);
+        assert_eq!(numbers(&[1, u32::MAX - 1]), [1, u32::MAX - 1, u32::MAX, 2]);
     }
 
     #[test]

@@ -189,6 +189,13 @@ fn inputs_are_never_outputs() {
 }
 
 #[test]
+fn a_picture_is_a_png() {
+    let bench = Bench::new(&Ball::small());
+    let complaint = bench.fail("segment image.tif --points marks.csv -o none --picture out/p.jpg", 2);
+    assert!(complaint.contains("p.jpg: pictures are PNG files"), "{complaint}");
+}
+
+#[test]
 fn outputs_that_cannot_be_written_end_with_code_1() {
     let bench = Bench::new(&Ball::small());
     let complaint = bench.fail("segment image.tif --points marks.csv -o /proc/x.zarr", 1);
