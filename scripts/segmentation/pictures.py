@@ -35,8 +35,21 @@ def draw(path, volume, number, outlines, answers):
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=90)
     plt.close(figure)
-    # Few colours take a third of the bytes.
-    Image.open(path).convert("RGB").quantize(64).save(path, optimize=True)
+    # Few colours take a third of the bytes; chosen by how often they occur they would not be those of thin lines.
+    picture = Image.open(path).convert("RGB")
+    picture.quantize(palette=palette(), dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def palette():
+    """Greys, and the colours of lines on darker and lighter ground."""
+    colors = [[level] * 3 for level in np.linspace(0, 255, 64).round().astype(int).tolist()]
+    for line in (TRUTH, MARKS, *RESULTS):
+        line = np.array(mpl.colors.to_rgb(line)) * 255
+        colors += [(share * line + (1 - share) * ground).round().astype(int).tolist()
+                   for ground in (0, 128, 255) for share in (1.0, 0.8, 0.6, 0.4)]
+    image = Image.new("P", (1, 1))
+    image.putpalette(sum(colors, []))
+    return image
 
 
 def middles(volume, number, outlines):
