@@ -5,7 +5,7 @@ use super::cross_validate::cross_validate;
 use super::object::{ObjectReport, Picture, Solution, solve};
 use super::outlines::scatter_of;
 use super::settings::{ImageModel, SegmentSettings, Start};
-use super::survey::{Looking, Outlined, Trust, trust};
+use super::survey::{Looking, Outlined, Trust, left_out_of, trust};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
 use crate::grid::Geometry;
@@ -138,9 +138,12 @@ fn survey<T: Element>(
     let scatter = scatter_of(&stage, objects, picture.geometry)?;
     stage.finish();
     let looks = settings.uses_image() && settings.image != ImageModel::Edge;
-    let by = Looking { scatter, looks, objects: objects.len() };
-    let outlined = engine.side_by_side(objects, most, |engine, marks| match settings.start {
-        Start::Auto if marks.seed.is_none() => Outlined::new(engine, picture, marks, by),
+    let left_out = left_out_of(objects.len());
+    let numbered: Vec<(usize, &ObjectMarks)> = objects.iter().enumerate().collect();
+    let outlined = engine.side_by_side(&numbered, most, |engine, &(number, marks)| match settings.start {
+        Start::Auto if marks.seed.is_none() => {
+            Outlined::new(engine, picture, marks, Looking { scatter, looks, left_out: left_out(number) })
+        }
         _ => Ok(None),
     })?;
     let stage = engine.stage("image model", 0);

@@ -25,9 +25,11 @@ const APART: f64 = 1.5;
 const MOST_PROFILES: usize = 3000;
 /// The image is smoothed by so many smallest spacings before profiles are taken.
 const SIGMA: f64 = 1.0;
-/// Sections that are left out in turn, of all objects together about, and of one at least and at most.
+/// Sections that are left out in turn, of all objects together about, and of one at least and at most; of more objects
+/// than these some are taken.
 const LEFT_OUT: usize = 32;
 const LEFT_OUT_OF_ONE: [usize; 2] = [2, 8];
+const MOST_LEAVING_OUT: usize = 32;
 /// With fewer profiles an object is read together with the others.
 const ENOUGH_PROFILES: usize = 36;
 /// How far a shape is off a smallest spacing from the outlines, of it, where nothing could be left out.
@@ -49,8 +51,15 @@ pub(super) struct Looking {
     pub scatter: Scatter,
     /// Whether the image has a say.
     pub looks: bool,
-    /// Objects of the run.
-    pub objects: usize,
+    /// Sections of an object that are left out in turn, at most.
+    pub left_out: usize,
+}
+
+/// How many sections are left out of each object, by its number among all of them.
+pub(super) fn left_out_of(objects: usize) -> impl Fn(usize) -> usize + Sync {
+    let of_one = (LEFT_OUT / objects.max(1)).clamp(LEFT_OUT_OF_ONE[0], LEFT_OUT_OF_ONE[1]);
+    let every = objects.div_ceil(MOST_LEAVING_OUT).max(1);
+    move |number| if number.is_multiple_of(every) { of_one } else { 0 }
 }
 
 /// A profile, and where it was taken.
@@ -94,9 +103,9 @@ impl Outlined {
         let least = LEAST_BESIDE * image.min_spacing();
         let fit = Fit::new(&all, MOST_SAMPLES, least);
         let functions = stage.run(fit.windows(), &Workers::none(), |(), window| Ok(fit.solve(window)))?;
-        let most = (LEFT_OUT / by.objects.max(1)).clamp(LEFT_OUT_OF_ONE[0], LEFT_OUT_OF_ONE[1]);
-        let every = sections.len().div_ceil(most);
-        let left_out: Vec<usize> = (0..sections.len()).step_by(every).filter(|_| sections.len() > 2).collect();
+        let tells = sections.len() > 2 && by.left_out > 0;
+        let every = sections.len().div_ceil(by.left_out.max(1));
+        let left_out: Vec<usize> = (0..sections.len()).step_by(every).filter(|_| tells).collect();
         let held_out = stage.run(&left_out, &Workers::none(), |(), &n| Ok(leave_out(&all, n, least)))?;
         stage.finish();
         let Some(fitted) = fit.join(functions) else { return Ok(None) };
