@@ -1,4 +1,4 @@
-# Sourced by scripts/reproduce and scripts/bench_peers: builds the program, makes a Python environment, runs a module in it.
+# Sourced by the scripts without an ending: builds the program, makes a Python environment, runs a module in it.
 
 # run_module NAME ARGUMENT...: `python -m NAME` of this folder, with what NAME/requirements.txt pins, in target/venv-NAME.
 # STRANDLINE names a built program to use; without it target/release/strandline is built first.
