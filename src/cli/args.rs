@@ -58,10 +58,15 @@ Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 130 inter
 pub(super) struct SegmentArgs {
     /// TIFF stack, or a folder with one TIFF file for each slice
     pub(super) image: PathBuf,
-    /// Border points: CSV (x,y,z and optionally object,contour), XYZ or PLY; given several times, the n-th file is
-    /// object n, and objects named in later files are numbered on from those of the earlier ones
+    /// Border points: CSV (x,y,z and optionally object,contour; or tables of napari, Imaris and others), XYZ, PLY,
+    /// ROIs (.roi, .zip); - reads standard input. Given several times, the n-th file is object n, and objects named in
+    /// later files are numbered on from those of the earlier ones
     #[arg(long, required_unless_present = "seed", value_name = "CLOUD")]
     pub(super) points: Vec<PathBuf>,
+    /// What the numbers of the points are: voxel indices, the first one 0, or lengths [default: as the file's form says:
+    /// voxels of napari and of ROIs, else lengths]
+    #[arg(long, value_enum)]
+    pub(super) points_in: Option<PointsIn>,
     /// Object without points: a ball, centre and radius, from which the surface goes to the image's edges; several
     /// times for several objects, numbered on from those of the points
     #[arg(long, value_name = "X,Y,Z,R", value_parser = parse_seed, allow_hyphen_values = true)]
@@ -271,6 +276,15 @@ pub(super) struct InfoArgs {
     /// Print JSON
     #[arg(long)]
     pub(super) json: bool,
+}
+
+/// What the numbers of points are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum PointsIn {
+    /// Indices of voxels
+    Voxels,
+    /// Lengths
+    Physical,
 }
 
 /// How the image's edges pull.

@@ -12,7 +12,7 @@ use crate::exec::{Cancel, Progress};
 use crate::grid::{DataSets, Geometry, TriangleMesh, refuse_too_many};
 use crate::io::label_volume::{LabelVolume, is_label_volume};
 use crate::io::ome_zarr::is_store;
-use crate::io::sources::{Source, read_source};
+use crate::io::sources::{Source, read_noted};
 use crate::io::stacks::Select;
 use crate::pipeline::label_borders::label_borders;
 
@@ -36,7 +36,11 @@ pub(super) fn read_sets(args: &DistanceJobArgs, console: &Console, cancel: &Canc
         } else if is_volume {
             return Err(without_inside("label volumes").at(path));
         } else {
-            match read_source(path)? {
+            let (source, notes) = read_noted(path)?;
+            for note in &notes {
+                console.note(note);
+            }
+            match source {
                 Source::Cloud(_) if args.choice.signed => return Err(without_inside("points").at(path)),
                 Source::Cloud(cloud) => read.sets.add_cloud(&cloud.positions),
                 Source::Mesh(mesh) => {

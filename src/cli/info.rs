@@ -10,14 +10,15 @@ use super::text::{grouped, number, triple};
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
 use crate::io::ome_zarr::{ImageReader, is_store};
-use crate::io::sources::{Source, read_source};
+use crate::io::points::{PointFile, Scale};
+use crate::io::sources::{Source, describe, is_standard_input};
 use crate::io::stacks::{self, Select};
 use crate::pipeline::marks::split;
 
 /// Runs the command.
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let path = &args.file;
-    if !path.exists() {
+    if !path.exists() && !is_standard_input(path) {
         return Err(Error::input("there is no such file or folder").at(path));
     }
     let (document, lines) = if is_store(path) {
@@ -25,8 +26,12 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     } else if let Some(format) = stacks::format_of(path) {
         stack(path, format)?
     } else {
-        match read_source(path)? {
-            Source::Cloud(cloud) => points(&cloud),
+        let (source, points_of, notes) = describe(path)?;
+        match source {
+            // What is told where points are taken as they are is no news here.
+            Source::Cloud(cloud) => {
+                points(&cloud, points_of.as_ref(), points_of.as_ref().map_or(&notes, |of| &of.notes))
+            }
             Source::Mesh(mesh) => triangles(&mesh),
         }
     };
@@ -71,14 +76,34 @@ fn stack(path: &Path, format: &stacks::Format) -> Result<(Value, Lines)> {
     Ok((document, lines))
 }
 
-fn points(cloud: &PointCloud) -> (Value, Lines) {
+fn points(cloud: &PointCloud, file: Option<&PointFile>, notes: &[String]) -> (Value, Lines) {
     let (low, high) = cloud.bounds().unwrap_or_default();
-    let mut lines = vec![
-        line("kind", "points"),
+    let mut lines = vec![line("kind", "points")];
+    let scales = file.map_or([Scale::Physical; 3], |file| file.scales);
+    let counts = |axis: usize| match (scales[axis], file.and_then(|file| file.units[axis])) {
+        (Scale::Physical, Some(unit)) => unit.name,
+        (Scale::Physical, None) => "length",
+        (Scale::Voxels, _) => "voxels, the first one 0",
+        (Scale::Slices, _) => "slices, in the file the first one 1, here 0",
+    };
+    let counts = [0, 1, 2].map(counts);
+    if let Some(file) = file {
+        lines.push(line("form", &*file.form));
+        match counts {
+            [x, y, z] if x == y && y == z => lines.push(line("x, y, z in", x)),
+            [x, y, z] => lines.extend([line("x in", x), line("y in", y), line("z in", z)]),
+        }
+    }
+    lines.extend([
         line("points", grouped(cloud.len() as u64)),
         line("lowest x, y, z", triple(low)),
         line("highest x, y, z", triple(high)),
-    ];
+    ]);
+    let times = file.and_then(|file| Some((file.times.iter().min()?, file.times.iter().max()?)));
+    if let Some((first, last)) = times {
+        let text = if first == last { first.to_string() } else { format!("{first} to {last}") };
+        lines.push(line("times", text));
+    }
     let mut objects = Vec::new();
     for marks in split(cloud) {
         let points: usize = marks.contours.iter().map(Vec::len).sum();
@@ -87,8 +112,10 @@ fn points(cloud: &PointCloud) -> (Value, Lines) {
         lines.push(line(&format!("object {}", marks.object), format!("{} points{on}", grouped(points as u64))));
         objects.push(json!({ "object": marks.object, "points": points, "contours": contours }));
     }
+    lines.extend(notes.iter().map(|note| line("note", &**note)));
     let document = json!({
-        "kind": "points", "points": cloud.len(), "lowest_xyz": low, "highest_xyz": high, "objects": objects,
+        "kind": "points", "form": file.map(|file| &*file.form), "counts_xyz": counts, "points": cloud.len(),
+        "lowest_xyz": low, "highest_xyz": high, "times": times, "objects": objects, "notes": notes,
     });
     (document, lines)
 }

@@ -1,18 +1,12 @@
-//! Opening inputs: the stack with its place in the world, and the marks of all files as one cloud.
+//! Opening an image: the stack with its place in the world, and the part of it that counts.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::console::Console;
 use super::text::number;
 use super::values::Crop;
 use crate::error::{Error, Result};
-use crate::exec::Progress;
-use crate::grid::{Box3, Geometry, PointCloud};
-use crate::io::points::read_cloud;
+use crate::grid::{Box3, Geometry};
 use crate::io::stacks::{self, Select, Stack, StackInfo};
-use crate::pipeline::marks::split;
-use crate::pipeline::segment::{Grids, check_marks, crossed};
 
 /// A stack and where it lies.
 pub(super) struct OpenStack {
@@ -91,85 +85,9 @@ pub(super) fn crop_box(crop: Option<Crop>, shape: [i64; 3]) -> Result<Box3> {
     Ok(part)
 }
 
-/// The marks of all files, and which file each object is from.
-pub(super) struct Marks {
-    pub(super) cloud: PointCloud,
-    pub(super) files: BTreeMap<u32, PathBuf>,
-}
-
-/// Reads all files of marks. A file that names no objects is one object; those of later files are numbered on.
-pub(super) fn read_marks(paths: &[PathBuf]) -> Result<Marks> {
-    let mut marks = Marks { cloud: PointCloud::default(), files: BTreeMap::new() };
-    for path in paths {
-        let cloud = read_cloud(path)?;
-        if !marks.cloud.is_empty() && marks.cloud.contours.is_empty() != cloud.contours.is_empty() {
-            let (this, other) =
-                if cloud.contours.is_empty() { ("no contours", "does") } else { ("contours", "does not") };
-            return Err(Error::input(format!(
-                "names {this} while {} {other}; give a contour column in all files of points or in none",
-                paths[0].display()
-            ))
-            .at(path));
-        }
-        marks.add(cloud, path);
-    }
-    Ok(marks)
-}
-
-impl Marks {
-    fn add(&mut self, cloud: PointCloud, path: &Path) {
-        let before = self.files.keys().last().copied().unwrap_or(0);
-        let objects = if cloud.objects.is_empty() { vec![1; cloud.len()] } else { cloud.objects };
-        let mut numbers: BTreeMap<u32, u32> = objects.iter().map(|&object| (object, object)).collect();
-        if before > 0 {
-            (before + 1..).zip(numbers.values_mut()).for_each(|(number, renumbered)| *renumbered = number);
-        }
-        self.files.extend(numbers.values().map(|&object| (object, path.to_path_buf())));
-        self.cloud.objects.extend(objects.iter().map(|object| numbers[object]));
-        self.cloud.positions.extend(cloud.positions);
-        self.cloud.contours.extend(cloud.contours);
-    }
-}
-
-/// Says what is odd about the marks; refuses them where no object's fit the image. Whether there are several objects.
-pub(super) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: usize, console: &Console) -> Result<bool> {
-    let objects = split(&marks.cloud);
-    let (mut bad, several) = (Vec::new(), objects.len() + seeds > 1);
-    for object in &objects {
-        let label = object.object;
-        match check_marks(object, grids) {
-            Ok(notes) => notes.iter().for_each(|note| console.note(note)),
-            Err(error) => bad.push(error.at(&marks.files[&label])),
-        }
-        for number in crossed(object, grids.part) {
-            console.note(&format!("outline {number} of object {label} crosses itself: are its marks in order?"));
-        }
-    }
-    // One of several that does not fit is refused by itself.
-    if seeds == 0 && bad.len() == objects.len() && !bad.is_empty() {
-        return Err(bad.swap_remove(0));
-    }
-    Ok(several)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn cloud(objects: &[u32]) -> PointCloud {
-        PointCloud { positions: vec![[0.0; 3]; objects.len().max(2)], objects: objects.into(), contours: Vec::new() }
-    }
-
-    #[test]
-    fn objects_of_later_files_are_numbered_on() {
-        let mut marks = Marks { cloud: PointCloud::default(), files: BTreeMap::new() };
-        marks.add(cloud(&[2, 5, 2]), Path::new("a"));
-        marks.add(cloud(&[]), Path::new("b"));
-        marks.add(cloud(&[9, 1, 9]), Path::new("c"));
-        assert_eq!(marks.cloud.objects, [2, 5, 2, 6, 6, 8, 7, 8]);
-        let files: Vec<(u32, &str)> = marks.files.iter().map(|(&n, p)| (n, p.to_str().unwrap())).collect();
-        assert_eq!(files, [(2, "a"), (5, "a"), (6, "b"), (7, "c"), (8, "c")]);
-    }
 
     #[test]
     fn crops_stay_in_the_image() {

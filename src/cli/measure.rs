@@ -5,11 +5,13 @@ use std::path::Path;
 use serde_json::json;
 
 use super::args::MeasureArgs;
+use super::console::{Console, Voice};
 use super::print;
 use super::text::{grouped, number};
 use crate::error::{Error, Result};
+use crate::exec::Progress;
 use crate::grid::{BoundaryEdges, TriangleMesh};
-use crate::io::sources::{Source, read_source};
+use crate::io::sources::{Source, read_noted, read_source};
 use crate::kernel::surface::{Hausdorff, Measures, PatchIndex, SurfaceMeasure};
 
 /// Runs the command.
@@ -27,7 +29,12 @@ pub(super) fn run(args: &MeasureArgs) -> Result<()> {
 }
 
 fn read_points(path: &Path) -> Result<Vec<[f64; 3]>> {
-    Ok(match read_source(path)? {
+    let (source, notes) = read_noted(path)?;
+    let console = Console::new(Voice::of(false, false));
+    for note in &notes {
+        console.note(note);
+    }
+    Ok(match source {
         Source::Cloud(cloud) => cloud.positions,
         Source::Mesh(mesh) => mesh.vertices,
     })

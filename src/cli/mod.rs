@@ -15,6 +15,7 @@ mod files;
 mod grid;
 mod info;
 mod input;
+mod marks;
 mod measure;
 mod middle;
 mod middle_args;

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
 use crate::io::ome_zarr::StoreWriter;
-use crate::io::sources::{Source, read_source};
+use crate::io::sources::{Source, read_noted};
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, mean_spacing, reconstruct,
     without_isolated,
@@ -88,7 +88,11 @@ impl Job {
         args.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
-        let cloud = match read_source(&args.cloud)? {
+        let (source, notes) = read_noted(&args.cloud)?;
+        for note in &notes {
+            console.note(note);
+        }
+        let cloud = match source {
             Source::Cloud(cloud) => cloud.positions,
             Source::Mesh(mesh) => {
                 console.note(&format!("{} is a mesh; its vertices are taken as points", args.cloud.display()));

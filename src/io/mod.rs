@@ -1,5 +1,6 @@
 //! Which bytes mean what: one file format a file.
 
+mod decoding;
 mod input;
 pub mod label_volume;
 mod mesh;
@@ -9,6 +10,7 @@ pub mod ome_zarr;
 mod ply;
 pub mod png;
 pub mod points;
+mod roi;
 pub mod sources;
 pub mod stacks;
 mod text;

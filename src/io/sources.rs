@@ -5,11 +5,12 @@
 
 use std::path::Path;
 
-pub use super::input::Input;
+pub use super::input::{Input, is_standard_input};
 
 use super::mesh::{obj, off, stl};
-use super::text::{first_binary_byte, quoted, refuse_utf16};
-use super::{ply, points};
+use super::points::PointFile;
+use super::text::{first_binary_byte, quoted};
+use super::{ply, points, roi};
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
 
@@ -70,7 +71,7 @@ pub const FORMATS: &[Format] = &[
     Format {
         name: "CSV",
         extensions: &["csv", "tsv"],
-        about: "points; a header names the columns x, y, z, and object and contour where there are any",
+        about: "points; a header names the columns x, y, z as most programs do, and object and contour where there are any",
         sniff: points::is_csv,
         read: read_table,
     },
@@ -81,6 +82,20 @@ pub const FORMATS: &[Format] = &[
         sniff: points::is_xyz,
         read: read_table,
     },
+    Format {
+        name: "ROI",
+        extensions: &["roi"],
+        about: "outline of ImageJ, in voxels",
+        sniff: roi::is_roi,
+        read: |input| roi::read_roi(input).and_then(|file| cloud_of(file, input)),
+    },
+    Format {
+        name: "ROI set",
+        extensions: &["zip"],
+        about: "outlines of ImageJ, in voxels",
+        sniff: roi::is_zip,
+        read: |input| roi::read_zip(input).and_then(|file| cloud_of(file, input)),
+    },
 ];
 
 /// Reads points or triangles in physical coordinates.
@@ -89,16 +104,37 @@ pub const FORMATS: &[Format] = &[
 /// When the file cannot be read, is of no format in [`FORMATS`], holds neither a point nor a triangle, holds more than
 /// can be numbered, or is damaged: names the file, the place in it and the reason.
 pub fn read_source(path: &Path) -> Result<Source> {
-    read(path).map_err(|error| error.at(path))
+    read_noted(path).map(|(source, _)| source)
 }
 
-fn read(path: &Path) -> Result<Source> {
-    let mut input = Input::open(path, &format!("points or a mesh ({})", names()))?;
+/// As [`read_source`], and what the user should know about how the file was understood.
+///
+/// # Errors
+/// As [`read_source`].
+pub fn read_noted(path: &Path) -> Result<(Source, Vec<String>)> {
+    let (source, _, notes) = describe(path)?;
+    Ok((source, notes))
+}
+
+/// As [`read_noted`], and how the points of a table or of ROIs are to be understood; their cloud is left out there.
+///
+/// # Errors
+/// As [`read_source`].
+pub fn describe(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>)> {
+    let describe = || {
+        let mut input = Input::open(path, &format!("points or a mesh ({})", names()))?;
+        let source = read(&mut input)?;
+        let note = |note: String| format!("{}: {note}", path.display());
+        Ok((source, input.points, input.notes.into_iter().map(note).collect()))
+    };
+    describe().map_err(|error: Error| error.at(path))
+}
+
+fn read(input: &mut Input) -> Result<Source> {
     let head = input.head()?;
     if let Some(format) = FORMATS.iter().find(|format| (format.sniff)(head)) {
-        return (format.read)(&mut input);
+        return (format.read)(input);
     }
-    refuse_utf16(head)?;
     if let Some(place) = first_binary_byte(head) {
         return Err(Error::input(format!(
             "holds binary data of no known format (byte {place} is no text); give points or a mesh ({})",
@@ -114,11 +150,20 @@ fn read(path: &Path) -> Result<Source> {
         )));
     }
     // What is text and nothing else is a table that cannot be understood; its reader says why.
-    read_table(&mut input)
+    read_table(input)
 }
 
 fn read_table(input: &mut Input) -> Result<Source> {
-    points::read_table(input).and_then(points::refuse_empty).map(Source::Cloud)
+    points::read_table(input).and_then(|file| cloud_of(file, input))
+}
+
+/// The points of a file, with what is to be told of it.
+fn cloud_of(file: PointFile, input: &mut Input) -> Result<Source> {
+    let cloud = points::refuse_empty(file.cloud)?;
+    let file = PointFile { cloud: PointCloud::default(), ..file };
+    input.notes.extend(file.notes_without_image());
+    input.points = Some(file);
+    Ok(Source::Cloud(cloud))
 }
 
 /// The names of all formats, for a message.

@@ -77,14 +77,6 @@ pub(super) fn first_binary_byte(head: &[u8]) -> Option<usize> {
     head.iter().position(|byte| !is_text(byte))
 }
 
-/// Refuses what starts like UTF-16, whose zero bytes would pass for binary data.
-pub(super) fn refuse_utf16(head: &[u8]) -> Result<()> {
-    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return Err(Error::input("is text in UTF-16; save it as UTF-8"));
-    }
-    Ok(())
-}
-
 /// An error of the operating system while a file was read.
 pub(super) fn unreadable(error: &io::Error) -> Error {
     Error::input(format!("cannot be read: {error}"))

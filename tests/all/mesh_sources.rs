@@ -74,7 +74,13 @@ fn every_format_gives_the_same_triangles() {
 fn every_row_of_the_table_claims_its_files_alone() {
     let model = model();
     let mut claimed: Vec<&str> = Vec::new();
-    let tables = [("CSV", &b"x,y,z\n1,2,3\n"[..]), ("XYZ", b"1 2 3\n"), ("XYZ", b"s x y z\n1 2 3 4\n")];
+    let tables = [
+        ("CSV", &b"x,y,z\n1,2,3\n"[..]),
+        ("XYZ", b"1 2 3\n"),
+        ("XYZ", b"s x y z\n1 2 3 4\n"),
+        ("ROI", b"Iout\0\xe3"),
+        ("ROI set", b"PK\x03\x04"),
+    ];
     let files = Form::ALL.map(|form| (form.format(), form.write(&model)));
     for (name, file) in files.into_iter().chain(tables.map(|(name, text)| (name, text.to_vec()))) {
         let names: Vec<_> = FORMATS.iter().filter(|f| (f.sniff)(&file)).map(|f| f.name).collect();

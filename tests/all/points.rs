@@ -58,10 +58,36 @@ fn every_dialect_gives_the_same_points() {
         "x y z\n1 2.5 -3\n0.1 0.2 3e2\n7 8 9\n",
         "index,axis-0,axis-1,axis-2\n0.0,-3,2.5,1\n1.0,300,0.2,0.1\n2.0,9,8,7\n",
         "# z y x\n-3 2.5 1\n300 0.2 0.1\n9 8 7\n",
+        "sep=;\r\nx;y;z\r\n1;2,5;-3\r\n0,1;0,2;300,0\r\n7;8;9\r\n",
+        "x,y,z\r1,2.5,-3\r0.1,0.2,3e2\r7,8,9\r",
+        "3\n1 2.5 -3 255\n0.1 0.2 3e2 255\n7 8 9 255\n",
+        "2\n1 2.5 -3\n0.1 0.2 3e2\n1\n7 8 9\n",
+        "4\n0 1 2.5 -3 7\n1 0.1 0.2 3e2 7\n2 7 8 9 7\n3 7 8 9 7\n0 2 1 2\n",
+        "1,0 2,5 -3\n0,1 0,2 3e2\n7 8 9\n",
+        "x,y,z\n\"1,0\",\"2,5\",-3\n\"0,1\",\"0,2\",3e2\n7,8,9\n",
+        "\nPosition\n=====\nPosition X,Position Y,Position Z,Unit,Category,Collection,Time,ID,\n1,2.5,-3,um,Spot,Position,1,0,\n\
+         0.1,0.2,3e2,um,Spot,Position,1,1,\n7,8,9,um,Spot,Position,1,2,\n",
+        "LABEL,ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,FRAME\nLabel,Spot ID,Quality,X,Y,Z,Frame\n\
+         ,,(quality),(micron),(micron),(micron),\nID0,0,1,1,2.5,-3,0\nID1,1,1,0.1,0.2,300,0\nID2,2,1,7,8,9,0\n",
+        " ,Area,Mean,X,Y,Slice\n1,0,7,1,2.5,-2\n2,0,7,0.1,0.2,301\n3,0,7,7,8,10\n",
+        "x (\u{b5}m),y (\u{b5}m),z (\u{b5}m)\n1,2.5,-3\n0.1,0.2,3e2\n7,8,9\n",
+        "Points:0,Points:1,Points:2\n1,2.5,-3\n0.1,0.2,3e2\n7,8,9\n",
+        "label,centroid-0,centroid-1,centroid-2\n1,-3,2.5,1\n2,300,0.2,0.1\n3,9,8,7\n",
+        "# Markups fiducial file version = 4.11\n# columns = id,x,y,z,ow\nF_0,1,2.5,-3,0\nF_1,0.1,0.2,3e2,0\nF_2,7,8,9,0\n",
+        "index,axis-0,axis-1,axis-2,axis-3\n0,5,-3,2.5,1\n1,5,300,0.2,0.1\n2,5,9,8,7\n",
+        "x;y;z;;\n1;2.5;-3;;\n0.1;0.2;3e2;;\n7;8;9;;;;\n",
     ] {
         let cloud = read(text);
-        assert_eq!(cloud.positions, POINTS, "{text:?}");
+        let points = &cloud.positions[..3];
+        assert_eq!(points, POINTS, "{text:?}");
         assert!(cloud.objects.is_empty() && cloud.contours.is_empty());
+        // Spreadsheets save the same in UTF-16.
+        for is_big in [false, true] {
+            let bytes = |unit: u16| if is_big { unit.to_be_bytes() } else { unit.to_le_bytes() };
+            let text = format!("\u{feff}{}", text.trim_start_matches('\u{feff}'));
+            let encoded: Vec<u8> = text.encode_utf16().flat_map(bytes).collect();
+            assert_eq!(read_bytes(&encoded).unwrap(), cloud, "{text:?}");
+        }
     }
 }
 
@@ -90,7 +116,8 @@ fn unusable_tables_are_refused_with_line_and_reason() {
         ("x,y,z,x\n1,2,3,4\n", &["line 1", "twice"]),
         ("OFF\n3 1 0\n0 0 0\n", &["line 1", "'off'"]),
         ("1 2\n3 4\n", &["line 1", "2 columns", "x, y and z"]),
-        ("2\n1 2 3\n4 5 6\n", &["line 1", "1 column;"]),
+        ("5\n1 2 3\n4 5 6\n", &["5 points", "after 2", "cut off"]),
+        ("5\n", &["line 1", "1 column;"]),
         ("1 2 3\n4 5 6\n7 8\n", &["line 3", "2 columns where line 1 has 3"]),
         ("x,y,z\n1,2,3\n\n4,5\n", &["line 4", "2 columns where line 1 has 3"]),
         ("x,y,z\n1,2,3,4\n", &["line 2", "4 columns where line 1 has 3"]),
@@ -100,18 +127,26 @@ fn unusable_tables_are_refused_with_line_and_reason() {
         ("nan 2 3\n", &["line 1", "x is 'nan'", "not finite"]),
         ("x,y,z\n1,2,3\n1,2,-inf\n", &["line 3", "z is '-inf'", "not finite"]),
         ("1 2 1e999\n", &["line 1", "z is '1e999'", "not finite"]),
-        ("1,5;2,5;3,5\n", &["line 1", "x is '1,5'", "point"]),
-        ("1,5 2,5 3,5\n", &["line 1", "y is '5 2'"]),
+        ("1.234,5;2,5;3,5\n", &["line 1", "x is '1.234,5'", "point"]),
+        ("x;y;z\n1,5;2;3\n1.5;2;3\n", &["line 3", "x is '1.5'", "line 2", "sign of decimals"]),
         ("x,y,z,object\n1,2,3,0\n", &["line 2", "object is '0'"]),
         ("x,y,z,object\n1,2,3,1\n1,2,3,-4\n", &["line 3", "object is '-4'"]),
         ("x,y,z,object\n1,2,3,1.5\n", &["line 2", "object is '1.5'"]),
         ("x,y,z,object\n1,2,3,4294967296\n", &["line 2", "object is '4294967296'"]),
         ("x,y,z,object\n1,2,3,\n", &["line 2", "object is ''"]),
         ("x,y,z,contour\n1,2,3,a\n", &["line 2", "contour is 'a'"]),
-        ("index,axis-0,axis-1,axis-2,axis-3\n0,1,2,3,4\n", &["line 1", "axes"]),
-        ("x,y,z\r1,2,3\r", &["line 1", "carriage return"]),
+        ("index,axis-0,axis-1,axis-2,axis-3,axis-4\n0,1,2,3,4,5\n", &["line 1", "more than four axes"]),
+        ("index,axis-0,axis-1\n0,1,2\n", &["line 1", "two axes", "needs three"]),
+        ("axis-0,axis-1,axis-2,axis-3\n0.5,1,2,3\n", &["line 2", "time is '0.5'"]),
+        (
+            "name,speed x,speed y,speed z\na,1,2,3\n",
+            &["line 1", "'name, speed x, speed y, speed z'", "three columns x, y, z"],
+        ),
+        ("X,Y,Frame\n1,2,3\n", &["line 1", "not z", "slice"]),
+        ("Position\n===\nPosition X,Position Y,Unit\n1,2,um\n", &["line 3", "not z"]),
+        ("x,y,z\n1,2,3\r4,5,6\n", &["line 2", "carriage return"]),
         ("# a\n\nx,y,z,name\n1,2,3,\"b\n4,5,6,\"c\n", &["line 4", "quote"]),
-        ("1 2 3\r4 5 6\r", &["line 1", "carriage return"]),
+        ("1 2 3\r4 5 6\n", &["line 1", "carriage return"]),
     ]);
 }
 
@@ -119,7 +154,9 @@ fn unusable_tables_are_refused_with_line_and_reason() {
 fn what_is_no_table_is_refused() {
     assert!(refusal(b"II*\0\x08\0\0\0").contains("binary"));
     assert!(refusal(b"\x93NUMPY\x01").contains("binary"));
-    assert!(refusal(b"\xff\xfex\0,\0y\0").contains("UTF-16"));
+    assert!(refusal(b"\xff\xfex\0,\0y\0").contains("not z"));
+    assert!(refusal(b"PK\x03\x04 and no more").contains("damaged ZIP"));
+    assert!(refusal(b"Iout\0\xe3\0\0").contains("cut off"));
     assert!(refusal(&vec![0xe9; 100_000]).contains("line 1"));
     assert!(refusal(&[&b"1 2 3\n"[..], &vec![b'7'; 2_000_000]].concat()).contains("line 2 is longer"));
     assert!(refusal(&[b"# comment\n".repeat(9000), b"1 2 3\n".to_vec()].concat()).contains("64 kB of comments"));

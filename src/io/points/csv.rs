@@ -6,13 +6,14 @@
 use std::borrow::Cow;
 use std::io::BufRead;
 
-use super::columns::{Columns, Rows};
+use super::PointFile;
+use super::columns::Rows;
+use super::names::Columns;
 use crate::error::{Error, Result};
-use crate::grid::PointCloud;
 use crate::io::text::{next_line, quoted, refuse_bare_returns};
 
 /// Reads the points after the header, which stands in `header_line`, counted from 1.
-pub(super) fn read(text: &mut impl BufRead, separator: char, columns: Columns, header_line: u64) -> Result<PointCloud> {
+pub(super) fn read(text: &mut impl BufRead, separator: char, columns: Columns, header_line: u64) -> Result<PointFile> {
     let mut rows = Rows::new(columns);
     let mut bytes = Vec::new();
     let mut number = 1;

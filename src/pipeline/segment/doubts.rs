@@ -1,0 +1,215 @@
+//! Marks that fit the image and may be meant otherwise: slice numbers and pixels for lengths, one outline number for many
+//! slices, one object marked in two files.
+
+use crate::grid::Geometry;
+use crate::pipeline::marks::ObjectMarks;
+
+/// Marks whose whole numbers say something: fewer may be whole by chance.
+const TELLING: usize = 8;
+/// An object so few voxels wide was hardly marked on this image by lengths.
+const HARDLY_MARKED: f64 = 4.0;
+/// Two objects whose boxes share so much of what both fill are likely one.
+const SAME: f64 = 0.6;
+
+/// What speaks against reading an object's marks as lengths, where the image has other spacings than 1.
+#[must_use]
+pub fn doubts(marks: &ObjectMarks, image: &Geometry) -> Vec<String> {
+    let points = marks.contours.concat();
+    let object = marks.object;
+    if points.is_empty() || !points.iter().all(|&p| fits_as_voxels(p, image)) {
+        return Vec::new();
+    }
+    let odd = [0, 1, 2].map(|axis| is_odd(&points, axis, image));
+    let whole = [0, 1, 2].map(|axis| is_whole(&points, axis));
+    let spacing = triple(image.spacing);
+    if whole == [true; 3] && odd.contains(&true) && !contours_are_slices(marks, image) {
+        return vec![format!(
+            "all marks of object {object} are whole numbers; if they are voxel indices, multiply them by the spacing \
+             {spacing}, or give --points-in voxels"
+        )];
+    }
+    if odd[2] && !contours_are_slices(marks, image) {
+        let h = short(image.spacing[2]);
+        return vec![format!(
+            "z of all marks of object {object} is a whole number, as slice numbers are, and slices are {h} apart: if all \
+             are voxel indices, give --points-in voxels; if z alone is, name its column slice (counted from 1) or \
+             z [px] (from 0)"
+        )];
+    }
+    if points.len() >= TELLING && odd[0] && odd[1] {
+        return vec![format!(
+            "x and y of all marks of object {object} are whole numbers, as pixels are: if they are, name the columns \
+             x [px], y [px], or give --points-in voxels where z counts slices too"
+        )];
+    }
+    let wide = |axis: usize| {
+        let (low, high) = limits(&points, axis);
+        (high - low) / image.spacing[axis]
+    };
+    if points.len() >= TELLING && wide(0) < HARDLY_MARKED && wide(1) < HARDLY_MARKED && image.spacing[..2] != [1.0; 2] {
+        return vec![format!(
+            "the marks of object {object} span {:.1} x {:.1} x {:.1} voxels; if they are voxel indices, give --points-in \
+             voxels",
+            wide(0),
+            wide(1),
+            wide(2)
+        )];
+    }
+    Vec::new()
+}
+
+fn fits_as_voxels(point: [f64; 3], image: &Geometry) -> bool {
+    (0..3).all(|a| point[a] >= -0.5 && point[a] <= image.shape[a] as f64 + 0.5)
+}
+
+fn is_whole(points: &[[f64; 3]], axis: usize) -> bool {
+    points.iter().all(|p| p[axis].fract() == 0.0)
+}
+
+/// Whole numbers along an axis on which voxels do not lie at whole numbers, or lie at every few of them alone.
+fn is_odd(points: &[[f64; 3]], axis: usize, image: &Geometry) -> bool {
+    let h = image.spacing[axis];
+    let on_voxel = |p: &[f64; 3]| {
+        let voxel = image.to_voxels(*p)[axis];
+        (voxel - voxel.round()).abs() < 1e-6
+    };
+    let differ = points.iter().any(|p| p[axis] != points[0][axis]);
+    differ && is_whole(points, axis) && (h.fract() != 0.0 || !points.iter().all(on_voxel))
+}
+
+/// True where the outlines bear the numbers of the slices that they lie on by their lengths.
+fn contours_are_slices(marks: &ObjectMarks, image: &Geometry) -> bool {
+    let on_slice = |(number, contour): (&i64, &Vec<[f64; 3]>)| {
+        contour.iter().all(|&p| (image.to_voxels(p)[2] - *number as f64).abs() < 0.25)
+    };
+    marks.drawn && marks.numbers.iter().zip(&marks.contours).all(on_slice)
+}
+
+/// The outlines that have marks on several slices along z, and on how many: three marks or more on each.
+#[must_use]
+pub fn spans_slices(marks: &ObjectMarks, image: &Geometry) -> Vec<(i64, usize)> {
+    let slices = |contour: &[[f64; 3]]| {
+        let mut slices: Vec<f64> = contour.iter().map(|&p| image.to_voxels(p)[2]).collect();
+        slices.sort_by(f64::total_cmp);
+        let runs: Vec<&[f64]> = slices.chunk_by(|a, b| b - a < 0.01).collect();
+        let planar = (0..2).any(|axis| {
+            let (low, high) = limits(contour, axis);
+            high - low < 0.25 * image.spacing[axis]
+        });
+        (!planar && runs.len() > 1 && runs.iter().all(|run| run.len() > 2)).then_some(runs.len())
+    };
+    let numbered = marks.numbers.iter().zip(&marks.contours).filter(|_| marks.drawn);
+    numbered.filter_map(|(&number, contour)| Some((number, slices(contour)?))).collect()
+}
+
+/// The share that the boxes of two objects have in common of what both fill, where it is so large that they may be one
+/// object; none where one lies within the other, as a nucleus in its cell.
+#[must_use]
+pub fn same_place(a: &ObjectMarks, b: &ObjectMarks, image: &Geometry) -> Option<f64> {
+    let boxed = |marks: &ObjectMarks| {
+        let points = marks.contours.concat();
+        (!points.is_empty()).then(|| [0, 1, 2].map(|axis| limits(&points, axis)))
+    };
+    let (a, b) = (boxed(a)?, boxed(b)?);
+    let within = |inner: &[(f64, f64); 3], outer: &[(f64, f64); 3]| {
+        (0..3).all(|axis| {
+            let h = image.spacing[axis];
+            inner[axis].0 >= outer[axis].0 + h && inner[axis].1 <= outer[axis].1 - h
+        })
+    };
+    if within(&a, &b) || within(&b, &a) {
+        return None;
+    }
+    let volume = |limits: &[(f64, f64); 3]| -> f64 {
+        (0..3).map(|axis| (limits[axis].1 - limits[axis].0).max(0.0) + 0.5 * image.spacing[axis]).product()
+    };
+    let common = [0, 1, 2].map(|axis| (a[axis].0.max(b[axis].0), a[axis].1.min(b[axis].1)));
+    if common.iter().any(|(low, high)| low > high) {
+        return None;
+    }
+    let share = volume(&common) / (volume(&a) + volume(&b) - volume(&common));
+    Some(share).filter(|&share| share > SAME)
+}
+
+fn limits(points: &[[f64; 3]], axis: usize) -> (f64, f64) {
+    points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[axis]), high.max(p[axis])))
+}
+
+/// A number with no more decimals than tell something.
+fn short(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+fn triple(values: [f64; 3]) -> String {
+    let [x, y, z] = values.map(short);
+    format!("({x}, {y}, {z})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(spacing: [f64; 3]) -> Geometry {
+        Geometry { shape: [100, 80, 40], spacing, origin: [0.0; 3], unit: None }
+    }
+
+    fn rings(slices: &[f64], number: impl Fn(f64) -> i64) -> ObjectMarks {
+        let ring = |z: f64| {
+            let at = |n: u32| f64::from(n) * std::f64::consts::TAU / 12.0;
+            (0..12).map(|n| [20.1 + 9.0 * at(n).cos(), 20.2 + 9.0 * at(n).sin(), z]).collect()
+        };
+        let contours = slices.iter().map(|&z| ring(z)).collect();
+        ObjectMarks {
+            object: 3,
+            contours,
+            numbers: slices.iter().map(|&z| number(z)).collect(),
+            drawn: true,
+            seed: None,
+        }
+    }
+
+    #[test]
+    fn whole_numbers_are_doubted() {
+        let points: Vec<[f64; 3]> = (0..20).map(|n| [f64::from(n), f64::from(n % 7), f64::from(n % 3)]).collect();
+        let marks = ObjectMarks { object: 3, contours: vec![points], numbers: vec![0], drawn: false, seed: None };
+        let notes = doubts(&marks, &image([0.25, 0.25, 1.0]));
+        assert!(notes[0].contains("whole numbers") && notes[0].contains("--points-in voxels"), "{notes:?}");
+        assert!(!doubts(&marks, &image([2.0; 3])).is_empty());
+        assert!(doubts(&marks, &image([1.0; 3])).is_empty());
+    }
+
+    #[test]
+    fn slice_numbers_are_told_from_heights() {
+        let slices = [4.0, 7.0, 10.0];
+        let notes = |spacing: f64, number: fn(f64) -> i64| doubts(&rings(&slices, number), &image([0.9, 0.9, spacing]));
+        for spacing in [0.3, 2.0, 5.0] {
+            assert!(notes(spacing, |z| z as i64)[0].contains("slice numbers"), "{spacing}");
+        }
+        assert!(notes(1.0, |z| z as i64).is_empty());
+        assert!(notes(0.5, |z| (2.0 * z) as i64).is_empty(), "the outlines' numbers are those of the slices");
+        assert!(doubts(&rings(&[4.2, 7.2, 10.2], |z| z as i64), &image([0.9, 0.9, 0.3])).is_empty());
+    }
+
+    #[test]
+    fn one_number_on_all_slices_is_found() {
+        let mut marks = rings(&[4.0, 7.0, 10.0], |z| z as i64);
+        assert!(spans_slices(&marks, &image([1.0; 3])).is_empty());
+        marks.contours = vec![marks.contours.concat()];
+        marks.numbers = vec![9];
+        assert_eq!(spans_slices(&marks, &image([1.0; 3])), [(9, 3)]);
+    }
+
+    #[test]
+    fn an_object_in_two_files_is_found_and_a_nucleus_is_none() {
+        let geometry = image([1.0; 3]);
+        let (a, b) = (rings(&[4.0, 10.0, 16.0], |_| 1), rings(&[5.0, 11.0, 17.0], |_| 1));
+        assert!(same_place(&a, &b, &geometry).is_some_and(|share| share > 0.7));
+        let mut inner = rings(&[8.0, 10.0, 14.0], |_| 1);
+        let towards = |p: &[f64; 3]| [20.1 + 0.9 * (p[0] - 20.1), 20.2 + 0.85 * (p[1] - 20.2), p[2]];
+        inner.contours.iter_mut().for_each(|c| c.iter_mut().for_each(|p| *p = towards(p)));
+        assert_eq!(same_place(&a, &inner, &geometry), None);
+        let mut far = b.clone();
+        far.contours.iter_mut().for_each(|c| c.iter_mut().for_each(|p| p[0] += 15.0));
+        assert_eq!(same_place(&a, &far, &geometry), None);
+    }
+}
