@@ -46,7 +46,8 @@ pub(super) enum Command {
 }
 
 const HELP_ON_SEGMENT: &str = "\
-Lengths are physical, in the unit of the image; triples are x,y,z; the centre of the first voxel is 0,0,0.
+Lengths are physical, in the unit of the image; triples are x,y,z; the centre of the first voxel is 0,0,0,
+or where an OME-Zarr image has it.
 Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 3 some\nobjects could not be solved, 130 interrupted, 143 terminated.";
 
 const HELP_ON_DISTANCE: &str = "\
@@ -56,7 +57,7 @@ Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 130 inter
 /// Find objects in a 3-D image, guided by border points that were marked on it.
 #[derive(Clone, Debug, Args)]
 pub(super) struct SegmentArgs {
-    /// TIFF stack, or a folder with one TIFF file for each slice
+    /// TIFF stack, a folder with one TIFF file for each slice, or an OME-Zarr image
     pub(super) image: PathBuf,
     /// Border points: CSV (x,y,z and optionally object,contour; or tables of napari, Imaris and others), XYZ, PLY,
     /// ROIs (.roi, .zip); - reads standard input. Given several times, the n-th file is object n, and objects named in
@@ -95,6 +96,9 @@ pub(super) struct ImageArgs {
     /// Time point of the file, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) time: u32,
+    /// Resolution of an OME-Zarr image, 0 the finest
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) level: u32,
     /// Part of the image in voxels, ends excluded; an end left out is the image's [default: all of it]
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = parse_crop, allow_hyphen_values = true)]
     pub(super) crop: Option<Crop>,
@@ -271,7 +275,7 @@ pub(super) struct MeasureArgs {
 /// Tell what an input or output is.
 #[derive(Debug, Args)]
 pub(super) struct InfoArgs {
-    /// TIFF stack, folder of slices, border points (CSV, XYZ, PLY) or OUT.zarr
+    /// TIFF stack, folder of slices, border points (CSV, XYZ, PLY), OME-Zarr or OUT.zarr
     pub(super) file: PathBuf,
     /// Print JSON
     #[arg(long)]

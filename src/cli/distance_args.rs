@@ -55,12 +55,21 @@ pub(super) struct GridArgs {
     #[arg(long, value_name = "NX,NY,NZ", value_parser = parse_whole_triple, allow_hyphen_values = true,
           requires_all = ["origin", "spacing"])]
     pub(super) shape: Option<[i64; 3]>,
-    /// The grid of this image: TIFF stack or folder of slices; that of a label volume is taken without being asked for
+    /// The grid of this image: TIFF stack, folder of slices or OME-Zarr; that of a label volume is taken without being asked for
     #[arg(long, value_name = "IMAGE", conflicts_with_all = ["spacing", "origin", "shape"])]
     pub(super) like: Option<PathBuf>,
     /// Distance between voxel centres of label volumes and of --like, in place of what the file says
     #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
     pub(super) image_spacing: Option<[f64; 3]>,
+    /// Channel of label volumes, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) channel: u32,
+    /// Time point of label volumes, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) time: u32,
+    /// Resolution of OME-Zarr label volumes and of --like, 0 the finest
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) level: u32,
 }
 
 /// How distance is computed.

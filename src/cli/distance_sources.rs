@@ -3,17 +3,15 @@
 use std::path::Path;
 
 use super::console::Console;
-use super::distance_args::DistanceJobArgs;
+use super::distance_args::{DistanceJobArgs, GridArgs};
 use super::grid::check_spacing;
 use super::input::open_stack;
 use super::text::grouped;
 use crate::error::{Error, Result};
 use crate::exec::{Cancel, Progress};
 use crate::grid::{DataSets, Geometry, TriangleMesh, refuse_too_many};
-use crate::io::label_volume::{LabelVolume, is_label_volume};
-use crate::io::ome_zarr::is_store;
+use crate::io::label_volume::{LabelVolume, is_label_volume, labels_of};
 use crate::io::sources::{Source, read_noted};
-use crate::io::stacks::Select;
 use crate::pipeline::label_borders::label_borders;
 
 /// What was read.
@@ -30,7 +28,7 @@ pub(super) fn read_sets(args: &DistanceJobArgs, console: &Console, cancel: &Canc
     for path in &args.sources {
         let is_volume = is_label_volume(path);
         if is_volume && !args.choice.signed {
-            let volume = open_volume(path, args.job.grid.image_spacing, console)?;
+            let volume = open_volume(path, &args.job.grid, console)?;
             add_labels(&mut read.sets, path, &volume, console, cancel)?;
             read.volume.get_or_insert_with(|| volume.geometry().clone());
         } else if is_volume {
@@ -60,19 +58,13 @@ fn without_inside(what: &str) -> Error {
     Error::input(format!("holds {what}, which have no inside here; --signed needs triangle meshes"))
 }
 
-fn open_volume(path: &Path, spacing: Option<[f64; 3]>, console: &Console) -> Result<LabelVolume> {
-    if is_store(path) {
-        let mut volume = LabelVolume::of_store(path)?;
-        if let Some(spacing) = spacing {
-            volume.set_spacing(spacing);
-        }
-        return Ok(volume);
-    }
-    let stack = open_stack(path, Select::default(), spacing)?;
-    for note in &stack.notes {
+fn open_volume(path: &Path, args: &GridArgs, console: &Console) -> Result<LabelVolume> {
+    let (path, note) = labels_of(path)?;
+    let stack = open_stack(&path, args.select(), args.image_spacing)?;
+    for note in note.iter().chain(&stack.notes) {
         console.note(note);
     }
-    Ok(LabelVolume::of_stack(path, stack.stack, stack.geometry))
+    Ok(LabelVolume::new(&path, stack.stack, stack.geometry))
 }
 
 /// Each label of a volume is a data set of that label; after other files they are numbered on.

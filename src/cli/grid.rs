@@ -15,7 +15,7 @@ const DEFAULT_PADDING: f64 = 1.0 / 6.0;
 /// The grid that was asked for; `bounds` is the box of all sources. Adds what the user should know to `notes`.
 pub(super) fn grid(args: &GridArgs, (low, high): ([f64; 3], [f64; 3]), notes: &mut Vec<String>) -> Result<Geometry> {
     if let Some(image) = &args.like {
-        let stack = open_stack(image, Select { channel: 0, time: 0 }, args.image_spacing)?;
+        let stack = open_stack(image, args.select(), args.image_spacing)?;
         notes.extend(stack.notes);
         return Ok(stack.geometry);
     }
@@ -60,6 +60,11 @@ fn exact(shape: [i64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Geometr
 }
 
 impl GridArgs {
+    /// Which part of label volumes and of the image of --like is read.
+    pub(super) fn select(&self) -> Select {
+        Select { channel: self.channel, time: self.time, level: self.level, ..Select::default() }
+    }
+
     /// Whether anything was said of where the grid lies.
     pub(super) fn is_asked_for(&self) -> bool {
         self.spacing.is_some() || self.padding.is_some() || self.origin.is_some() || self.like.is_some()
@@ -92,8 +97,17 @@ pub(super) fn check_counts(counts: [f64; 3]) -> Result<()> {
 mod tests {
     use super::*;
 
-    const NOTHING: GridArgs =
-        GridArgs { spacing: None, padding: None, origin: None, shape: None, like: None, image_spacing: None };
+    const NOTHING: GridArgs = GridArgs {
+        spacing: None,
+        padding: None,
+        origin: None,
+        shape: None,
+        like: None,
+        image_spacing: None,
+        channel: 0,
+        time: 0,
+        level: 0,
+    };
 
     fn around(args: &GridArgs, low: [f64; 3], high: [f64; 3]) -> Result<Geometry> {
         grid(args, (low, high), &mut Vec::new())

@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::args::InfoArgs;
+use super::info_store::store;
 use super::print;
 use super::text::{grouped, number, triple};
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
-use crate::io::ome_zarr::{ImageReader, is_store};
+use crate::io::ome_zarr::is_store;
 use crate::io::points::{PointFile, Scale};
 use crate::io::sources::{Source, describe, is_standard_input};
 use crate::io::stacks::{self, Select};
@@ -40,14 +41,14 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     Ok(())
 }
 
-type Lines = Vec<(String, String)>;
+pub(super) type Lines = Vec<(String, String)>;
 
 fn table(lines: &Lines) -> String {
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     lines.iter().fold(String::new(), |text, (name, value)| text + &format!("{name:<width$}  {value}\n"))
 }
 
-fn line(name: &str, value: impl Into<String>) -> (String, String) {
+pub(super) fn line(name: &str, value: impl Into<String>) -> (String, String) {
     (name.into(), value.into())
 }
 
@@ -143,86 +144,4 @@ fn triangles(mesh: &TriangleMesh) -> (Value, Lines) {
         "boundary_edges": edges.open, "flipped_edges": edges.flipped, "lowest_xyz": low, "highest_xyz": high,
     });
     (document, lines)
-}
-
-fn store(path: &Path) -> Result<(Value, Lines)> {
-    let mut lines = vec![line("kind", "OME-Zarr store")];
-    let mut images = Map::new();
-    for group in groups(path) {
-        // The root of a store may hold no image of its own.
-        let Ok(image) = ImageReader::open(&path.join(&group)) else { continue };
-        let name = if group.is_empty() { "image" } else { &group };
-        let mut levels = Vec::new();
-        for level in image.levels() {
-            let g = &level.geometry;
-            let [x, y, z] = g.shape;
-            let unit = g.unit.as_deref().unwrap_or("");
-            let text = format!("{x} x {y} x {z} {}, spacing {} {unit}", level.element, triple(g.spacing));
-            lines.push(line(&format!("{name}, level {}", level.path), text.trim_end()));
-            levels.push(json!({
-                "path": level.path, "shape_xyz": g.shape, "spacing_xyz": g.spacing, "origin_xyz": g.origin,
-                "unit": g.unit, "type": level.element,
-            }));
-        }
-        images.insert(name.into(), levels.into());
-    }
-    if images.is_empty() {
-        return Err(Error::input("holds no OME-Zarr 0.5 image with the axes z, y, x").at(path));
-    }
-    let report = std::fs::read(path.join("report.json")).ok().and_then(|text| serde_json::from_slice(&text).ok());
-    if let Some(report) = &report {
-        lines.extend(summary(report));
-    }
-    let result = report.as_ref().map_or(Value::Null, |report| report["result"].clone());
-    Ok((json!({ "kind": "store", "images": images, "result": result }), lines))
-}
-
-/// The groups in which our stores keep images, the root first.
-fn groups(store: &Path) -> Vec<String> {
-    let below = |folder: &str| {
-        let entries = std::fs::read_dir(store.join(folder)).into_iter().flatten().flatten();
-        let mut names: Vec<String> = entries
-            .filter(|entry| entry.path().join("zarr.json").is_file())
-            .map(|entry| format!("{folder}/{}", entry.file_name().to_string_lossy()))
-            .collect();
-        names.sort();
-        names
-    };
-    let mut groups = vec![String::new(), "levelset".into()];
-    groups.extend(below("levelset"));
-    groups.extend(below("labels"));
-    groups.extend(below("closest-point"));
-    groups
-}
-
-/// The inputs that a report names: an image, or sources.
-fn made_from(settings: &Value) -> String {
-    let sources = settings["sources"].as_array().into_iter().flatten();
-    let single = ["image", "cloud"].iter().filter_map(|key| settings[key].as_str());
-    let names: Vec<&str> = single.chain(sources.filter_map(Value::as_str)).collect();
-    names.join(", ")
-}
-
-/// A few lines out of a report.
-fn summary(report: &Value) -> Lines {
-    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned);
-    let unit = report["grid"]["unit"].as_str().unwrap_or("").to_owned();
-    let mut lines = vec![
-        line("made by", format!("strandline {} {}", text(&report["version"]), text(&report["command"]))),
-        line("from", made_from(&report["settings"])),
-        line("seconds", report["seconds"].as_f64().map_or("?".into(), number)),
-    ];
-    for object in report["result"]["objects"].as_array().into_iter().flatten() {
-        let value = |name: &str| object[name].as_f64().map_or("?".into(), number);
-        lines.push(line(
-            &format!("object {}", object["label"]),
-            format!(
-                "volume {}, area {} ({unit} cubed, squared), closed: {}",
-                value("volume"),
-                value("area"),
-                object["closed"]
-            ),
-        ));
-    }
-    lines
 }

@@ -6,6 +6,7 @@ use super::text::number;
 use super::values::Crop;
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry};
+use crate::io::ome_zarr::is_store;
 use crate::io::stacks::{self, Select, Stack, StackInfo};
 
 /// A stack and where it lies.
@@ -33,11 +34,30 @@ pub(super) fn open_stack(path: &Path, select: Select, spacing: Option<[f64; 3]>)
         ))
         .at(path));
     }
+    if spacing.is_none() {
+        check_told(path, info)?;
+    }
     let mut notes: Vec<String> = info.notes.iter().map(|note| format!("{}: {note}", path.display())).collect();
     let guessed = info.spacing.map(|told| told.is_none() && spacing.is_none());
     let spacing = spacing.unwrap_or_else(|| file_spacing(path, info, &mut notes));
-    let geometry = Geometry { shape: info.shape, spacing, origin: [0.0; 3], unit: info.unit.clone() };
+    let geometry = Geometry { shape: info.shape, spacing, origin: info.origin, unit: info.unit.clone() };
     Ok(OpenStack { stack, geometry, guessed, notes })
+}
+
+/// Refuses a spacing that is none, and an array that says nothing of where its voxels lie.
+fn check_told(path: &Path, info: &StackInfo) -> Result<()> {
+    let give = "give --image-spacing HX,HY,HZ";
+    for (axis, spacing) in AXES.iter().zip(info.spacing) {
+        if let Some(spacing) = spacing.filter(|h| !(h.is_finite() && *h > 0.0)) {
+            return Err(
+                Error::input(format!("has scale {spacing} along {axis}, where voxels have a size; {give}")).at(path)
+            );
+        }
+    }
+    if is_store(path) && info.spacing == [None; 3] {
+        return Err(Error::input(format!("does not tell the spacing of its voxels; {give}")).at(path));
+    }
+    Ok(())
 }
 
 /// The file's spacing; what it does not tell is guessed, with a note.

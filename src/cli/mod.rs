@@ -14,6 +14,7 @@ mod distance_sources;
 mod files;
 mod grid;
 mod info;
+mod info_store;
 mod input;
 mod marks;
 mod measure;

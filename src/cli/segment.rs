@@ -87,7 +87,8 @@ impl Job {
         args.output.picture.as_deref().map(picture::check_name).transpose()?;
         let resources = config::resources(&args.resources, args.output.store())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
-        let select = Select { channel: args.picture.channel, time: args.picture.time };
+        let picture = &args.picture;
+        let select = Select { channel: picture.channel, time: picture.time, level: picture.level, ..Select::default() };
         let opened = open_stack(&args.image, select, spacing)?;
         opened.notes.iter().for_each(|note| console.note(note));
         let crop = crop_box(args.picture.crop, opened.geometry.shape)?;
@@ -312,6 +313,7 @@ impl Job {
             output: output.store().map(|path| path.display().to_string()),
             channel: picture.channel,
             time: picture.time,
+            level: picture.level,
             crop_xyz: crop_xyz(&self.crop),
             image_type: outcome.element.name(),
             solver: Solver::new(&self.settings, &self.geometry),

@@ -15,3 +15,4 @@ pub mod sources;
 pub mod stacks;
 mod text;
 pub mod tiff_stack;
+pub mod zarr_image;

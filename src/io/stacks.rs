@@ -6,8 +6,9 @@ use std::path::Path;
 
 use super::ome_zarr::is_store;
 use super::tiff_stack::{self, TiffStack};
+use super::zarr_image::ZarrImage;
 use crate::error::{Error, Result};
-use crate::store::{ElementType, PlaneSource};
+use crate::store::{ElementType, VolumeSource};
 
 /// What a stack is, told without decoding a plane of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +25,8 @@ pub struct StackInfo {
     pub element: ElementType,
     /// Distance between voxel centres along x, y, z, each where the file tells it.
     pub spacing: [Option<f64>; 3],
+    /// World position of the centre of the first voxel, x, y, z.
+    pub origin: [f64; 3],
     /// The unit of `spacing` as OME-Zarr spells it, where the file tells it.
     pub unit: Option<String>,
     /// The axes as stored, slowest first, `S` for samples inside a pixel: `TZCYX`.
@@ -41,10 +44,14 @@ pub struct Select {
     pub channel: u32,
     /// The time point.
     pub time: u32,
+    /// The resolution of a multiscale image, 0 the finest.
+    pub level: u32,
+    /// The image; the first where none is named.
+    pub image: Option<u32>,
 }
 
 /// One channel at one time of a stack that was opened.
-pub trait Stack: PlaneSource {
+pub trait Stack: VolumeSource {
     /// What the stack is.
     fn info(&self) -> &StackInfo;
 }
@@ -78,6 +85,7 @@ pub const FORMATS: &[Format] = &[
         sniff: |path| path.is_dir() && !is_store(path),
         open: open_tiff,
     },
+    Format { name: "Zarr image", extensions: &[], sniff: is_store, open: open_zarr },
 ];
 
 /// The format of what lies at a path; none when it is no stack, or nothing lies there.
@@ -104,7 +112,15 @@ pub fn open_stack(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
     (format.open)(path, select)
 }
 
+fn open_zarr(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
+    Ok(Box::new(ZarrImage::open(path, select)?))
+}
+
 fn open_tiff(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
+    if select.level > 0 {
+        let error = format!("--level {} chooses a level of an OME-Zarr image; TIFF is read as it is", select.level);
+        return Err(Error::usage(error).at(path));
+    }
     Ok(Box::new(TiffStack::open(path, select)?))
 }
 
@@ -134,11 +150,12 @@ mod tests {
             assert_eq!(name(&write("data.bin", bytes)), Some("TIFF stack"), "{bytes:?}");
         }
         assert_eq!(name(slices), Some("folder of TIFF slices"));
+        assert_eq!(name(store), Some("Zarr image"));
         assert_eq!(name(&write("text.TIF", b"no image")), Some("TIFF stack"));
-        for other in [store, &write("marks.csv", b"x,y,z\n"), &write("empty", b""), &folder.path().join("missing")] {
+        for other in [&write("marks.csv", b"x,y,z\n"), &write("empty", b""), &folder.path().join("missing")] {
             assert_eq!(name(other), None, "{}", other.display());
             let error = open_stack(other, Select::default()).err().unwrap();
-            assert_eq!((error.exit_code(), error.path()), (2, Some(other)));
+            assert_eq!((error.exit_code(), error.path()), (2, Some(&**other)));
         }
     }
 }

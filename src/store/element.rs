@@ -117,6 +117,38 @@ pub enum SamplesMut<'a> {
     F64(&'a mut [f64]),
 }
 
+impl SamplesMut<'_> {
+    /// The type of the samples.
+    #[must_use]
+    pub fn element(&self) -> ElementType {
+        match self {
+            Self::U8(_) => ElementType::U8,
+            Self::U16(_) => ElementType::U16,
+            Self::U32(_) => ElementType::U32,
+            Self::F32(_) => ElementType::F32,
+            Self::F64(_) => ElementType::F64,
+        }
+    }
+
+    /// How many samples the buffer takes.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U8(out) => out.len(),
+            Self::U16(out) => out.len(),
+            Self::U32(out) => out.len(),
+            Self::F32(out) => out.len(),
+            Self::F64(out) => out.len(),
+        }
+    }
+
+    /// True for a buffer that takes none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
 /// An element type that stacks hand out: says how its buffers are passed to a reader.
 pub trait Sample: Element {
     /// The buffer as the reader wants it.

@@ -11,5 +11,5 @@ mod window;
 pub use brick_array::{BrickArray, Scratch};
 pub use element::{Element, ElementType, Sample, SamplesMut};
 pub use free_space::free_space;
-pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, NoMesh, PlaneSource};
+pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, NoMesh, PlaneSource, VolumeSource};
 pub use window::{Traffic, Window};

@@ -1,6 +1,6 @@
-//! The traits that join files, bricks and pipelines: read or write any box of voxels, one plane of a stack, or a mesh.
+//! The traits that join files, bricks and pipelines: read or write any box of voxels, a volume as it is stored, or a mesh.
 
-use super::{Element, ElementType, SamplesMut};
+use super::{Element, ElementType, Sample, SamplesMut};
 use crate::error::Result;
 use crate::grid::Box3;
 
@@ -46,6 +46,93 @@ pub trait PlaneSource: Sync {
     /// # Errors
     /// When the plane cannot be read or decoded: names file, page and reason.
     fn read_plane(&self, z: i64, out: SamplesMut<'_>) -> Result<()>;
+}
+
+/// A volume in a file, of which any box can be read from any thread, and which is stored in boxes of its own: the planes of
+/// a stack, the chunks of a Zarr array.
+pub trait VolumeSource: Sync {
+    /// Voxels along each axis, `[x, y, z]`.
+    fn shape(&self) -> [i64; 3];
+
+    /// The type that samples are handed out in.
+    fn element(&self) -> ElementType;
+
+    /// The shape of the boxes in which the volume is best read, laid from voxel (0, 0, 0) on and cut where it ends: what
+    /// is read by whole boxes is decoded once.
+    fn natural_shape(&self) -> [i64; 3];
+
+    /// Bytes that are held while a natural box is read, beside the buffer that it goes into.
+    fn decoding_bytes(&self) -> u64;
+
+    /// Fills `out`, dense `[z][y][x]` over `part`, of the type that [`VolumeSource::element`] names; `part` lies inside the
+    /// shape.
+    ///
+    /// # Errors
+    /// When a part of the file cannot be read or decoded: names file, place and reason.
+    fn read_box(&self, part: &Box3, out: SamplesMut<'_>) -> Result<()>;
+
+    /// The natural boxes that hold voxels of `part`, cut to it, x fastest.
+    fn natural_boxes(&self, part: &Box3) -> Vec<Box3> {
+        let edge = self.natural_shape();
+        let first = |a: usize| part.lo[a].div_euclid(edge[a]);
+        let end = |a: usize| (part.hi[a] - 1).div_euclid(edge[a]) + 1;
+        let places = Box3::new([first(0), first(1), first(2)], [end(0), end(1), end(2)]);
+        let cut = |place: [i64; 3]| {
+            let lo: [i64; 3] = std::array::from_fn(|a| place[a] * edge[a]);
+            Box3::new(lo, std::array::from_fn(|a| lo[a] + edge[a])).intersect(part)
+        };
+        places.rows().flat_map(|(y, z)| (places.lo[0]..places.hi[0]).map(move |x| cut([x, y, z]))).collect()
+    }
+}
+
+impl<S: PlaneSource> VolumeSource for S {
+    fn shape(&self) -> [i64; 3] {
+        PlaneSource::shape(self)
+    }
+
+    fn element(&self) -> ElementType {
+        PlaneSource::element(self)
+    }
+
+    fn natural_shape(&self) -> [i64; 3] {
+        let [width, height, _] = PlaneSource::shape(self);
+        [width, height, 1]
+    }
+
+    fn decoding_bytes(&self) -> u64 {
+        let [width, height, _] = PlaneSource::shape(self);
+        // A part of a plane is cut out of the whole; what is decoded is bounded by the plane too.
+        2 * width.unsigned_abs() * height.unsigned_abs() * PlaneSource::element(self).size() as u64
+    }
+
+    fn read_box(&self, part: &Box3, out: SamplesMut<'_>) -> Result<()> {
+        match out {
+            SamplesMut::U8(out) => read_planes(self, part, out),
+            SamplesMut::U16(out) => read_planes(self, part, out),
+            SamplesMut::U32(out) => read_planes(self, part, out),
+            SamplesMut::F32(out) => read_planes(self, part, out),
+            SamplesMut::F64(out) => read_planes(self, part, out),
+        }
+    }
+}
+
+/// Reads a box of a stack plane by plane.
+fn read_planes<T: Sample>(source: &impl PlaneSource, part: &Box3, out: &mut [T]) -> Result<()> {
+    let [width, height, _] = source.shape();
+    let [part_width, part_height, _] = part.shape();
+    let mut buffer = Vec::new();
+    for (z, out) in (part.lo[2]..part.hi[2]).zip(out.chunks_exact_mut((part_width * part_height) as usize)) {
+        if [part_width, part_height] == [width, height] {
+            source.read_plane(z, T::buffer(out))?;
+            continue;
+        }
+        buffer.resize((width * height) as usize, T::default());
+        source.read_plane(z, T::buffer(&mut buffer))?;
+        for (y, row) in (part.lo[1]..).zip(out.chunks_exact_mut(part_width as usize)) {
+            row.copy_from_slice(&buffer[(y * width + part.lo[0]) as usize..][..part_width as usize]);
+        }
+    }
+    Ok(())
 }
 
 /// Something that takes a triangle mesh as it is found: a file, a buffer in memory.

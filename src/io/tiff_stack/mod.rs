@@ -16,7 +16,7 @@ mod samples;
 mod shaped;
 mod slices;
 mod source;
-mod units;
+pub(super) mod units;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};

@@ -11,9 +11,11 @@ pub(super) enum SampleKind {
     U8,
     U16,
     U32,
+    U64,
     I8,
     I16,
     I32,
+    I64,
     F16,
     F32,
     F64,
@@ -30,14 +32,15 @@ impl SampleKind {
             (1 | 4, 8) => Ok(Self::U8),
             (1 | 4, 16) => Ok(Self::U16),
             (1 | 4, 32) => Ok(Self::U32),
+            (1 | 4, 64) => Ok(Self::U64),
             (1 | 4, 1..=31) => Ok(Self::Packed(bits as u8)),
             (2, 8) => Ok(Self::I8),
             (2, 16) => Ok(Self::I16),
             (2, 32) => Ok(Self::I32),
+            (2, 64) => Ok(Self::I64),
             (3, 16) => Ok(Self::F16),
             (3, 32) => Ok(Self::F32),
             (3, 64) => Ok(Self::F64),
-            (1 | 2 | 4, 64) => Err("64-bit integers are not supported; save it as 32 bit or as float".to_string()),
             (5 | 6, _) => Err("complex numbers are not supported; save the real part or the magnitude".to_string()),
             _ => {
                 let name = match format {
@@ -57,7 +60,7 @@ impl SampleKind {
             Self::U8 | Self::I8 => 8,
             Self::U16 | Self::I16 | Self::F16 => 16,
             Self::U32 | Self::I32 | Self::F32 => 32,
-            Self::F64 => 64,
+            Self::U64 | Self::I64 | Self::F64 => 64,
             Self::Packed(bits) => u16::from(bits),
         }
     }
@@ -70,8 +73,8 @@ impl SampleKind {
     /// The value of the `SampleFormat` tag.
     pub(super) fn format(self) -> u16 {
         match self {
-            Self::U8 | Self::U16 | Self::U32 | Self::Packed(_) => 1,
-            Self::I8 | Self::I16 | Self::I32 => 2,
+            Self::U8 | Self::U16 | Self::U32 | Self::U64 | Self::Packed(_) => 1,
+            Self::I8 | Self::I16 | Self::I32 | Self::I64 => 2,
             Self::F16 | Self::F32 | Self::F64 => 3,
         }
     }
@@ -82,14 +85,14 @@ impl SampleKind {
         format!("{family}{}", self.bits())
     }
 
-    /// The smallest type handed out that holds every value exactly.
+    /// The smallest type handed out that holds every value exactly; of 64-bit integers those up to 2^53.
     pub(super) fn element(self) -> ElementType {
         match self {
             Self::U8 | Self::Packed(..=8) => ElementType::U8,
             Self::U16 | Self::Packed(..=16) => ElementType::U16,
             Self::U32 | Self::Packed(_) => ElementType::U32,
             Self::I8 | Self::I16 | Self::F16 | Self::F32 => ElementType::F32,
-            Self::I32 | Self::F64 => ElementType::F64,
+            Self::I32 | Self::U64 | Self::I64 | Self::F64 => ElementType::F64,
         }
     }
 }
@@ -154,6 +157,8 @@ impl Row<'_> {
             (SampleKind::I8, SamplesMut::F32(o)) => numbers!(self, &mut o[part], i8, f32::from),
             (SampleKind::I16, SamplesMut::F32(o)) => numbers!(self, &mut o[part], i16, f32::from),
             (SampleKind::I32, SamplesMut::F64(o)) => numbers!(self, &mut o[part], i32, f64::from),
+            (SampleKind::U64, SamplesMut::F64(o)) => numbers!(self, &mut o[part], u64, |v| v as f64),
+            (SampleKind::I64, SamplesMut::F64(o)) => numbers!(self, &mut o[part], i64, |v| v as f64),
             (SampleKind::Packed(b), SamplesMut::U8(o)) => unpack(self, b.into(), &mut o[part], |v| v as u8),
             (SampleKind::Packed(b), SamplesMut::U16(o)) => unpack(self, b.into(), &mut o[part], |v| v as u16),
             (SampleKind::Packed(b), SamplesMut::U32(o)) => unpack(self, b.into(), &mut o[part], |v| v),

@@ -237,6 +237,7 @@ pub(super) fn info(page: &Page, dimensions: &Dimensions, description: Descriptio
         file_type: sample.name(),
         element: sample.element(),
         spacing: description.spacing,
+        origin: [0.0; 3],
         unit: description.unit,
         axes: dimensions.letters(page),
         compression: page.compression.name(),

@@ -22,7 +22,7 @@ const UNITS: [(&str, f64, &[&str]); 12] = [
 
 /// What a spelling of a unit means.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Unit {
+pub(in crate::io) enum Unit {
     /// The OME-Zarr name, and how many metres it has.
     Length(&'static str, f64),
     /// Lengths are counted in pixels: no physical unit.
@@ -32,7 +32,7 @@ pub(super) enum Unit {
 }
 
 /// Finds the unit; upper and lower case count as one except where they tell `mm` from `Mm`.
-pub(super) fn parse(text: &str) -> Unit {
+pub(in crate::io) fn parse(text: &str) -> Unit {
     let text = text.trim().replace("\\u00B5", "\u{b5}").replace("\\u00b5", "\u{b5}").replace("\\u03BC", "\u{3bc}");
     let lower = text.to_lowercase();
     if ["", "pixel", "pixels", "pix", "px", "voxel", "voxels", "none", "null"].contains(&lower.as_str()) {

@@ -25,19 +25,20 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// The histogram of some values; none when one of them is no finite number.
-    #[must_use]
-    pub fn of<T: Element>(values: &[T]) -> Option<Self> {
-        let mut counts = Self::default();
-        for value in values {
+    /// Counts some values.
+    ///
+    /// # Errors
+    /// With the place of a value that is no finite number; those before it are counted.
+    pub fn add<T: Element>(&mut self, values: &[T]) -> Result<(), usize> {
+        for (place, value) in values.iter().enumerate() {
             let value = value.to_f64();
             if !value.is_finite() {
-                return None;
+                return Err(place);
             }
-            (counts.low, counts.high) = (counts.low.min(value), counts.high.max(value));
-            counts.bins[bin_of(value) as usize] += 1;
+            (self.low, self.high) = (self.low.min(value), self.high.max(value));
+            self.bins[bin_of(value) as usize] += 1;
         }
-        Some(counts)
+        Ok(())
     }
 
     /// Adds the counts of another one.
@@ -88,14 +89,20 @@ fn value_of(bin: u32) -> f64 {
 mod tests {
     use super::*;
 
+    fn of<T: Element>(values: &[T]) -> Histogram {
+        let mut counts = Histogram::default();
+        counts.add(values).unwrap();
+        counts
+    }
+
     #[test]
     fn percentiles_are_those_of_the_sorted_values() {
         let values: Vec<u16> = (0..10_000u32).map(|n| ((n * 7919) % 10_000 / 40) as u16).collect();
-        let range = Histogram::of(&values).unwrap().range([1.0, 99.0]);
+        let range = of(&values).range([1.0, 99.0]);
         assert_eq!((range.low, range.high), (2.0, 247.0));
-        let constant = Histogram::of(&[5.0f32; 8]).unwrap().range([1.0, 99.0]);
+        let constant = of(&[5.0f32; 8]).range([1.0, 99.0]);
         assert_eq!(constant.low, constant.high);
-        assert!(Histogram::of(&[1.0, f32::NAN]).is_none());
+        assert_eq!(Histogram::default().add(&[1.0, f32::NAN, 2.0]), Err(1));
     }
 
     #[test]

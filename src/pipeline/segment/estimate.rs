@@ -17,7 +17,7 @@ use crate::pipeline::image_terms::Smoothing;
 use crate::pipeline::marks::{cloud_of, split_and_seed};
 use crate::pipeline::smoothing::thread_bytes;
 use crate::pipeline::vicinity::Vicinity;
-use crate::store::PlaneSource;
+use crate::store::VolumeSource;
 
 /// What a run is expected to take.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,6 +43,8 @@ const SECONDS_PER_VOXEL: f64 = 6e-8;
 /// Memory that an outline takes: its curve, its edges and where they lie; and what an object's profiles and shape take.
 const OUTLINE_BYTES: u64 = 256 << 10;
 const OUTLINED_BYTES: u64 = 2 << 20;
+/// Memory that a thread takes to count grey values.
+const HISTOGRAM_BYTES: u64 = 10 << 20;
 /// Memory that a thread takes to fit outlines.
 const FIT_BYTES: u64 = 8 << 20;
 
@@ -51,7 +53,7 @@ const FIT_BYTES: u64 = 8 << 20;
 /// The search for what a cloud encloses is taken to end where it begins, at its first reach.
 #[must_use]
 pub fn estimate(
-    stack: &dyn PlaneSource,
+    stack: &dyn VolumeSource,
     crop: &Box3,
     guides: &Guides<'_>,
     settings: &SegmentSettings,
@@ -59,7 +61,7 @@ pub fn estimate(
     writes: bool,
 ) -> Estimate {
     let size = stack.element().size() as u64;
-    let plane = stack.shape()[0].unsigned_abs() * stack.shape()[1].unsigned_abs() * size;
+    let natural = Box3::from_shape(stack.natural_shape()).volume() * size;
     let (mut points, mut grid_cells, mut largest, mut near, mut outlines) = (0, 0, 0, 0, 0);
     let objects = split_and_seed(guides.cloud, guides.seeds);
     for marks in &objects {
@@ -82,8 +84,8 @@ pub fn estimate(
     let grid = BrickGrid::new(crop.shape(), settings.brick);
     let image = grid.len() * grid.brick_len() as u64 * size;
     let (largest_voxels, near_voxels) = (largest * CELL_LEN as u64, near * CELL_LEN as u64);
-    // While planes come in: the plane, its cropped copy, and what is decoded; the latter two bounded by the plane.
-    let reading = threads * (3 * plane + (2 << 20));
+    // While the image comes in: a natural box, what its decoding takes, and a histogram.
+    let reading = threads * (natural + stack.decoding_bytes() + HISTOGRAM_BYTES);
     let solving = outlines
         + threads * FIT_BYTES
         + points * POINT_BYTES
@@ -91,7 +93,7 @@ pub fn estimate(
         + largest * STORED_CELL_BYTES;
     let writing = if writes { threads * COARSE_VOXELS * size.max(4) } else { 0 };
     // Decoders keep their buffers.
-    let decoders = threads * plane;
+    let decoders = threads * natural;
     let [joining, joined] =
         if objects.len() > 1 { needs(guides.geometry, settings.fill_gaps, threads) } else { [0; 2] };
     let coarse = if writes { voxels * size * 3 / 4 } else { 0 };

@@ -18,7 +18,7 @@ use crate::kernel::surface::Contact;
 use crate::pipeline::ingest::{Image, ingest};
 use crate::pipeline::marks::split_and_seed;
 use crate::pipeline::pyramid::{Reduce, write_levels};
-use crate::store::{BoxSource, Element, ElementType, PlaneSource, Sample};
+use crate::store::{BoxSource, Element, ElementType, Sample, VolumeSource};
 
 /// What a segmentation found.
 #[derive(Clone, Debug)]
@@ -46,7 +46,7 @@ pub struct Outcome {
 /// interrupted.
 pub fn segment(
     engine: &Engine,
-    stack: &dyn PlaneSource,
+    stack: &dyn VolumeSource,
     crop: &Box3,
     guides: &Guides<'_>,
     settings: &SegmentSettings,
@@ -63,14 +63,14 @@ pub fn segment(
 
 fn run<T: Sample>(
     engine: &Engine,
-    stack: &dyn PlaneSource,
+    stack: &dyn VolumeSource,
     crop: &Box3,
     guides: &Guides<'_>,
     settings: &SegmentSettings,
     store: Option<&StoreWriter>,
 ) -> Result<Outcome> {
     let objects = split_and_seed(guides.cloud, guides.seeds);
-    let stage = engine.stage("read stack", crop.shape()[2].unsigned_abs());
+    let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();
     if settings.uses_image() && image.extremes[0] == image.extremes[1] {

@@ -1,0 +1,70 @@
+//! The metadata documents of a Zarr hierarchy: `zarr.json` of version 3; `.zgroup`, `.zarray` and `.zattrs` of version 2.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::error::{Error, Result};
+
+/// The most bytes of a document that are read; those of large plates have some megabytes.
+const LONGEST: u64 = 64 << 20;
+
+/// A group or an array.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Node {
+    /// 2 or 3.
+    pub(super) format: u8,
+    pub(super) attributes: Value,
+    /// The document of an array.
+    pub(super) array: Option<Value>,
+}
+
+impl Node {
+    /// Reads the node in a folder; none where there is none.
+    pub(super) fn read(folder: &Path) -> Result<Option<Self>> {
+        if let Some(mut document) = document(&folder.join("zarr.json"))? {
+            let attributes = document["attributes"].take();
+            let array = (document["node_type"] == "array").then_some(document);
+            return Ok(Some(Self { format: 3, attributes, array }));
+        }
+        let array = document(&folder.join(".zarray"))?;
+        let attributes = document(&folder.join(".zattrs"))?;
+        if array.is_none() && attributes.is_none() && !folder.join(".zgroup").is_file() {
+            return Ok(None);
+        }
+        Ok(Some(Self { format: 2, attributes: attributes.unwrap_or_default(), array }))
+    }
+
+    /// The attributes of OME-Zarr: below `ome` since version 0.5, among all others before.
+    pub(super) fn ome(&self) -> &Value {
+        if self.attributes["ome"].is_object() { &self.attributes["ome"] } else { &self.attributes }
+    }
+}
+
+/// A document, where there is one.
+fn document(path: &Path) -> Result<Option<Value>> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let unreadable = |e: std::io::Error| Error::input(format!("cannot be read: {e}")).at(path);
+    let mut text = Vec::new();
+    File::open(path).map_err(unreadable)?.take(LONGEST + 1).read_to_end(&mut text).map_err(unreadable)?;
+    if text.len() as u64 > LONGEST {
+        return Err(Error::input("has more than 64 MiB, which is no metadata of an image").at(path));
+    }
+    let value: Value = serde_json::from_slice(&text).map_err(|e| Error::input(format!("is no JSON: {e}")).at(path))?;
+    if value.is_object() { Ok(Some(value)) } else { Err(Error::input("is no JSON object").at(path)) }
+}
+
+/// Names of the nodes right below a folder, sorted.
+pub(super) fn children(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries
+        .filter(|entry| ["zarr.json", ".zarray", ".zgroup"].iter().any(|name| entry.path().join(name).is_file()))
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
