@@ -1,4 +1,4 @@
-//! The papers' program on the whole grid and in its band, and ours (Kósa & Mikula 2015, Tables 1 and 2), as lines of a
+//! The papers' program on the whole grid and in its band, and ours (Kósa 2015, Tables 1 and 2), as lines of a
 //! Markdown table: grid, points in the band, seconds of the three, mean squared difference of u between the first two.
 //! `cargo bench --bench full_and_band [-- LARGEST]`: grids of 40^3, 80^3 .. up to that; 80 without.
 #![allow(missing_docs, dead_code, clippy::disallowed_methods)]

@@ -25,8 +25,9 @@ SECTIONS = {
 TITLE = """# Reproduction
 
 B. Kósa, K. Mikula: *Direct simple computation of middle surface between 3D point clouds and/or discrete surfaces by
-tracking sources in distance function calculation algorithms*, 2023: the tables of its experiments; B. Kósa, K. Mikula,
-2015, and B. Kósa's PhD thesis: surfaces from point clouds and images; and what this program gives. Tables are numbered as printed.
+tracking sources in distance function calculation algorithms*, 2023: the tables of its experiments; B. Kósa's
+diploma thesis, 2015, and PhD thesis: surfaces from point clouds and images; and what this program gives. Tables are numbered as printed; what is
+misprinted in the papers is in [algorithms.md](algorithms.md).
 `scripts/reproduce` runs the experiments and writes this page, part by part.
 
     scripts/reproduce --data FOLDER            # all grids, up to 893 x 1279 x 482

@@ -176,7 +176,7 @@ SEALER_VDT = {
     ),
 }
 
-# Kósa & Mikula 2015, Tables 1 (bracelet) and 2 (sealer): points in the band, seconds without and with it, difference.
+# Kósa 2015, Tables 1 (bracelet) and 2 (sealer): points in the band, seconds without and with it, difference.
 BANDS = (
     (40, ((4636, 4.269, 0.261, 8.90795e-7), (6075, 13.914, 0.537, 1.75849e-6))),
     (80, ((37640, 34.247, 1.677, 2.27554e-8), (48710, 88.673, 3.470, 4.38982e-8))),

@@ -1,4 +1,4 @@
-"""Reconstruction (Kósa & Mikula 2015; Kósa 2015 and PhD, ch. 5.1): Sponge, a scan-like cloud, noise, and the Sponge image."""
+"""Reconstruction (Kósa 2015 and PhD, ch. 5.1): Sponge, a scan-like cloud, noise, and the Sponge image."""
 
 import json
 import subprocess
@@ -173,7 +173,7 @@ def band():
         "this program",
     ]
     return (
-        "## The band (Kósa & Mikula 2015, Tables 1 and 2)\n\n"
+        "## The band (Kósa 2015, Tables 1 and 2)\n\n"
         "The papers' program solves u on all points of the grid, or in a band of twice beta. `plain, here` is a program written\n"
         "from the paper (f64, one thread) on a made body like the one above; the last column is this program's whole run, on\n"
         "two threads, surface and measures included.\n\n" + page.table(header, rows)
@@ -214,7 +214,7 @@ def noise(setting):
         )
     header = ["cloud", "points", "volume", "pieces", "MeanHD / h", "MaxHD / h", "points lost"]
     return (
-        "## Noise and missing points (Kósa & Mikula 2015, Fig. 13 and 14)\n\n"
+        "## Noise and missing points (Kósa 2015, Fig. 13 and 14)\n\n"
         "The same scan, h = 0.2. Distances are those of the points that all three clouds share; lost are points farther than a\n"
         "voxel from the surface, which the moved ones should be.\n\n" + page.table(header, rows)
     )
@@ -274,6 +274,7 @@ def image(setting):
         )
     return (
         "## The Sponge as an image, without points (Kósa PhD, Fig. 2.3)\n\n"
-        "`segment sponge.tif --seed ... --edge plain`: v = -grad g, not normalised, delta = 0.025, K = 10; the start is a ball\n"
-        f"around the Sponge. {text}"
+        "`segment sponge.tif --seed ... --edge plain`: v = -grad g, not normalised, delta = 0.025, K = 10 for grey values on\n"
+        "[0, 1] (the thesis gives 255 inside and 0 outside, and no range for K; on 0..255 g would be all but 0 on the whole border); the start is\n"
+        f"a ball around the Sponge. {text}"
     )

@@ -25,8 +25,8 @@ pub fn checkerboard(set: &BrickSet, keep: impl Fn(Slot) -> bool) -> [Vec<Slot>; 
 /// The diagonal planes of bricks in sweep order: `upward[a]` says whether axis `a` is swept from low to high.
 ///
 /// Every brick comes after the three it depends on upwind, and the bricks of a plane do not share faces, so a sweep
-/// over the waves gives bit for bit what the triple loop over voxels gives (algorithms: section 3). Planes are those of
-/// the grid, whether a rank has bricks in them or not, so that all ranks go through them in step.
+/// over the waves gives bit for bit what the triple loop over voxels gives (docs/algorithms.md, "The sweep schedule").
+/// Planes are those of the grid, whether a rank has bricks in them or not, so that all ranks go through them in step.
 #[must_use]
 pub fn sweep_waves(set: &BrickSet, upward: [bool; 3]) -> Vec<Vec<Slot>> {
     let counts = set.grid().counts();

@@ -1,4 +1,4 @@
-//! `Geometry`: how a box of voxels lies in the physical world (algorithms: section "Grid").
+//! `Geometry`: how a box of voxels lies in the physical world (docs/algorithms.md, "Grid").
 
 use super::Box3;
 

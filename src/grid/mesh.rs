@@ -1,4 +1,4 @@
-//! Sources of a distance: the triangles of a mesh in the world (algorithms: section "Sources").
+//! Sources of a distance: the triangles of a mesh in the world (docs/algorithms.md, "Triangles").
 
 use crate::error::{Error, Result};
 

@@ -1,4 +1,4 @@
-//! The narrow band and its start (algorithms: section 5, "Initial condition", "Narrow band").
+//! The narrow band and its start (docs/algorithms.md, "Narrow band").
 //!
 //! What a voxel is at the start is told by `kernel/level_set/start.rs`. Only cells that hold a solved voxel are stored;
 //! the others are constant, for the border between the sides is solved wherever it runs. Beyond the band the distance

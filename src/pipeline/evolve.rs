@@ -1,4 +1,4 @@
-//! The time loop of the level set over the cells of the band (algorithms: section 5, "Time loop"; section 10).
+//! The time loop of the level set over the cells of the band (docs/algorithms.md, "Time loop").
 //!
 //! A step assembles the scheme of each cell from the old values and relaxes it, from where the last two steps point to;
 //! cells of even and odd parity take turns, and those that needed corrections, or stand beside one that did, are taken

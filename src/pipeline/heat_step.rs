@@ -1,5 +1,5 @@
 //! The presmoothing as published: one implicit step of the heat equation, solved by relaxation over cells (Kósa PhD,
-//! sec. 3; algorithms: section 6).
+//! sec. 3; docs/algorithms.md, "Grey range and presmoothing").
 
 use std::sync::Arc;
 

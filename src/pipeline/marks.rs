@@ -1,9 +1,9 @@
 //! Border marks become a cloud: contours are closed by interpolation, the ends of an object by caps.
 //!
-//! Neighbouring marks of a contour are joined linearly at no more than one voxel apart (algorithms: section 6). An
-//! object that is marked only along its sides is an open tube, so the plane of its first and of its last contour is
-//! filled with points (section 10). A mark on a slice says that the object is there through the whole slice: caps lie
-//! half a slice beyond the outermost contours, and those contours are drawn out to the caps.
+//! Neighbouring marks of a contour are joined linearly at no more than one voxel apart (docs/algorithms.md, "Marks as a
+//! cloud"). An object that is marked only along its sides is an open tube, so the plane of its first and of its last
+//! contour is filled with points. A mark on a slice says that the object is there through the whole slice:
+//! caps lie half a slice beyond the outermost contours, and those contours are drawn out to the caps.
 
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
 //! Sheets: points with the same side all around them, so that a surface would close over them. Outside, the voxels that
-//! hold them are held inside, as a thin shell (algorithms: section 5, "Sheets"); inside they are held outside, as a
-//! slit.
+//! hold them are held inside, as a thin shell (docs/algorithms.md, "Pockets and sheets"); inside they are held outside,
+//! as a slit.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! Tagging: what the cloud encloses, found by the bottleneck flood (algorithms: section 5, "Automatic beta").
+//! Tagging: what the cloud encloses, found by the bottleneck flood (docs/algorithms.md, "Bottleneck flood").
 //!
 //! One flood gives the answer for every threshold at once. Bricks far from the cloud are not stored: all their
 //! voxels lie at the same (largest) distance, so a connected region of them has one flood value.

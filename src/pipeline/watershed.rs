@@ -1,6 +1,6 @@
 //! Which side of the cloud each voxel is on: the watershed of the distance, its regions joined to spaces and these told
-//! inside or outside (`kernel/level_set/ascent.rs`, `kernel/level_set/spaces.rs`; algorithms: section 5, "Automatic
-//! beta").
+//! inside or outside (`kernel/level_set/ascent.rs`, `kernel/level_set/spaces.rs`; docs/algorithms.md, "Steepest ascent
+//! and spaces").
 //!
 //! A hole is closed at its own saddle, however wide others are, and between its points the cloud is closed by the ridge
 //! between both sides.

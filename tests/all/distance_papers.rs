@@ -1,4 +1,4 @@
-//! Figures that the middle-surface paper prints (Kósa & Mikula 2023; algorithms: sections 8 and 10).
+//! Figures that the middle-surface paper prints (Kósa & Mikula 2023; docs/algorithms.md, "Readings and figures").
 
 use strandline::error::Result;
 use strandline::grid::{Box3, DataSets, Geometry, PointBins};
@@ -14,7 +14,7 @@ use crate::common::solve::{Equation, equation, everywhere, sweeps};
 use crate::common::textbook::{Stored, position};
 
 /// Grid points of the Cube experiment along each axis, and the mean squared error of the Eikonal methods to five
-/// digits, cut off: Table 2 and its finer digits in algorithms, section 10.
+/// digits, cut off: Table 2 and its finer digits in docs/algorithms.md, "Readings and figures".
 const TABLE_2: [(i64, f64); 4] = [(10, 2.5692e-3), (19, 9.7901e-4), (37, 3.7697e-4), (73, 1.4352e-4)];
 
 /// The domain [-0.4, 1.4]^3 with so many points along each axis.
@@ -159,8 +159,8 @@ fn sponge_and_sphere_share_all_voxels() {
 }
 
 /// Sec. 4, Experiment 2: the grid points on each vertex, open edge and open face of the cube are a data set of their
-/// own. By Alg. 7 all vertices get as many voxels (one has the centre too), all edges, all faces: algorithms, section
-/// 10. In single precision: the last bits of f64 differ where distances are equal by symmetry.
+/// own. By Alg. 7 all vertices get as many voxels (one has the centre too), all edges, all faces: docs/algorithms.md,
+/// "Readings and figures". In single precision: the last bits of f64 differ where distances are equal by symmetry.
 #[test]
 fn subsets_of_the_cube_share_its_voxels_evenly() {
     let count = 37;

@@ -30,6 +30,7 @@ mod triangle_distance;
 mod watershed;
 mod wavefront;
 
+mod citations;
 mod cli;
 mod layering;
 mod outlines;

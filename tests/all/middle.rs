@@ -58,8 +58,8 @@ fn is_sphere(found: &MiddleFound) -> bool {
     2 * found.measures.vertices - found.measures.triangles == 4
 }
 
-/// The true surface's volume and area by quadrature: algorithms, section 10. On a grid that no crease has a plane of
-/// voxels in common with.
+/// The true surface's volume and area by quadrature: docs/algorithms.md, "Readings and figures". On a grid that no
+/// crease has a plane of voxels in common with.
 #[test]
 fn between_cube_and_sphere_is_the_true_surface() {
     let sets = cube_and_sphere(200);
@@ -98,10 +98,10 @@ fn between_concentric_spheres_is_a_sphere() {
 
 /// Six digits are printed.
 const DIGITS: [f64; 2] = [5e-7, 5e-6];
-/// Where the order in which voxels are visited decides: 0.3 % and 0.2 % (algorithms: section 10).
+/// Where the order in which voxels are visited decides: 0.3 % and 0.2 % (docs/algorithms.md, "Readings and figures").
 const ORDER: [f64; 2] = [0.003 * 0.278, 0.002 * 2.34];
 /// FMM as printed takes values of voxels on trial too, which lets it find smaller distances along diagonals; ours, like
-/// any FMM from frozen values alone (algorithms: section 9), is 0.5 % and 0.7 % off it from h = 0.025 on.
+/// any FMM from frozen values alone (docs/algorithms.md, "Errata"), is 0.5 % and 0.7 % off it from h = 0.025 on.
 const CAUSAL: [f64; 2] = [0.005 * 0.2745, 0.0075 * 2.344];
 
 /// Table 11: volume and area of the isosurface of labels as printed, and how near to it they can be had.

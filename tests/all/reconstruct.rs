@@ -24,7 +24,7 @@ fn by_defaults(cloud: &[[f64; 3]]) -> Result<Reconstruction> {
     reconstruct(&Lab::new(2).engine, &grid, cloud, &ReconstructSettings::default(), None)
 }
 
-/// The papers' settings for a spacing (algorithms: section 10).
+/// The papers' settings for a spacing (docs/algorithms.md, "Readings and figures").
 fn as_printed(h: f64, delta: f64) -> ReconstructSettings {
     let motion = Motion {
         delta: Some(delta),
@@ -61,7 +61,7 @@ fn the_sponge_measures_what_the_papers_scheme_gives() {
     }
 }
 
-/// In the band by bricks in f32, and everywhere by the plain program in f64 (Kósa & Mikula 2015, Tables 1 and 2 compare
+/// In the band by bricks in f32, and everywhere by the plain program in f64 (Kósa 2015, Tables 1 and 2 compare
 /// the two): the mean distance of the points is the same to 1e-5.
 #[test]
 fn the_band_gives_what_the_full_domain_gives() {
@@ -195,7 +195,7 @@ fn mesh_of(grid: &Geometry, cloud: &[[f64; 3]]) -> TriangleMesh {
 }
 
 /// A tenth of the points can be missing, and of 100 points moved anywhere in the box none has an effect: the surface
-/// moves by less than half a spacing beside every point that stays (Kósa & Mikula 2015, Fig. 13-14).
+/// moves by less than half a spacing beside every point that stays (Kósa 2015, Fig. 13-14).
 #[test]
 fn missing_and_moved_points_do_not_move_the_surface() {
     let cloud = scan([2.0; 3], 12_000, 0.01);

@@ -50,7 +50,8 @@ pub(crate) fn sphere_by_angles(centre: [f64; 3], r: f64) -> Vec<[f64; 3]> {
     (0..=20).flat_map(|p| (0..=10).map(move |t| point(f64::from(p) * step, f64::from(t) * step))).collect()
 }
 
-/// The papers' pair (algorithms: section 10): the Sponge, and a sphere of radius 1/2 two to its negative x side.
+/// The papers' pair (docs/algorithms.md, "Readings and figures"): the Sponge, and a sphere of radius 1/2 two to its
+/// negative x side.
 pub(crate) fn sponge_and_sphere() -> [Vec<[f64; 3]>; 2] {
     [sponge(), sphere_by_angles([-2.0, 0.0, 0.0], 0.5)]
 }

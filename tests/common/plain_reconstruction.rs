@@ -1,4 +1,4 @@
-//! The reconstruction of Kósa & Mikula (2015) as one would write it down: one thread, f64, whole arrays. Fast sweeping
+//! The reconstruction of Kósa (2015) as one would write it down: one thread, f64, whole arrays. Fast sweeping
 //! from the corners of the points' cells, a flood for the start, a band of twice beta, semi-implicit steps with SOR.
 //! Shared by tests and the bench.
 

@@ -166,8 +166,26 @@ pub(crate) fn fsm_with_sources<P: Stored>(
 /// voxel at the sum of the offsets has no source yet, that of the smallest neighbour.
 pub(crate) fn fsm_from<P: Stored>(
     geometry: &Geometry,
+    start: (Vec<P>, Vec<Option<usize>>),
+    iterations: u32,
+) -> (Vec<P>, Vec<Option<usize>>) {
+    alg_7(geometry, start, iterations, true)
+}
+
+/// Alg. 7 to the letter: where the voxel at the sum of the offsets has no source, none is what is copied.
+pub(crate) fn fsm_to_the_letter<P: Stored>(
+    geometry: &Geometry,
+    start: (Vec<P>, Vec<Option<usize>>),
+    iterations: u32,
+) -> (Vec<P>, Vec<Option<usize>>) {
+    alg_7(geometry, start, iterations, false)
+}
+
+fn alg_7<P: Stored>(
+    geometry: &Geometry,
     (mut d, mut s): (Vec<P>, Vec<Option<usize>>),
     iterations: u32,
+    falls_back: bool,
 ) -> (Vec<P>, Vec<Option<usize>>) {
     let grid = PlainGrid { shape: geometry.shape };
     let free: Vec<bool> = s.iter().map(Option::is_none).collect();
@@ -180,7 +198,7 @@ pub(crate) fn fsm_from<P: Stored>(
                 let lower = P::store(x);
                 if lower < d[grid.at(v)] {
                     let source = |o: [i64; 3]| s[grid.at(std::array::from_fn(|a| v[a] + o[a]))];
-                    let found = source(sum).or(source(first));
+                    let found = source(sum).or(if falls_back { source(first) } else { None });
                     d[grid.at(v)] = lower;
                     s[grid.at(v)] = found;
                 }

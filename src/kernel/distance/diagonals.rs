@@ -2,8 +2,8 @@
 //!
 //! In a sweep with equal directions along x and y no voxel of a diagonal x + y = s depends on another: those at x - 1
 //! and y - 1 lie on diagonal s - 1, those at x + 1 and y + 1 on s + 1, and z neighbours in the planes beside. Stored
-//! `[z][x + y][y]` each of the six is a contiguous run. Sweeps with opposite directions want y turned round.
-//! Any order that keeps "upwind neighbours first" gives the bits of the triple loop (algorithms: section 3).
+//! `[z][x + y][y]` each of the six is a contiguous run. Sweeps with opposite directions want y turned round. Any order
+//! that keeps "upwind neighbours first" gives the bits of the triple loop (docs/algorithms.md, "The sweep schedule").
 
 use std::ops::Range;
 

@@ -1,5 +1,5 @@
-//! DP over a whole volume in memory, in the textbook's order (Kósa & Mikula 2023, Alg. 5 as mended; algorithms:
-//! sections 3 and 9).
+//! DP over a whole volume in memory, in the textbook's order (Kósa & Mikula 2023, Alg. 5 as mended; docs/algorithms.md,
+//! "Dijkstra-Pythagoras").
 //!
 //! One heap: the smallest voxel takes the nearest of the sources of its frozen neighbours, of equally near ones that
 //! of the lower label where triangles are among them, then the first of -x, +x, -y, +y, -z, +z (of 26: z slowest), and

@@ -1,4 +1,5 @@
-//! DP, the Dijkstra-Pythagoras method (Kósa & Mikula 2023, Alg. 5; algorithms: section 3) inside a tile.
+//! DP, the Dijkstra-Pythagoras method (Kósa & Mikula 2023, Alg. 5; docs/algorithms.md, "Dijkstra-Pythagoras") inside a
+//! tile.
 //!
 //! State, distances and ties are those of VDT; only the order is another. What enters a tile, from ghosts and fixed
 //! voxels, is carried through it in order of exact distance: a voxel offers its source to its neighbours, which keep

@@ -1,5 +1,5 @@
-//! FMM, the fast marching method for `|grad d| = 1` (Sethian 1996; Kósa & Mikula 2023, Alg. 4; algorithms: section 3)
-//! inside a tile.
+//! FMM, the fast marching method for `|grad d| = 1` (Sethian 1996; Kósa & Mikula 2023, Alg. 4; docs/algorithms.md,
+//! "Fast marching") inside a tile.
 //!
 //! The update, its arithmetic and the state are those of `fast_sweeping`; only the order is another. What enters a
 //! tile, from ghosts and fixed voxels, is marched through it in order of value: all voxels of a bucket hand their

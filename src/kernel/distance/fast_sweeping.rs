@@ -1,4 +1,5 @@
-//! FSM, the fast sweeping method for `|grad d| = 1` (Zhao 2005; Kósa & Mikula 2023, Alg. 2; algorithms: section 3).
+//! FSM, the fast sweeping method for `|grad d| = 1` (Zhao 2005; Kósa & Mikula 2023, Alg. 2; docs/algorithms.md, "Fast
+//! sweeping").
 //!
 //! Each voxel takes the upwind solution (`upwind`) when that lowers its value. In and out: a grown tile of distances
 //! (physical units, infinity where nothing is known); fixed voxels carry the sign bit and are never changed. Halo 1,

@@ -1,4 +1,4 @@
-//! Initialisation from a point cloud (Kósa & Mikula 2023, Alg. 1 and section 4.0.1; algorithms: section 2).
+//! Initialisation from a point cloud (Kósa & Mikula 2023, Alg. 1 and section 4.0.1; docs/algorithms.md, "Points").
 //!
 //! Each point fixes the eight grid points of the cell that holds it, or of a larger cube around that cell, at their
 //! exact Euclidean distance; a point that lies on a grid point may fix that one alone. A grid point keeps the smallest

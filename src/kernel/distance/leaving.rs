@@ -1,5 +1,5 @@
 //! What a tile tells the bricks beside it once it is settled: the smallest value that may lower one of their voxels, by
-//! which the front schedule orders bricks (algorithms: section 3, "The `front` schedule").
+//! which the front schedule orders bricks (docs/algorithms.md, "The front schedule").
 //!
 //! In: a grown tile of states, halo 1, faces or all 26 directions; what those beside were told of a face before. Out: a
 //! distance, physical units, or nothing. Faces only are read.

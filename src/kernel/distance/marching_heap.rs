@@ -1,5 +1,5 @@
 //! FMM over a whole volume in memory, in the textbook's order (Kósa & Mikula 2023, Alg. 4; with sources Alg. 8;
-//! algorithms: sections 3, 4 and 9).
+//! docs/algorithms.md, "Fast marching").
 //!
 //! One heap: the smallest voxel is frozen and its six neighbours are updated from frozen ones by the upwind solution.
 //! Fixed voxels are on trial from the beginning. With sources, a voxel that freezes takes that of the frozen one of its

@@ -1,7 +1,7 @@
 //! From which neighbour a voxel takes its source once all distances are finished: the *parent* rules of the Eikonal
-//! methods (algorithms: section 4). A parent has a smaller distance, so chains of parents end at fixed voxels; `trace`
-//! follows them. A voxel in the middle between two sources may have several that are as good; of these the rules name
-//! the first, and say that there are others.
+//! methods (docs/algorithms.md, "Source tracking"). A parent has a smaller distance, so chains of parents end at fixed
+//! voxels; `trace` follows them. A voxel in the middle between two sources may have several that are as good; of these
+//! the rules name the first, and say that there are others.
 
 use super::precision::{Precision, Real};
 use super::upwind::{Axes, Upwind, solve};

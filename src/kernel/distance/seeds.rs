@@ -1,5 +1,5 @@
-//! The sources that fix the voxels of one brick, or that these are told of, and the states that follow from them
-//! (Kósa & Mikula 2023, Alg. 1; algorithms: section 2).
+//! The sources that fix the voxels of one brick, or that these are told of, and the states that follow from them (Kósa
+//! & Mikula 2023, Alg. 1; docs/algorithms.md, "Points").
 //!
 //! Arrays are dense `[z][y][x]` over a brick. Of what fixes a voxel and what it is told of it starts from the nearer;
 //! of equal distances from the lower label, then from the lower index.

@@ -1,4 +1,5 @@
-//! VDT to points and triangles together (Kósa & Mikula 2023, Alg. 3 with Alg. 6; algorithms: sections 2 and 3).
+//! VDT to points and triangles together (Kósa & Mikula 2023, Alg. 3 with Alg. 6; docs/algorithms.md, "Vector distance
+//! transform").
 //!
 //! The state and its sweeps are those of `vector_distance`; only the distance to a source is another: exact
 //! point–triangle distance (Eberly 1999), f64. It costs tens of additions, so a source is asked for its distance only

@@ -1,5 +1,5 @@
-//! Sources of the voxels that fell in a sweep of FSM (Kósa & Mikula 2023, Alg. 7; algorithms: section 4), brick by
-//! brick.
+//! Sources of the voxels that fell in a sweep of FSM (Kósa & Mikula 2023, Alg. 7; docs/algorithms.md, "Source
+//! tracking"), brick by brick.
 //!
 //! In the triple loop a voxel copies the source of one of 26 neighbours, as it is at that moment: its new one where the
 //! neighbour comes before it in the order of the loop, else the one it had before the sweep. Tiles are swept in another

@@ -1,4 +1,4 @@
-//! Initialisation from a triangle mesh (Kósa & Mikula 2023, Alg. 6; algorithms: section 2).
+//! Initialisation from a triangle mesh (Kósa & Mikula 2023, Alg. 6; docs/algorithms.md, "Triangles").
 //!
 //! All corners of every cell that a triangle cuts are fixed at their exact distance to it (point–triangle distance:
 //! Eberly 1999); a grid point keeps the smallest one and that triangle; of equal distances the lower label wins, then

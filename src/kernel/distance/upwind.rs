@@ -1,6 +1,6 @@
-//! The upwind (Godunov) solution of `|grad d| = 1` at a voxel (algorithms: section 3), and which neighbours it is made
-//! of, which says where the voxel's source comes from (Kósa & Mikula 2023, Alg. 7, lines 8 to 20; algorithms: section
-//! 4).
+//! The upwind (Godunov) solution of `|grad d| = 1` at a voxel (docs/algorithms.md, "Upwind solution"), and which
+//! neighbours it is made of, which says where the voxel's source comes from (Kósa & Mikula 2023, Alg. 7, lines 8 to 20;
+//! docs/algorithms.md, "Source tracking").
 //!
 //! With `a_s` the smaller neighbour along axis s, the solution is the x with `sum (((x - a_s)^+) / h_s)^2 = 1`, taken
 //! with one, two, then three axes in order of a. Of two equal neighbours along an axis the upper one counts, which Alg.

@@ -1,4 +1,5 @@
-//! VDT, the vector distance transform (Danielsson 1980; Kósa & Mikula 2023, Alg. 3; algorithms: section 3).
+//! VDT, the vector distance transform (Danielsson 1980; Kósa & Mikula 2023, Alg. 3; docs/algorithms.md, "Vector
+//! distance transform").
 //!
 //! Each voxel carries the index of its nearest known source. In the eight ordered passes it looks at the sources of
 //! its six face neighbours and keeps the one nearest by Euclidean distance; the distance follows from the source. Of

@@ -1,5 +1,5 @@
 //! The front of a wavefront method over a whole volume in memory: one heap of the voxels on trial (Kósa & Mikula 2023,
-//! Alg. 4 and 5; algorithms: section 3).
+//! Alg. 4 and 5; docs/algorithms.md, "Distance").
 //!
 //! The smallest voxel leaves first; of equal ones that of the lower place. A voxel whose value falls is put in once
 //! more, and its older entries are passed over. Scratch: one byte a voxel and 16 for each entry.

@@ -1,7 +1,9 @@
-//! The edge detector `g = 1 / (1 + K s^2)` (Perona & Malik 1990; Kósa PhD, eq. 3.3; algorithms: section 6).
+//! The edge detector `g = 1 / (1 + K s^2)` (Perona & Malik 1990; Kósa PhD, eq. 2.4; docs/algorithms.md, "Edge
+//! detector").
 //!
 //! `s` is the mean of the 24 tetrahedral gradient norms of the smoothed image, in units of intensity (0..1) per
-//! `length`; with the smallest spacing as that length, K means the same for every unit and every sampling.
+//! `length`; with the smallest spacing as that length, K means the same for every unit and every sampling. The papers
+//! do not say for which range of intensities K is; theirs too is read as for 0..1.
 
 use crate::kernel::level_set::covolume::{Planes, mean_gradient};
 

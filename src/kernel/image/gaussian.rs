@@ -1,5 +1,5 @@
-//! Presmoothing: the exact solution of the heat equation, a Gaussian, on a block of cells (Koenderink 1984; algorithms:
-//! section 6).
+//! Presmoothing: the exact solution of the heat equation, a Gaussian, on a block of cells (Koenderink 1984;
+//! docs/algorithms.md, "Grey range and presmoothing").
 //!
 //! `I_t = 1/2 Laplace I` solved up to `t = sigma^2` is `I` convolved with a Gaussian of width sigma, which is separable:
 //! along each axis, x first, then y, then z,

@@ -1,4 +1,5 @@
-//! Intensities taken to [0, 1], so that K means the same for 8, 16 and 32 bit images (algorithms: section 6).
+//! Intensities taken to [0, 1], so that K means the same for 8, 16 and 32 bit images (docs/algorithms.md, "Grey range
+//! and presmoothing").
 
 use crate::grid::Box3;
 use crate::store::Element;

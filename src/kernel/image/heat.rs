@@ -1,4 +1,5 @@
-//! Presmoothing: one implicit step of the heat equation on one cell (Kósa PhD, sec. 3; algorithms: section 6).
+//! Presmoothing: one implicit step of the heat equation on one cell (Kósa PhD, sec. 3; docs/algorithms.md, "Grey range
+//! and presmoothing").
 //!
 //! `(1 - tau Laplace) I = I_0` with `tau = sigma^2 / 2`, the 7-point Laplacian with the true spacing and homogeneous
 //! Neumann borders. Divided by its diagonal it has the same form as a time step of the level set, so the same

@@ -1,5 +1,5 @@
 //! `Histogram`: how often grey values occur, exact to 1 part in 2^16 of the positive and negative number line, in
-//! bounded memory; what percentiles are taken from (algorithms: section 6).
+//! bounded memory; what percentiles are taken from (docs/algorithms.md, "Grey range and presmoothing").
 //!
 //! A value is counted under the upper bits of its f32 pattern, which are ordered as the numbers are. Integers up to 2^8
 //! have bins of their own; counts add up the same in any order.

@@ -1,8 +1,8 @@
 //! Basins inside one brick: connected voxels with `d > b`, the pieces of what a closed cloud encloses, and where the
 //! flood enters them.
 //!
-//! A basin's `b` is the same on all its voxels: the saddle at which the cloud's hole lets the flood in. Its
-//! persistence is `max d / b` (algorithms: section 5). Pieces of neighbouring bricks are joined in `persistence`.
+//! A basin's `b` is the same on all its voxels: the saddle at which the cloud's hole lets the flood in. Its persistence
+//! is `max d / b` (docs/algorithms.md, "Bottleneck flood"). Pieces of neighbouring bricks are joined in `persistence`.
 
 use crate::grid::{FACES, Face};
 use crate::tile::HaloTile;

@@ -1,4 +1,5 @@
-//! Coefficients of one plane of voxels from the norms on its faces (Kósa PhD, eq. 3.12, 3.14; algorithms: section 5).
+//! Coefficients of one plane of voxels from the norms on its faces (Kósa PhD, eq. 3.12, 3.14; docs/algorithms.md,
+//! "Co-volume scheme").
 //!
 //! ```text
 //! c_pq = tau / h_s^2 * ( max(theta (d_q - d_p) + r_p (g_q - g_p), 0) + max(F_p (u_q - u_p), 0) / 4 * S_pq

@@ -1,4 +1,5 @@
-//! Coefficients of the semi-implicit co-volume scheme on one cell (Kósa PhD, eq. 3.12, 3.14; algorithms: section 5).
+//! Coefficients of the semi-implicit co-volume scheme on one cell (Kósa PhD, eq. 3.12, 3.14; docs/algorithms.md,
+//! "Co-volume scheme").
 //!
 //! The scheme for a voxel p with face neighbours q is `u_p + sum a_pq (u_q - u_p) = u_p^old`. With `c_pq = -a_pq >= 0`
 //!

@@ -1,4 +1,4 @@
-//! The bottleneck flood on one tile (algorithms: section 5, "Automatic beta").
+//! The bottleneck flood on one tile (docs/algorithms.md, "Bottleneck flood").
 //!
 //! `b_p` is the largest threshold at which a flood from the domain's border through voxels with `d >= threshold` still
 //! reaches p: the fixed point of `b_p = max(b_p, min(d_p, max over face neighbours b_q))`. Only comparisons, so the

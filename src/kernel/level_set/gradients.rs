@@ -1,4 +1,5 @@
-//! Gradient norms on the tetrahedra of the co-volume mesh (Kósa 2015, sec. 3.3; algorithms: section 5).
+//! Gradient norms on the tetrahedra of the co-volume mesh (Kósa 2015, sec. 3.3; docs/algorithms.md, "Gradient on a
+//! tetrahedron").
 //!
 //! Each face between voxels p and q carries four tetrahedra, one for each of its edges (z1, z2). With vertex values
 //! the mean of the eight voxels around the vertex, the gradient on a tetrahedron has the components

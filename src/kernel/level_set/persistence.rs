@@ -1,4 +1,4 @@
-//! Which basins persist (algorithms: section 5, "Automatic beta"): the pieces of all bricks, joined where they touch,
+//! Which basins persist (docs/algorithms.md, "Bottleneck flood"): the pieces of all bricks, joined where they touch,
 //! their depths compared with their saddles. Depths and saddles are only compared, so names and sums do not depend on
 //! the order in which pieces are joined.
 

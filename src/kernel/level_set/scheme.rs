@@ -1,5 +1,5 @@
-//! How the scheme of a cell lies in memory: the linear system
-//! `u_p = old_p + sum w_pq (u_q - old_p)` (algorithms: section 5).
+//! How the scheme of a cell lies in memory: the linear system `u_p = old_p + sum w_pq (u_q - old_p)`
+//! (docs/algorithms.md, "Co-volume scheme").
 //!
 //! Relaxation corrects one colour at a time, and along a row every second voxel has the same colour. So each row of 16
 //! voxels is kept as two halves, even x and odd x, and a half fills a vector with one colour alone. What the solver

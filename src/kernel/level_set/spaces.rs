@@ -1,5 +1,5 @@
-//! Which regions of steepest ascent are inside of a cloud and which are outside (algorithms: section 5, "Automatic
-//! beta": basins, saddles and persistence, here of all spaces against each other, not of the outside alone).
+//! Which regions of steepest ascent are inside of a cloud and which are outside (docs/algorithms.md, "Steepest ascent
+//! and spaces": basins, saddles and persistence, here of all spaces against each other, not of the outside alone).
 //!
 //! Regions merge across their passes, the widest first. Where two spaces meet that are both so much deeper than the
 //! pass between them, a wall of points stands there, and they stay apart. Spaces that are left are told sides so that

@@ -1,4 +1,4 @@
-//! The start of the time loop on one brick (algorithms: section 5, "Initial condition", "Narrow band").
+//! The start of the time loop on one brick (docs/algorithms.md, "Narrow band").
 //!
 //! u = 1 inside, 0 outside. Solved are the voxels within `inner` of the cloud on the inside and within `outer` on the
 //! outside, and those near the border between both sides wherever it is, across holes too; all others keep their start

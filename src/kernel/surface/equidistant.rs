@@ -1,5 +1,5 @@
 //! Where the surface between labels passes between neighbouring corners: the place that is equally far from the nearest
-//! sources of each label (algorithms: section 4, "Beyond the papers").
+//! sources of each label (docs/algorithms.md, "Surface between labels").
 //!
 //! Near the place are the sources that the voxels of a label track, one voxel around; with them the place is found, the
 //! nearest source of each label is looked up there, and it is found again if one of these is new.

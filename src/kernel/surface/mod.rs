@@ -1,4 +1,4 @@
-//! Surfaces: from a field to triangles, and what triangles measure (algorithms: section "Surface and measures").
+//! Surfaces: from a field to triangles, and what triangles measure (docs/algorithms.md, "Surfaces and measures").
 //!
 //! [`MarchingCubes`] turns a brick's voxels into a [`Patch`], [`Welder`] joins the patches into one mesh,
 //! [`SurfaceMeasure`] sums volume and area as the triangles pass, [`PatchIndex`] answers how far points lie from them.

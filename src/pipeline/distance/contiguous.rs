@@ -1,5 +1,5 @@
-//! The contiguous start (Kósa & Mikula 2023, Sec. 4.0.1; algorithms: section 2): a point fixes all voxels in a cube so
-//! large that the cubes of a data set leave no gap.
+//! The contiguous start (Kósa & Mikula 2023, Sec. 4.0.1; docs/algorithms.md, "Contiguous start"): a point fixes all
+//! voxels in a cube so large that the cubes of a data set leave no gap.
 
 use rstar::primitives::GeomWithData;
 use rstar::{PointDistance, RTree};

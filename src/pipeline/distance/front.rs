@@ -1,5 +1,5 @@
 //! The `front` schedule: bricks are taken in the order in which distance reaches them and relaxed in memory until
-//! nothing in them changes (Chacon & Vladimirsky 2012; algorithms: section 3, "The `front` schedule").
+//! nothing in them changes (Chacon & Vladimirsky 2012; docs/algorithms.md, "The front schedule").
 //!
 //! A round takes all bricks whose smallest entering value lies within a brick's width of the smallest of all, those of
 //! even and of odd parity by turns: no two that share a face at the same time (where a method looks at 26 neighbours,

@@ -1,5 +1,5 @@
-//! Distance to points and triangles over a set of bricks (algorithms: sections 2 and 3): which voxels sources fix, how
-//! distance is carried outward from them, and the fields that come of it.
+//! Distance to points and triangles over a set of bricks (docs/algorithms.md, "Distance"): which voxels sources fix,
+//! how distance is carried outward from them, and the fields that come of it.
 //!
 //! The set need not cover the domain: a value within the set's reach of the cloud is reached only through smaller
 //! values, so leaving far bricks out changes none of the near ones.

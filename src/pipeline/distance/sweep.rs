@@ -1,5 +1,5 @@
 //! The `sweep` schedule: ordered passes over all bricks, bit for bit the textbook's triple loops for any brick size and
-//! number of threads and ranks (algorithms: section 3, "Sweeping brick by brick changes nothing").
+//! number of threads and ranks (docs/algorithms.md, "The sweep schedule").
 
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers, sweep_waves};

@@ -1,5 +1,5 @@
-//! `middle`: the surface equally far from labelled clouds and meshes, straight from source tracking (Kósa & Mikula 2023;
-//! algorithms: section 4).
+//! `middle`: the surface equally far from labelled clouds and meshes, straight from source tracking (Kósa & Mikula
+//! 2023; docs/algorithms.md, "Labels and middle surfaces").
 //!
 //! ```text
 //! sources -> distance with tracking -> labels -> surfaces between them -> mesh, measures of each pair

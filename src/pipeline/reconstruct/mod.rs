@@ -1,4 +1,4 @@
-//! `reconstruct`: a closed surface from a point cloud without normals (Kósa 2015; Kósa & Mikula 2015).
+//! `reconstruct`: a closed surface from a point cloud without normals (Kósa 2015).
 //!
 //! ```text
 //! cloud -> grid -> distance -> flood -> band -> time loop -> u -> surface -> mesh, measures
