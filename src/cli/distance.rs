@@ -22,6 +22,7 @@ use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
 use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::distance::Neighbours;
+use crate::kernel::distance::outside::count_outside;
 use crate::kernel::distance::precision::Precision;
 use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, Textbook, distance};
 use crate::pipeline::middle::{LabelMode, MiddleSettings, SurfaceKind, middle};
@@ -82,6 +83,7 @@ impl Job {
             Some(geometry) if !args.job.grid.is_asked_for() => geometry,
             _ => grid(&args.job.grid, bounds, &mut notes)?,
         };
+        notes.extend(outside_note(&geometry, &sets));
         for note in &notes {
             console.note(note);
         }
@@ -101,7 +103,7 @@ impl Job {
     }
 
     fn run<P: Precision>(&self) -> Result<()> {
-        check_range::<P>(&self.geometry)?;
+        check_range::<P>(&self.geometry, &self.sets)?;
         let (threads, ranks) = (self.resources.threads, self.args.job.ranks);
         let needs = match self.middle_settings() {
             Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks),
@@ -296,9 +298,34 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     })
 }
 
+/// Says how many sources lie outside of the grid: it may not be where it was meant to be.
+fn outside_note(geometry: &Geometry, sets: &DataSets) -> Option<String> {
+    let (outside, all) = (count_outside(geometry, sets), sets.len() as u64);
+    let which = match outside {
+        0 => return None,
+        _ if outside == all => format!("all {} sources lie outside of the grid or reach", grouped(all)),
+        1 => format!("1 of {} sources lies outside of the grid or reaches", grouped(all)),
+        _ => format!("{} of {} sources lie outside of the grid or reach", grouped(outside), grouped(all)),
+    };
+    Some(format!("{which} out of it; distances are to all of them (--origin, --shape and --spacing say where it lies)"))
+}
+
+/// How far a voxel may be from the nearest source where all of them lie outside: half of the grid's diagonal more than its
+/// middle is.
+fn farthest_outside(geometry: &Geometry, sets: &DataSets, diagonal: f64) -> f64 {
+    let [lo, hi] = [geometry.position([0; 3]), geometry.position(geometry.shape.map(|n| n - 1))];
+    let middle: [f64; 3] = std::array::from_fn(|a| f64::midpoint(lo[a], hi[a]));
+    let away = |p: &[f64; 3]| (0..3).map(|a| (p[a] - middle[a]).powi(2)).sum::<f64>();
+    let corners = (0..sets.mesh.len()).map(|n| sets.mesh.corners(n)[0]);
+    let nearest = sets.positions.iter().copied().chain(corners).map(|p| away(&p)).fold(f64::INFINITY, f64::min);
+    nearest.sqrt() + 0.5 * diagonal
+}
+
 /// Refuses distances that the type cannot hold.
-fn check_range<P: Precision>(geometry: &Geometry) -> Result<()> {
+fn check_range<P: Precision>(geometry: &Geometry, sets: &DataSets) -> Result<()> {
     let diagonal = (0..3).map(|a| (geometry.shape[a] as f64 * geometry.spacing[a]).powi(2)).sum::<f64>().sqrt();
+    let is_outside = count_outside(geometry, sets) > 0;
+    let diagonal = if is_outside { diagonal.max(farthest_outside(geometry, sets, diagonal)) } else { diagonal };
     let smallest = geometry.min_spacing();
     // Below 2^-14 half precision loses digits.
     if diagonal < P::MAX && smallest > P::LEAST {

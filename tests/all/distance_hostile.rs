@@ -176,19 +176,27 @@ fn sources_outside_the_grid() {
     let bench = Bench::new(&ball);
     bench.write("away.xyz", "-500 0 0\n-501 3 0\n");
     bench.write("some.xyz", "-500 0 0\n5 5 5\n");
+    bench.write("within.xyz", "5 5 5\n");
     bench.write("across.obj", "v -900 5 5\nv 900 5 5\nv 0 900 5\nf 1 2 3\n");
-    for (grid, word) in
-        [("--like image.tif", "no source lies in the grid"), ("--spacing 1 --origin 0,0,0 --shape 9,9,9", "--origin")]
-    {
-        for output in ["none", "out/x.zarr"] {
-            let complaint = refusal(&bench, &format!("distance away.xyz {grid} -q -o {output}"), 2);
-            assert!(complaint.contains(word), "{complaint}");
-        }
-        for (source, fixed) in [("some.xyz", 1..9), ("across.obj", 9..10_000)] {
+    for grid in ["--like image.tif", "--spacing 1 --origin 0,0,0 --shape 9,9,9"] {
+        for (source, fixed, note) in [
+            ("some.xyz", 1..9, Some("1 of 2 sources lies outside")),
+            ("across.obj", 9..10_000, Some("all 1 sources lie outside of the grid or reach out")),
+            ("away.xyz", 100..10_000, Some("all 2 sources lie outside")),
+            ("within.xyz", 1..9, None),
+        ] {
             bench.succeed(&format!("distance {source} {grid} -q --overwrite -o none --report out/r.json"));
-            let found = bench.json("out/r.json")["result"].clone();
+            let (report, told) = (bench.json("out/r.json"), note.unwrap_or_default());
+            let found = report["result"].clone();
             assert!(fixed.contains(&found["fixed_voxels"].as_u64().unwrap()), "{source} {grid}: {found}");
             assert_eq!(found["unlabelled_voxels"], 0);
+            assert_eq!(
+                report["notes"].to_string().contains("outside"),
+                note.is_some(),
+                "{source}: {}",
+                report["notes"]
+            );
+            assert!(report["notes"].to_string().contains(told), "{source}: {}", report["notes"]);
             fs::remove_file(bench.path("out/r.json")).unwrap();
         }
     }

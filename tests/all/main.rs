@@ -9,6 +9,7 @@ mod distance_cli;
 mod distance_front;
 mod distance_hostile;
 mod distance_meshes;
+mod distance_outside;
 mod distance_papers;
 mod flood;
 mod fsm_sources;

@@ -1,11 +1,12 @@
-//! What a piece of a distance field holds: its largest finite value, and voxels of which nothing is known.
+//! What a piece of a distance field holds: its largest finite distance, to either side of a surface, and voxels of which
+//! nothing is known.
 
 use super::precision::{Precision, Real};
 
 /// Values looked at side by side.
 const LANES: usize = 16;
 
-/// The largest finite value (0 where there is none) and the number of others.
+/// The largest finite magnitude (0 where there is none) and the number of others.
 #[must_use]
 pub fn extent<P: Precision>(values: &[P]) -> (f64, u64) {
     pulp::Arch::new().dispatch(Extent(values))
@@ -32,6 +33,7 @@ fn extent_of<P: Precision>(values: &[P]) -> (f64, u64) {
         let mut infinite = [0_u32; LANES];
         for (i, value) in values.iter().enumerate() {
             let value = value.lane();
+            let value = value.larger(zero - value);
             let finite = value < P::Lane::INFINITY;
             infinite[i] = u32::from(!finite);
             largest[i] = largest[i].larger(if finite { value } else { zero });
@@ -53,6 +55,7 @@ mod tests {
         let expected = values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max);
         assert_eq!(extent(&values), (f64::from(expected), 2));
         assert_eq!(extent::<f64>(&[]), (0.0, 0));
+        assert_eq!(extent(&[-7.0_f32, 3.0, -0.5]), (7.0, 0), "insides count too");
         assert_eq!(extent(&[f64::INFINITY; 3]), (0.0, 3));
     }
 }

@@ -20,6 +20,7 @@ pub mod labelled_shapes;
 pub mod leaving;
 pub mod marching_heap;
 pub mod method;
+pub mod outside;
 pub mod parents;
 pub mod precision;
 pub mod second_look;

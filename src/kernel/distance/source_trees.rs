@@ -24,9 +24,16 @@ enum Tree {
 
 /// A triangle and the box around it.
 #[derive(Debug)]
-struct Placed {
-    triangle: Triangle,
+pub(super) struct Placed {
+    pub(super) triangle: Triangle,
     extent: AABB<[f64; 3]>,
+}
+
+impl Placed {
+    /// The triangle of three corners.
+    pub(super) fn new(corners: [[f64; 3]; 3]) -> Self {
+        Self { triangle: Triangle::new(corners), extent: AABB::from_points(&corners) }
+    }
 }
 
 impl RTreeObject for Placed {
@@ -53,11 +60,7 @@ impl SourceTrees {
                 let point = |n: u32| GeomWithData::new(sets.positions[n as usize], n);
                 return Tree::Points(RTree::bulk_load(cloud.map(point).collect()));
             }
-            let placed = |n: u32| {
-                let corners = sets.mesh.corners(n as usize);
-                let placed = Placed { triangle: Triangle::new(corners), extent: AABB::from_points(&corners) };
-                GeomWithData::new(placed, points + n)
-            };
+            let placed = |n: u32| GeomWithData::new(Placed::new(sets.mesh.corners(n as usize)), points + n);
             Tree::Triangles(RTree::bulk_load(mesh.map(placed).collect()))
         };
         Self { trees: sets.places().map(tree).collect(), labels: sets.labels().to_vec() }

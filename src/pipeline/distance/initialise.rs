@@ -44,13 +44,14 @@ pub(super) struct Seeded {
     pub(super) triangle_distances: u64,
 }
 
-/// Fixes voxels of this rank's bricks; `kept`, where it is given, gets the sources that fix them.
+/// Fixes voxels of this rank's bricks; `kept`, where it is given, gets the sources that fix them. Sources
+/// outside of the grid fix none that is farther than `farthest` and some voxels more.
 pub(super) fn initialise<M: DistanceMethod>(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
     array: &BrickArray<M::State>,
     kept: Option<&BrickArray<u32>>,
-    start: Start,
+    (start, farthest): (Start, f64),
 ) -> Result<Seeded> {
     let set = array.set();
     let (grid, len) = (*set.grid(), set.grid().brick_len());
@@ -72,6 +73,11 @@ pub(super) fn initialise<M: DistanceMethod>(
             let beside = bins.of(id).iter().map(|&n| (first + n, mesh.corners(n as usize)));
             let (squared, source) = (&mut fixed.squared, &mut fixed.source);
             distances = triangles::fix_voxels(sources.geometry, &part, edge, beside, label, squared, source);
+        }
+        if let Some(outside) = sources.outside {
+            // Distances up to there are made of those of voxels beside the way, which may be a little larger.
+            let beside = sources.geometry.length([2; 3]);
+            outside.fix_voxels(&part, edge, farthest + beside, fixed);
         }
         if tells {
             let points = sources.points_seeding(id, margin);

@@ -8,12 +8,13 @@ use super::field::boxes_to_look_at;
 use super::output::write_fields;
 use super::sign::Signed;
 use super::{Method, Options, Schedule, Solved, Sources, solve};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::{BrickGrid, BrickSet, DataSets, Geometry, PointBins, TriangleBins};
 use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::initialise::Cube;
+use crate::kernel::distance::outside::OutsideSources;
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::source_trees::SourceTrees;
 use crate::kernel::distance::winding_number::WindingTree;
@@ -77,14 +78,14 @@ pub struct DistanceFound {
     pub unlabelled_voxels: u64,
     /// Distances from a voxel to a triangle that were computed to fix voxels, where there are triangles.
     pub triangle_distances: Option<u64>,
-    /// Voxels of each label, where labels were asked for.
+    /// Voxels of each label, where labels were asked for; also of labels that are nowhere the nearest.
     pub label_voxels: BTreeMap<u32, u64>,
 }
 
 /// Computes the distance to `sets` on a grid, stored as `P`; `store` gets the fields, none when it is absent.
 ///
 /// # Errors
-/// When no source touches the grid, the output cannot be written, scratch runs out, or the run is interrupted.
+/// When the output cannot be written, scratch runs out, or the run is interrupted.
 pub fn distance<P: Precision>(
     engine: &Engine,
     geometry: &Geometry,
@@ -120,7 +121,12 @@ pub fn measure<P: Precision>(
 ) -> Result<DistanceFound> {
     let stage = engine.stage("measure", boxes_to_look_at(set.grid()).len());
     stage.voxels(geometry.domain().volume());
-    let (measured, label_voxels) = solved.measure(&stage, set, settings.labels.then_some(sets))?;
+    let (measured, mut label_voxels) = solved.measure(&stage, set, settings.labels.then_some(sets))?;
+    if settings.labels {
+        for &label in sets.labels() {
+            label_voxels.entry(label).or_default();
+        }
+    }
     stage.finish();
     Ok(DistanceFound {
         max: measured.max,
@@ -135,7 +141,7 @@ pub fn measure<P: Precision>(
 /// are the same sources, sorted: with them labels are looked at closer, where these are tracked.
 ///
 /// # Errors
-/// When no source touches the grid, scratch runs out or the run is interrupted, or by what it is handed to.
+/// When scratch runs out or the run is interrupted, or by what it is handed to.
 pub fn solve_sets<P: Precision, R>(
     engine: &Engine,
     geometry: &Geometry,
@@ -150,6 +156,7 @@ pub fn solve_sets<P: Precision, R>(
     let bins = PointBins::new(grid, geometry, &sets.positions);
     let triangles = (!sets.mesh.is_empty()).then(|| TriangleBins::new(grid, geometry, &sets.mesh));
     let cubes = cubes(geometry, sets, settings.init);
+    let outside = OutsideSources::new(geometry, sets);
     let sources = Sources {
         geometry,
         positions: &sets.positions,
@@ -158,6 +165,7 @@ pub fn solve_sets<P: Precision, R>(
         mesh: triangles.as_ref().map(|bins| (&sets.mesh, bins)),
         sets: Some(sets),
         trees,
+        outside: outside.as_ref(),
     };
     stage.finish();
     let stage = engine.stage("distance", set.len() as u64);
@@ -170,11 +178,6 @@ pub fn solve_sets<P: Precision, R>(
     };
     let solved = solve::<P>(&stage, &sources, &set, settings.method, settings.schedule, options)?;
     stage.finish();
-    if solved.fixed_voxels == 0 {
-        return Err(Error::input(
-            "no source lies in the grid; check --origin, --shape and --spacing against the coordinates of the files",
-        ));
-    }
     then(solved, &set)
 }
 

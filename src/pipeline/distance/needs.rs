@@ -3,6 +3,7 @@
 use super::{DistanceSettings, Schedule, Textbook};
 use crate::grid::{BrickGrid, DataSets, Geometry};
 use crate::kernel::distance::beside_sources::remembered_bytes;
+use crate::kernel::distance::outside::count_outside;
 use crate::kernel::distance::precision::Precision;
 
 /// An estimate; sizes in bytes.
@@ -56,7 +57,8 @@ impl DistanceSettings {
         let held = buffers + grid.len().saturating_mul(of_brick) + sets.len() as u64 * SOURCE_BYTES;
         let remembered = threads as u64 * remembered_bytes(sets.len());
         let trees = if self.looks_closer::<P>(sets) { tree_bytes(sets) + remembered } else { 0 };
-        let held = held.saturating_add(self.heap_bytes::<P>(geometry)).saturating_add(trees);
+        let outside = if count_outside(geometry, sets) > 0 { tree_bytes(sets) } else { 0 };
+        let held = held.saturating_add(self.heap_bytes::<P>(geometry)).saturating_add(trees + outside);
         // On either side of a cut lie ghosts, a plane of bricks at most, of which only faces are stored.
         let plane = grid.counts()[0].unsigned_abs().saturating_mul(grid.counts()[1].unsigned_abs());
         // Along with sweeps the faces of sources are kept a second time, as they were before.

@@ -268,7 +268,7 @@ impl<'a> Job<'_, 'a> {
     /// A method's start: its state with the voxels that sources fix.
     fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let seeded = initialise::<M>(self.stage, self.sources, &state, None, start)?;
+        let seeded = initialise::<M>(self.stage, self.sources, &state, None, (start, self.options.farthest))?;
         Ok((state, seeded))
     }
 
@@ -276,7 +276,8 @@ impl<'a> Job<'_, 'a> {
     fn start_apart<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, BrickArray<u32>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
         let sources = BrickArray::blank(self.engine.scratch(), self.set, NO_SOURCE)?;
-        let seeded = initialise::<M>(self.stage, self.sources, &state, Some(&sources), Start::Fixed)?;
+        let seeded =
+            initialise::<M>(self.stage, self.sources, &state, Some(&sources), (Start::Fixed, self.options.farthest))?;
         Ok((state, sources, seeded))
     }
 

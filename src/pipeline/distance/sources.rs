@@ -2,6 +2,7 @@
 
 use crate::grid::{Box3, BrickId, DataSets, Geometry, PointBins, TriangleBins, TriangleMesh};
 use crate::kernel::distance::initialise::Cube;
+use crate::kernel::distance::outside::OutsideSources;
 use crate::kernel::distance::source_trees::SourceTrees;
 
 /// Points, and triangles where there are any, sorted by the bricks of a grid.
@@ -22,13 +23,15 @@ pub struct Sources<'a> {
     pub sets: Option<&'a DataSets>,
     /// The same, sorted; where labels are asked for.
     pub trees: Option<&'a SourceTrees>,
+    /// The same, where some reach out of the grid and count there too.
+    pub outside: Option<&'a OutsideSources<'a>>,
 }
 
 impl<'a> Sources<'a> {
-    /// A cloud whose points fix the corners of their cells.
+    /// A cloud whose points fix the corners of their cells; those outside of the grid are left out.
     #[must_use]
     pub fn cloud(geometry: &'a Geometry, positions: &'a [[f64; 3]], bins: &'a PointBins) -> Self {
-        Self { geometry, positions, bins, cubes: &[], mesh: None, sets: None, trees: None }
+        Self { geometry, positions, bins, cubes: &[], mesh: None, sets: None, trees: None, outside: None }
     }
 
     /// Points and triangles as data sets, where there are triangles.
@@ -72,9 +75,17 @@ impl<'a> Sources<'a> {
         points.map(move |p| (p, self.positions[p as usize], self.cube(p).grown(beyond)))
     }
 
-    /// Whether any source may fix a voxel of a brick, or a point voxels so many beyond it.
+    /// Whether any source may fix a voxel of a brick, also through a face of the grid, or a point voxels so many beyond it.
     pub(super) fn may_seed(&self, id: BrickId, beyond: [i64; 3]) -> bool {
         self.bricks_seeding(id, beyond).any(|brick| !self.bins.of(brick).is_empty())
             || self.mesh.is_some_and(|(_, bins)| !bins.of(id).is_empty())
+            || (self.outside.is_some() && self.is_at_a_face(id))
+    }
+
+    /// Whether a brick has voxels of the grid's outermost layer.
+    fn is_at_a_face(&self, id: BrickId) -> bool {
+        let grid = self.bins.grid();
+        let (part, shape) = (grid.brick_box(id), grid.shape());
+        (0..3).any(|a| part.lo[a] == 0 || part.hi[a] == shape[a])
     }
 }

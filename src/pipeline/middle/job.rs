@@ -79,8 +79,7 @@ pub struct MiddleFound {
 /// measures, none when it is absent.
 ///
 /// # Errors
-/// When there are fewer than two sets, no source touches the grid, the output cannot be written, scratch runs out, or the
-/// run is interrupted.
+/// When there are fewer than two sets, the output cannot be written, scratch runs out, or the run is interrupted.
 pub fn middle<P: Precision>(
     engine: &Engine,
     geometry: &Geometry,

@@ -1,0 +1,233 @@
+//! Distances on grids that sources lie outside of, against a plain search over all sources in f64.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+
+use strandline::grid::{DataSets, Geometry, TriangleMesh};
+use strandline::kernel::distance::Neighbours;
+use strandline::kernel::distance::source_trees::SourceTrees;
+use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule, solve_sets};
+
+use crate::common::ball::Bench;
+use crate::common::lab::{Lab, PlainGrid};
+use crate::common::meshes::{self, Form};
+use crate::common::random::Random;
+use crate::common::solve::{Equation, equation};
+use crate::common::stores::volume;
+use crate::common::textbook::{position, squared};
+
+const SWEEP: Schedule = Schedule::Sweep { iterations: 4 };
+
+fn grid() -> Geometry {
+    Geometry { shape: [23, 14, 19], spacing: [0.5, 0.7, 0.6], origin: [3.0, -2.0, 1.0], unit: None }
+}
+
+/// Points in the grid and around it, triangles that cut it, reach out of it or lie away, and a label that lies outside
+/// with all it has.
+fn scene(seed: u64) -> DataSets {
+    let (grid, mut random) = (grid(), Random(seed));
+    let mut place = |from: f64, to: f64| -> [f64; 3] {
+        std::array::from_fn(|a| {
+            let extent = (grid.shape[a] - 1) as f64 * grid.spacing[a];
+            grid.origin[a] + (from + (to - from) * random.unit()) * extent
+        })
+    };
+    let mut sets = DataSets::default();
+    let around: Vec<[f64; 3]> = (0..9).map(|_| place(-0.7, 1.7)).collect();
+    sets.add_cloud(&around);
+    let mut corners = Vec::new();
+    for _ in 0..4 {
+        let at = place(-0.8, 1.8);
+        let near = |p: [f64; 3]| -> [f64; 3] { std::array::from_fn(|a| at[a] + 0.5 * (p[a] - at[a])) };
+        corners.extend([at, near(place(-1.0, 2.0)), near(place(-1.0, 2.0))]);
+    }
+    let triangles = (0..4).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+    sets.add_mesh(&TriangleMesh::new(corners, triangles).unwrap());
+    let beside: Vec<[f64; 3]> = (0..5).map(|_| place(1.05, 1.4)).collect();
+    sets.add_cloud(&beside);
+    sets
+}
+
+/// The distance to a segment.
+fn to_segment(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
+    let along: f64 = (0..3).map(|i| (p[i] - a[i]) * (b[i] - a[i])).sum::<f64>() / squared(a, b);
+    let t = along.clamp(0.0, 1.0);
+    squared(p, std::array::from_fn(|i| a[i] + t * (b[i] - a[i]))).sqrt()
+}
+
+/// The distance to a triangle: to its plane where the foot lies inside, else to the nearest side.
+fn to_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
+    let sub = |p: [f64; 3], q: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| p[i] - q[i]) };
+    let cross = |u: [f64; 3], v: [f64; 3]| -> [f64; 3] {
+        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    };
+    let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+    let normal = cross(sub(b, a), sub(c, a));
+    let left = |from: [f64; 3], to: [f64; 3]| dot(cross(sub(to, from), sub(p, from)), normal) >= 0.0;
+    if left(a, b) && left(b, c) && left(c, a) {
+        return dot(sub(p, a), normal).abs() / dot(normal, normal).sqrt();
+    }
+    to_segment(p, a, b).min(to_segment(p, b, c)).min(to_segment(p, c, a))
+}
+
+/// For each voxel the distance to each label's sources, by a plain search.
+fn plainly(sets: &DataSets) -> Vec<Vec<f64>> {
+    let near = |v| {
+        let here = position(&grid(), v);
+        let of = |[cloud, mesh]: [std::ops::Range<u32>; 2]| {
+            let points = cloud.map(|n| squared(here, sets.positions[n as usize]).sqrt());
+            points.chain(mesh.map(|n| to_triangle(here, sets.mesh.corners(n as usize)))).fold(f64::INFINITY, f64::min)
+        };
+        sets.places().map(of).collect()
+    };
+    PlainGrid { shape: grid().shape }.voxels().map(near).collect()
+}
+
+fn settings(method: Method, schedule: Schedule, brick: i64) -> DistanceSettings {
+    DistanceSettings {
+        method,
+        schedule,
+        neighbours: Neighbours::Faces,
+        init: Init::Cell,
+        farthest: None,
+        signed: false,
+        labels: true,
+        closest_point: false,
+        brick,
+    }
+}
+
+/// Distances, and the label of the nearest source.
+fn solved(sets: &DataSets, settings: &DistanceSettings, ranks: usize) -> (Vec<f32>, Vec<u32>) {
+    let lab = Lab::new(2);
+    let engine = lab.engine.with_ranks(ranks);
+    let trees = SourceTrees::new(sets);
+    solve_sets::<f32, _>(&engine, &grid(), sets, Some(&trees), settings, |solved, _| {
+        let part = grid().domain();
+        let (mut values, mut sources) = (vec![0.0; part.len()], vec![0; part.len()]);
+        solved.values.read_box(&part, &mut values)?;
+        solved.sources.read_box(&part, &mut sources)?;
+        Ok((values, sources.into_iter().map(|source| sets.label(source)).collect()))
+    })
+    .unwrap()
+}
+
+/// How far distances and labels are from those of a plain search: the largest error, the share of voxels with any, and
+/// whether each label is right where another is farther by more than `unsure`.
+fn errors(sets: &DataSets, (values, labels): &(Vec<f32>, Vec<u32>), unsure: f64) -> (f64, f64, bool) {
+    let (mut most, mut wrong, mut all_right) = (0.0_f64, 0, true);
+    for ((value, &label), each) in values.iter().zip(labels).zip(plainly(sets)) {
+        let exact = each.iter().copied().fold(f64::INFINITY, f64::min);
+        let error = f64::from(*value) - exact;
+        assert!(error > -1e-5 * exact.max(1.0) || unsure > 1e-3, "{value} is below {exact}");
+        most = most.max(error.abs());
+        wrong += usize::from(error.abs() > 1e-5 * exact.max(1.0));
+        all_right &= each[label as usize - 1] <= exact + unsure;
+    }
+    (most, wrong as f64 / values.len() as f64, all_right)
+}
+
+#[test]
+fn every_source_counts_wherever_it_lies() {
+    for seed in 1..5 {
+        let sets = scene(seed);
+        for method in Method::all() {
+            for schedule in [Schedule::Front, SWEEP] {
+                let found = solved(&sets, &settings(method, schedule, 16), 1);
+                let name = format!("{} {schedule:?}, seed {seed}", method.name());
+                match equation(method) {
+                    Equation::Euclidean => {
+                        let (most, wrong, labels) = errors(&sets, &found, 1e-4);
+                        let (allowed, often) = if schedule == SWEEP { (0.3, 0.02) } else { (1e-4, 0.0) };
+                        assert!(most <= allowed && wrong <= often, "{name}: {most}, {wrong}");
+                        assert!(labels || schedule == SWEEP, "{name}: labels");
+                    }
+                    Equation::Eikonal => {
+                        let (most, _, labels) = errors(&sets, &found, 1.2);
+                        assert!(most < 1.0 && labels, "{name}: {most}, labels {labels}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Bricks change no bit of sweeps, ranks none of anything.
+#[test]
+fn bricks_and_ranks_change_nothing_outside_either() {
+    let sets = scene(7);
+    for method in Method::all() {
+        for schedule in [Schedule::Front, SWEEP] {
+            let one = solved(&sets, &settings(method, schedule, 16), 1);
+            assert_eq!(one, solved(&sets, &settings(method, schedule, 16), 3), "{} {schedule:?}", method.name());
+            if schedule == SWEEP {
+                assert_eq!(one, solved(&sets, &settings(method, schedule, 32), 2), "{}", method.name());
+            }
+        }
+    }
+}
+
+/// Sources far outside change nothing of what those in the grid give.
+#[test]
+fn what_is_far_away_changes_no_bit() {
+    let mut sets = DataSets::default();
+    let geometry = grid();
+    sets.add_cloud(&[[5, 3, 4], [17, 9, 11], [9, 12, 2]].map(|v| geometry.position(v)));
+    let mut more = sets.clone();
+    more.add_cloud(&[[900.0, 0.0, 0.0], [0.0, -800.0, 7.0]]);
+    for method in Method::all() {
+        for schedule in [Schedule::Front, SWEEP] {
+            let settings = settings(method, schedule, 16);
+            assert_eq!(solved(&sets, &settings, 1), solved(&more, &settings, 1), "{} {schedule:?}", method.name());
+        }
+    }
+}
+
+/// Two points of which one lies beside the grid, and balls around the grid and away from it, with signs.
+#[test]
+fn distances_through_the_faces_of_a_grid() {
+    let bench = Bench::bare();
+    bench.write("two.xyz", "0 0 0\n12 5 5\n");
+    fs::write(bench.path("ball.ply"), Form::PlyText.write(&meshes::sphere([0.0; 3], 5.0, 40, std::f64::consts::PI)))
+        .unwrap();
+    for method in ["vdt", "dp", "fsm", "fmm"] {
+        let run = format!("--spacing 1 --method {method} --overwrite -q -o out/x.zarr");
+        bench.succeed(&format!("distance two.xyz --origin 5,0,0 --shape 11,11,11 --labels {run}"));
+        let found = volume(&bench.path("out/x.zarr"));
+        let close = |at: usize, exact: f64| (found[at] - exact).abs() < 1e-5;
+        assert!(
+            close(0, 5.0) && close(1, 6.0) && close(12, 38_f64.sqrt()) == (method == "vdt" || method == "dp"),
+            "{method}"
+        );
+        assert!((found[1 + 11 + 121] - 38_f64.sqrt()).abs() < 0.4, "{method}: {}", found[1 + 11 + 121]);
+        let grid = "--origin -2,-2,-2 --shape 9,9,9 --signed --overwrite -q -o out/in.zarr --spacing 0.5";
+        bench.succeed(&format!("distance ball.ply {grid} --method {method} --closest-point"));
+        let found = volume(&bench.path("out/in.zarr"));
+        assert!(found.len() == 729 && found.iter().all(|d| *d < -1.4 && *d > -5.3), "{method}: {found:?}");
+        let largest = bench.json("out/in.zarr/report.json")["result"]["max"].as_f64().unwrap();
+        assert!((4.9..5.3).contains(&largest), "{method}: {largest}");
+        let at = |name: &str| volume(&bench.path(&format!("out/in.zarr/closest-point/{name}")))[0];
+        let closest = [at("x"), at("y"), at("z")];
+        assert!((squared(closest, [0.0; 3]).sqrt() - 5.0).abs() < 0.05 && closest[0] < -2.0, "{closest:?}");
+        bench.succeed(&format!("distance ball.ply {} --method {method}", grid.replace("-2,-2,-2", "6,0,0")));
+        let found = volume(&bench.path("out/in.zarr"));
+        assert!(found.iter().all(|d| *d > 0.9) && (found[0] - 1.0).abs() < 0.02, "{method}: {}", found[0]);
+    }
+}
+
+/// A label that is the nearest nowhere is told with no voxel; within a largest distance, what lies farther is that far.
+#[test]
+fn labels_without_a_voxel_and_distances_beyond_the_largest() {
+    let bench = Bench::bare();
+    bench.write("near.xyz", "2 2 2\n");
+    bench.write("away.xyz", "90 0 0\n");
+    let grid = "--origin 0,0,0 --shape 5,5,5 --spacing 1 --overwrite -o out/x.zarr";
+    let printed = bench.succeed(&format!("distance near.xyz away.xyz {grid} --labels"));
+    assert!(printed.contains("label 1: 125 voxels") && printed.contains("label 2: 0 voxels"), "{printed}");
+    bench.succeed(&format!("distance away.xyz {grid} --max-distance 3 -q"));
+    assert!(volume(&bench.path("out/x.zarr")).iter().all(|&d| d == 3.0));
+    let text =
+        bench.fail("distance away.xyz --origin -9e9,0,0 --shape 5,5,5 --spacing 1 --precision f16 -q -o none", 2);
+    assert!(text.contains("--precision f16"), "{text}");
+}
