@@ -11,11 +11,11 @@ use super::console::{Console, Voice};
 use super::distance_args::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
 use super::distance_report::{Found, Settings, describe_found};
 use super::distance_sources::{Read, read_sets};
-use super::files::{export_mesh, mesh_format};
+use super::files::{export_mesh, mesh_format, tell_of_anchor};
 use super::grid::grid;
 use super::outputs::Outputs;
 use super::report::{Ran, Report};
-use super::text::{bytes, duration, grouped, number, triple};
+use super::text::{bytes, duration, grouped, number, place, triple};
 use super::{print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
@@ -141,13 +141,14 @@ impl Job {
         };
         let store = target.as_deref().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
         let found = self.solve::<P>(engine, store.as_ref())?;
+        tell_of_anchor(mesh, &self.geometry, &self.console);
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;
             store.finish()?;
         }
         if let (Some(mesh), Some(folder)) = (mesh, &target) {
-            export_mesh(&folder.join("meshes/surface.ply"), mesh)?;
+            export_mesh(&folder.join("meshes/surface.ply"), &self.geometry, mesh)?;
         }
         match &output.report {
             Some(path) => self.report(engine, &found).write(path)?,
@@ -232,7 +233,7 @@ impl Job {
             s.method.name(),
             grouped(g.domain().volume()),
             triple(g.spacing),
-            triple(g.origin),
+            place(g.origin, g.min_spacing()),
             duration(needs.seconds),
             bytes(self.resources.memory),
             bytes(needs.held),

@@ -6,7 +6,10 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use super::config::folder_of;
+use super::console::Console;
 use crate::error::{Error, Result};
+use crate::exec::Progress;
+use crate::grid::Geometry;
 use crate::io::mesh_export::{FORMATS, Format};
 
 /// Writes a file through `write`; it gets its name, and replaces what had it, only when all is written.
@@ -26,11 +29,25 @@ pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<&File>)
     Ok(())
 }
 
-/// Writes a finished PLY mesh in the format that the name of `to` asks for, whole or not at all.
-pub(super) fn export_mesh(ply: &Path, to: &Path) -> Result<()> {
+/// Writes a finished PLY mesh on a grid in the format that the name of `to` asks for, whole or not at all.
+pub(super) fn export_mesh(ply: &Path, geometry: &Geometry, to: &Path) -> Result<()> {
     let format = mesh_format(to)?;
-    write_whole(to, |sink| format.export(ply, sink))
+    write_whole(to, |sink| format.export(ply, geometry.anchor(), sink))
         .map_err(|error| Error::from_io("the mesh cannot be written", &error).at(to))
+}
+
+/// Says from where positions are seen in a mesh file that cannot hold them as they are.
+pub(super) fn tell_of_anchor(mesh: Option<&Path>, geometry: &Geometry, console: &Console) {
+    let Some((path, format)) = mesh.and_then(|path| Some((path, Format::of(path)?))) else { return };
+    let [x, y, z] = geometry.anchor();
+    if format.is_single && [x, y, z] != [0.0; 3] {
+        console.note(&format!(
+            "{}: {} holds single precision alone, so its coordinates are relative to {x}, {y}, {z}; add these, or write \
+             OBJ, PLY or VTP",
+            path.display(),
+            format.name
+        ));
+    }
 }
 
 /// The format of a mesh that is to be written.

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::args::InfoArgs;
 use super::info_store::store;
 use super::print;
-use super::text::{grouped, number, triple};
+use super::text::{grouped, number, place};
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
 use crate::io::ome_zarr::is_store;
@@ -77,8 +77,14 @@ fn stack(path: &Path, format: &stacks::Format) -> Result<(Value, Lines)> {
     Ok((document, lines))
 }
 
+/// What places in a box are told to: a thousandth of its largest extent.
+fn step_within(low: [f64; 3], high: [f64; 3]) -> f64 {
+    (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max) / 1e3
+}
+
 fn points(cloud: &PointCloud, file: Option<&PointFile>, notes: &[String]) -> (Value, Lines) {
     let (low, high) = cloud.bounds().unwrap_or_default();
+    let step = step_within(low, high);
     let mut lines = vec![line("kind", "points")];
     let scales = file.map_or([Scale::Physical; 3], |file| file.scales);
     let counts = |axis: usize| match (scales[axis], file.and_then(|file| file.units[axis])) {
@@ -97,8 +103,8 @@ fn points(cloud: &PointCloud, file: Option<&PointFile>, notes: &[String]) -> (Va
     }
     lines.extend([
         line("points", grouped(cloud.len() as u64)),
-        line("lowest x, y, z", triple(low)),
-        line("highest x, y, z", triple(high)),
+        line("lowest x, y, z", place(low, step)),
+        line("highest x, y, z", place(high, step)),
     ]);
     let times = file.and_then(|file| Some((file.times.iter().min()?, file.times.iter().max()?)));
     if let Some((first, last)) = times {
@@ -123,6 +129,7 @@ fn points(cloud: &PointCloud, file: Option<&PointFile>, notes: &[String]) -> (Va
 
 fn triangles(mesh: &TriangleMesh) -> (Value, Lines) {
     let (low, high) = mesh.bounds().unwrap_or_default();
+    let step = step_within(low, high);
     let edges = mesh.boundary_edges();
     let mut closed = vec![edges.is_closed().to_string()];
     if !edges.is_closed() {
@@ -136,8 +143,8 @@ fn triangles(mesh: &TriangleMesh) -> (Value, Lines) {
         line("vertices", grouped(mesh.vertices.len() as u64)),
         line("triangles", grouped(mesh.len() as u64)),
         line("closed", closed.join(", ")),
-        line("lowest x, y, z", triple(low)),
-        line("highest x, y, z", triple(high)),
+        line("lowest x, y, z", place(low, step)),
+        line("highest x, y, z", place(high, step)),
     ];
     let document = json!({
         "kind": "mesh", "vertices": mesh.vertices.len(), "triangles": mesh.len(), "closed": edges.is_closed(),

@@ -61,7 +61,8 @@ impl Local {
         let names = mesh.welded();
         let mut measure = SurfaceMeasure::new([0.0; 3]);
         for triangle in &mesh.triangles {
-            measure.add(triangle.map(|v| names[v as usize]), triangle.map(|v| self.vertices[v as usize]));
+            measure
+                .add(triangle.map(|v| names[v as usize]), triangle.map(|v| self.vertices[v as usize].map(f64::from)));
         }
         measure.measures()
     }

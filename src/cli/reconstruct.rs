@@ -9,12 +9,12 @@ use serde::Serialize;
 
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
-use super::files::{export_mesh, mesh_format};
+use super::files::{export_mesh, mesh_format, tell_of_anchor};
 use super::grid::check_counts;
 use super::outputs::Outputs;
 use super::reconstruct_args::ReconstructArgs;
 use super::report::{Hausdorff, Hole, Moves, Ran, Report};
-use super::text::{bytes, duration, grouped, number, triple};
+use super::text::{bytes, duration, grouped, number, place, triple};
 use super::{print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
@@ -173,6 +173,7 @@ impl Job {
         let store = target.as_deref().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
         let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, store.as_ref())
             .map_err(|error| error.at(&self.args.cloud))?;
+        tell_of_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;
@@ -180,7 +181,7 @@ impl Job {
         }
         engine.check()?;
         if let (Some(mesh), Some(folder)) = (&self.args.mesh, &target) {
-            export_mesh(&folder.join("meshes/surface.ply"), mesh)?;
+            export_mesh(&folder.join("meshes/surface.ply"), &found.geometry, mesh)?;
         }
         if let Some(path) = &output.report {
             self.report(engine, &found).write(path)?;
@@ -236,11 +237,10 @@ fn describe_found(found: &Reconstruction) -> String {
     if found.sheet_points > 0 {
         lines.push(format!("sheets without an inside: {} points, held as thin shells", grouped(found.sheet_points)));
     }
-    lines.extend(
-        found
-            .hole
-            .map(|hole| format!("largest hole of the cloud: {} wide, at {}", number(hole.width), triple(hole.place))),
-    );
+    lines.extend(found.hole.map(|hole| {
+        let at = place(hole.place, 0.1 * hole.width);
+        format!("largest hole of the cloud: {} wide, at {at}", number(hole.width))
+    }));
     lines.push(format!(
         "start at {} from the points; {} steps, ended by {}",
         number(found.beta),

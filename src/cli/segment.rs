@@ -7,12 +7,12 @@ use std::time::Instant;
 use super::args::SegmentArgs;
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
-use super::files::{export_mesh, mesh_format};
+use super::files::{export_mesh, mesh_format, tell_of_anchor};
 use super::input::{crop_box, open_stack};
 use super::marks::{Marks, Reading, look_at_marks, read_marks};
 use super::outputs::{Outputs, numbered};
 use super::report::{Found, Ran, Report, Settings, Solver, crop_xyz};
-use super::text::{bytes, duration, grouped, number, triple};
+use super::text::{bytes, duration, grouped, number, place, triple};
 use super::{picture, print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
@@ -212,6 +212,7 @@ impl Job {
         };
         let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())?;
         self.tell(&outcome);
+        tell_of_anchor(output.mesh.as_deref(), &self.geometry, &self.console);
         if let Some(store) = &store {
             if self.command == "demo" {
                 picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;
@@ -285,7 +286,7 @@ impl Job {
                 let several = outcome.objects.len() + outcome.refused.len() > 1;
                 let name = if several { format!("object-{}.ply", object.label) } else { "surface.ply".into() };
                 let target = if several { numbered(path, object.label) } else { path.clone() };
-                export_mesh(&folder.join("meshes").join(name), &target)?;
+                export_mesh(&folder.join("meshes").join(name), &self.geometry, &target)?;
             }
         }
         if let Some(path) = &output.picture {
@@ -341,7 +342,7 @@ impl Job {
              theta {} rho {} delta {} k {} sigma {} beta {} tau {} epsilon {} omega {} brick {} threads {}",
             self.stack.element().name(),
             triple(g.spacing),
-            triple(g.origin),
+            place(g.origin, g.min_spacing()),
             number(s.motion.theta),
             s.rho.map_or("automatic".into(), number),
             number(s.motion.delta_on(g)),
@@ -365,7 +366,7 @@ impl Job {
             lines.push(format!("object {}: {points} marks{contours}, {file}", object.object));
         }
         for (n, seed) in self.args.seed.iter().enumerate() {
-            let at = triple(seed.centre);
+            let at = place(seed.centre, 0.1 * seed.radius);
             lines.push(format!("seed {}: a ball of radius {} at {at}", n + 1, number(seed.radius)));
         }
         let (held, allowed) = (bytes(estimate.held), bytes(self.resources.memory));

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::text::{grouped, number, triple};
+use super::text::{grouped, number, place};
 use crate::exec::StageReport;
 use crate::pipeline::segment::Outcome;
 
@@ -52,7 +52,7 @@ pub(super) fn objects(outcome: &Outcome) -> String {
             grouped(object.cloud_points),
             number(object.beta),
             object.hole.map_or("-".into(), |hole| number(hole.width)),
-            object.hole.map_or("-".into(), |hole| triple(hole.place)),
+            object.hole.map_or("-".into(), |hole| place(hole.place, 0.1 * hole.width)),
             object.image_model.into(),
             object.evolution.steps.to_string(),
             object.evolution.stopped_by.into(),

@@ -1,7 +1,8 @@
 //! Writes a triangle mesh as binary little-endian PLY (Turk 1994) while it is found, whatever its size.
 //!
 //! How many vertices and triangles there are is known only at the end. The file therefore starts with a header of
-//! fixed length, filled up by a comment; vertices follow it as they come, triangles gather in a second scratch
+//! fixed length, filled up by a comment; vertices follow it as they come, in single precision or, on a grid whose
+//! positions that would move, in double; triangles gather in a second scratch
 //! file that is appended at the end. Nothing stands under the final name before the file is whole.
 
 use std::fs::File;
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+use crate::grid::Geometry;
 use crate::store::MeshSink;
 
 const BUFFER: usize = 1 << 18;
@@ -19,13 +21,20 @@ const BUFFER: usize = 1 << 18;
 #[derive(Debug)]
 pub struct PlyWriter {
     path: PathBuf,
-    unit: Option<String>,
-    is_tagged: bool,
+    form: Form,
     /// The header, or at first the room for it, and the vertices.
     file: BufWriter<NamedTempFile>,
     triangles: BufWriter<File>,
     vertex_count: u64,
     triangle_count: u64,
+}
+
+/// What a file says of itself beside its counts.
+#[derive(Clone, Debug)]
+struct Form {
+    unit: Option<String>,
+    is_tagged: bool,
+    is_double: bool,
 }
 
 impl PlyWriter {
@@ -36,27 +45,34 @@ impl PlyWriter {
     /// # Errors
     /// When no file can be made in that folder.
     pub fn create(path: &Path, unit: Option<&str>) -> Result<Self> {
-        Self::start(path, unit, false)
+        Self::start(path, Form { unit: unit.map(ToOwned::to_owned), is_tagged: false, is_double: false })
     }
 
-    /// As `create`; each triangle has the properties `label_low` and `label_high`, the labels that it separates.
+    /// As `create`, for a mesh on a grid: its unit, and positions in double precision where single does not hold them.
     ///
     /// # Errors
     /// When no file can be made in that folder.
-    pub fn create_tagged(path: &Path, unit: Option<&str>) -> Result<Self> {
-        Self::start(path, unit, true)
+    pub fn on_grid(path: &Path, geometry: &Geometry) -> Result<Self> {
+        Self::start(path, Form::of(geometry, false))
     }
 
-    fn start(path: &Path, unit: Option<&str>, is_tagged: bool) -> Result<Self> {
+    /// As `on_grid`; each triangle has the properties `label_low` and `label_high`, the labels that it separates.
+    ///
+    /// # Errors
+    /// When no file can be made in that folder.
+    pub fn tagged_on_grid(path: &Path, geometry: &Geometry) -> Result<Self> {
+        Self::start(path, Form::of(geometry, true))
+    }
+
+    fn start(path: &Path, form: Form) -> Result<Self> {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
         let start = || -> io::Result<_> {
             let mut file = BufWriter::with_capacity(BUFFER, scratch_file(folder)?);
-            file.write_all(&header(unit, is_tagged, u64::MAX, u64::MAX))?;
+            file.write_all(&header(&form, u64::MAX, u64::MAX))?;
             Ok((file, BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?)))
         };
         let (file, triangles) = start().map_err(|e| unwritable(&e, path))?;
-        let unit = unit.map(ToOwned::to_owned);
-        Ok(Self { path: path.to_path_buf(), unit, is_tagged, file, triangles, vertex_count: 0, triangle_count: 0 })
+        Ok(Self { path: path.to_path_buf(), form, file, triangles, vertex_count: 0, triangle_count: 0 })
     }
 
     /// Completes the file and puts it under its name, in place of any file that was there.
@@ -74,21 +90,28 @@ impl PlyWriter {
         triangles.seek(SeekFrom::Start(0))?;
         io::copy(&mut triangles, file.as_file_mut())?;
         file.seek(SeekFrom::Start(0))?;
-        file.write_all(&header(self.unit.as_deref(), self.is_tagged, self.vertex_count, self.triangle_count))?;
+        file.write_all(&header(&self.form, self.vertex_count, self.triangle_count))?;
         file.as_file().sync_all()?;
         file.persist(&self.path).map_err(|e| e.error)?;
         Ok(())
     }
 }
 
+impl Form {
+    fn of(geometry: &Geometry, is_tagged: bool) -> Self {
+        Self { unit: geometry.unit.clone(), is_tagged, is_double: !geometry.fits_single() }
+    }
+}
+
 impl MeshSink for PlyWriter {
-    fn vertex(&mut self, position: [f32; 3]) -> Result<()> {
-        let mut bytes = [0; 12];
-        for (place, value) in bytes.chunks_exact_mut(4).zip(position) {
-            place.copy_from_slice(&value.to_le_bytes());
-        }
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
         self.vertex_count += 1;
-        self.file.write_all(&bytes).map_err(|e| unwritable(&e, &self.path))
+        let written = if self.form.is_double {
+            self.file.write_all(position.map(f64::to_le_bytes).as_flattened())
+        } else {
+            self.file.write_all(position.map(|v| (v as f32).to_le_bytes()).as_flattened())
+        };
+        written.map_err(|e| unwritable(&e, &self.path))
     }
 
     fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
@@ -102,7 +125,7 @@ impl MeshSink for PlyWriter {
 
     fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> Result<()> {
         self.triangle(corners)?;
-        if !self.is_tagged {
+        if !self.form.is_tagged {
             return Ok(());
         }
         let bytes = labels.map(u32::to_le_bytes).concat();
@@ -111,20 +134,22 @@ impl MeshSink for PlyWriter {
 }
 
 /// The header, of one length for all counts.
-fn header(unit: Option<&str>, is_tagged: bool, vertices: u64, triangles: u64) -> Vec<u8> {
-    let longest = header_text(unit, is_tagged, u64::MAX, u64::MAX, 0).len();
-    let padding = longest - header_text(unit, is_tagged, vertices, triangles, 0).len();
-    header_text(unit, is_tagged, vertices, triangles, padding).into_bytes()
+fn header(form: &Form, vertices: u64, triangles: u64) -> Vec<u8> {
+    let longest = header_text(form, u64::MAX, u64::MAX, 0).len();
+    let padding = longest - header_text(form, vertices, triangles, 0).len();
+    header_text(form, vertices, triangles, padding).into_bytes()
 }
 
-fn header_text(unit: Option<&str>, is_tagged: bool, vertices: u64, triangles: u64, padding: usize) -> String {
+fn header_text(form: &Form, vertices: u64, triangles: u64, padding: usize) -> String {
     // A line end in the unit would end the comment. Signed indices are what most readers expect.
-    let unit = unit.map_or(String::new(), |u| format!("comment unit {}\n", u.replace(char::is_control, " ")));
+    let unit =
+        form.unit.as_ref().map_or(String::new(), |u| format!("comment unit {}\n", u.replace(char::is_control, " ")));
     let index = if vertices <= 1 << 31 { "int" } else { "uint" };
-    let tags = if is_tagged { "property uint label_low\nproperty uint label_high\n" } else { "" };
+    let tags = if form.is_tagged { "property uint label_low\nproperty uint label_high\n" } else { "" };
+    let number = if form.is_double { "double" } else { "float" };
     format!(
         "ply\nformat binary_little_endian 1.0\ncomment made by strandline\n{unit}comment {:padding$}\n\
-         element vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
+         element vertex {vertices}\nproperty {number} x\nproperty {number} y\nproperty {number} z\n\
          element face {triangles}\nproperty list uchar {index} vertex_indices\n{tags}end_header\n",
         ""
     )
@@ -150,15 +175,19 @@ fn unwritable(error: &io::Error, path: &Path) -> Error {
 mod tests {
     use super::*;
 
+    fn form(unit: Option<&str>, is_tagged: bool) -> Form {
+        Form { unit: unit.map(ToOwned::to_owned), is_tagged, is_double: is_tagged }
+    }
+
     #[test]
     fn headers_have_one_length() {
         for (unit, tags) in [(None, false), (Some("micrometer"), true), (Some("two\nlines"), false)] {
             let counts = [(0, 0), (7, 12), (1 << 31, 9), (u64::MAX, u64::MAX)];
-            let sizes = counts.map(|(v, t)| header(unit, tags, v, t).len());
+            let sizes = counts.map(|(v, t)| header(&form(unit, tags), v, t).len());
             assert!(sizes.iter().all(|&size| size == sizes[0]), "{sizes:?}");
         }
-        let text = String::from_utf8(header(Some("a\nb"), false, 1 << 31, 1)).unwrap();
+        let text = String::from_utf8(header(&form(Some("a\nb"), false), 1 << 31, 1)).unwrap();
         assert!(text.contains("comment unit a b\n") && text.contains("uchar int "));
-        assert!(String::from_utf8(header(None, true, (1 << 31) + 1, 1)).unwrap().contains("uchar uint "));
+        assert!(String::from_utf8(header(&form(None, true), (1 << 31) + 1, 1)).unwrap().contains("uchar uint "));
     }
 }

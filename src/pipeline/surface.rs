@@ -40,7 +40,7 @@ pub fn draw(
 ) -> Result<Drawn> {
     let measures = match mesh {
         Some(path) => {
-            let mut mesh = PlyWriter::create(path, geometry.unit.as_deref())?;
+            let mut mesh = PlyWriter::on_grid(path, geometry)?;
             let measures = extract(stage, u, geometry, &mut mesh)?;
             mesh.finish()?;
             measures

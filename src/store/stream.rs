@@ -141,7 +141,7 @@ pub trait MeshSink {
     ///
     /// # Errors
     /// When the vertex cannot be written.
-    fn vertex(&mut self, position: [f32; 3]) -> Result<()>;
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()>;
 
     /// Takes a triangle of vertices that came before it, counter-clockwise as seen from outside.
     ///
@@ -158,7 +158,7 @@ pub trait MeshSink {
     }
 }
 
-/// A triangle mesh in memory.
+/// A triangle mesh in memory, in single precision: for meshes that are not far from zero.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshBuffer {
     /// World positions, `[x, y, z]`.
@@ -168,8 +168,8 @@ pub struct MeshBuffer {
 }
 
 impl MeshSink for MeshBuffer {
-    fn vertex(&mut self, position: [f32; 3]) -> Result<()> {
-        self.vertices.push(position);
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
+        self.vertices.push(position.map(|v| v as f32));
         Ok(())
     }
 
@@ -184,7 +184,7 @@ impl MeshSink for MeshBuffer {
 pub struct NoMesh;
 
 impl MeshSink for NoMesh {
-    fn vertex(&mut self, _position: [f32; 3]) -> Result<()> {
+    fn vertex(&mut self, _position: [f64; 3]) -> Result<()> {
         Ok(())
     }
 

@@ -11,6 +11,7 @@ mod distance_hostile;
 mod distance_meshes;
 mod distance_outside;
 mod distance_papers;
+mod far_coordinates;
 mod flood;
 mod fsm_sources;
 mod gaussian;

@@ -24,7 +24,7 @@ fn write(mesh: &MeshBuffer, path: &Path, unit: Option<&str>) {
     let mut given = 0;
     for &triangle in &mesh.triangles {
         while given <= triangle.into_iter().max().unwrap_or(0) {
-            writer.vertex(*vertices.next().expect("vertices enough")).expect("room for a vertex");
+            writer.vertex(vertices.next().expect("vertices enough").map(f64::from)).expect("room for a vertex");
             given += 1;
         }
         writer.triangle(triangle).expect("room for a triangle");

@@ -45,12 +45,12 @@ impl BoxSource<f32> for Grey {
 /// A mesh in memory with the labels of its triangles.
 #[derive(Default, PartialEq, Debug)]
 struct Faces {
-    vertices: Vec<[f32; 3]>,
+    vertices: Vec<[f64; 3]>,
     facets: Vec<([u32; 3], [u32; 2])>,
 }
 
 impl MeshSink for Faces {
-    fn vertex(&mut self, position: [f32; 3]) -> strandline::error::Result<()> {
+    fn vertex(&mut self, position: [f64; 3]) -> strandline::error::Result<()> {
         self.vertices.push(position);
         Ok(())
     }

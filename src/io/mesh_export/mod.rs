@@ -20,15 +20,17 @@ pub struct Format {
     pub name: &'static str,
     /// How names of such files end, without the dot; it decides.
     pub extension: &'static str,
-    write: fn(&mut Written, &mut dyn Write) -> io::Result<()>,
+    /// Whether it holds f32 alone: positions far from zero are then written as seen from an anchor.
+    pub is_single: bool,
+    write: fn(&mut Written, [f64; 3], &mut dyn Write) -> io::Result<()>,
 }
 
 /// The formats.
 pub const FORMATS: &[Format] = &[
-    Format { name: "PLY", extension: "ply", write: Written::copy },
-    Format { name: "OBJ", extension: "obj", write: obj::write },
-    Format { name: "STL", extension: "stl", write: stl::write },
-    Format { name: "VTP", extension: "vtp", write: vtp::write },
+    Format { name: "PLY", extension: "ply", is_single: false, write: |mesh, _, out| mesh.copy(out) },
+    Format { name: "OBJ", extension: "obj", is_single: false, write: |mesh, _, out| obj::write(mesh, out) },
+    Format { name: "STL", extension: "stl", is_single: true, write: stl::write },
+    Format { name: "VTP", extension: "vtp", is_single: false, write: |mesh, _, out| vtp::write(mesh, out) },
 ];
 
 impl Format {
@@ -39,11 +41,12 @@ impl Format {
         FORMATS.iter().find(|format| format.extension == extension)
     }
 
-    /// Writes the surface that stands in `ply`, a file of [`PlyWriter`](super::mesh_ply::PlyWriter), to `out`.
+    /// Writes the surface that stands in `ply`, a file of [`PlyWriter`](super::mesh_ply::PlyWriter), to `out`; positions
+    /// of a format that holds f32 alone as seen from `anchor`.
     ///
     /// # Errors
     /// When `ply` cannot be read or `out` not written.
-    pub fn export(&self, ply: &Path, out: &mut dyn Write) -> io::Result<()> {
-        (self.write)(&mut Written::open(ply)?, out)
+    pub fn export(&self, ply: &Path, anchor: [f64; 3], out: &mut dyn Write) -> io::Result<()> {
+        (self.write)(&mut Written::open(ply)?, anchor, out)
     }
 }

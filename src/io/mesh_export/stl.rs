@@ -1,21 +1,24 @@
 //! STL (3D Systems, 1988), binary: 80 bytes, the number of facets, then for each its normal, its corners and two bytes.
-//! A facet holds positions, so the vertices are kept in memory: 12 bytes each.
+//! A facet holds positions, so the vertices are kept in memory: 12 bytes each. They are f32: of a mesh far from zero those
+//! seen from an anchor, which the first 80 bytes name.
 
 use std::io::{self, Write};
 
 use super::written::Written;
 
-pub(super) fn write(mesh: &mut Written, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(mesh: &mut Written, anchor: [f64; 3], out: &mut dyn Write) -> io::Result<()> {
     let count = u32::try_from(mesh.triangles)
         .map_err(|_| io::Error::new(io::ErrorKind::InvalidInput, "STL holds fewer than 2^32 triangles; choose PLY"))?;
     let mut positions = Vec::new();
     mesh.each_vertex(|position| {
-        positions.push(position);
+        positions.push(std::array::from_fn(|a| (position[a] - anchor[a]) as f32));
         Ok(())
     })?;
     // Must not begin with "solid", which would make it text.
     let mut head = [b' '; 80];
-    head[..18].copy_from_slice(b"binary STL surface");
+    let [x, y, z] = anchor;
+    let text = if anchor == [0.0; 3] { "binary STL surface".into() } else { format!("binary STL from {x},{y},{z}") };
+    head.iter_mut().zip(text.bytes()).for_each(|(place, byte)| *place = byte);
     out.write_all(&head)?;
     out.write_all(&count.to_le_bytes())?;
     mesh.each_triangle(|corners| {

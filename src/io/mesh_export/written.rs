@@ -5,9 +5,8 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 const BUFFER: usize = 1 << 18;
-const VERTEX_BYTES: u64 = 12;
 
-/// Vertices as three f32 each, then triangles as a count byte and three indices, and two labels where they have any;
+/// Vertices as three f32 or three f64 each, then triangles as a count byte and three indices, and two labels where they have any;
 /// little-endian.
 pub(super) struct Written {
     file: BufReader<File>,
@@ -16,12 +15,14 @@ pub(super) struct Written {
     pub(super) vertices: u64,
     pub(super) triangles: u64,
     pub(super) is_tagged: bool,
+    /// Whether positions are f64.
+    pub(super) is_double: bool,
 }
 
 impl Written {
     pub(super) fn open(path: &Path) -> io::Result<Self> {
         let mut file = BufReader::with_capacity(BUFFER, File::open(path)?);
-        let (mut start, mut counts, mut is_tagged) = (0, [0; 2], false);
+        let (mut start, mut counts, mut is_tagged, mut is_double) = (0, [0; 2], false, false);
         loop {
             let mut line = String::new();
             let read = file.read_line(&mut line)?;
@@ -35,19 +36,27 @@ impl Written {
                 }
             }
             is_tagged |= line == "property uint label_low\n";
+            is_double |= line == "property double x\n";
             if line == "end_header\n" {
                 let [vertices, triangles] = counts;
-                return Ok(Self { file, start, vertices, triangles, is_tagged });
+                return Ok(Self { file, start, vertices, triangles, is_tagged, is_double });
             }
         }
     }
 
-    pub(super) fn each_vertex(&mut self, mut f: impl FnMut([f32; 3]) -> io::Result<()>) -> io::Result<()> {
+    fn vertex_bytes(&self) -> u64 {
+        if self.is_double { 24 } else { 12 }
+    }
+
+    pub(super) fn each_vertex(&mut self, mut f: impl FnMut([f64; 3]) -> io::Result<()>) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(self.start))?;
         for _ in 0..self.vertices {
-            let mut bytes = [0; 12];
-            self.file.read_exact(&mut bytes)?;
-            f(words(&bytes).map(f32::from_le_bytes))?;
+            let mut bytes = [0; 24];
+            let width = self.vertex_bytes() as usize;
+            self.file.read_exact(&mut bytes[..width])?;
+            let double = |n: usize| f64::from_le_bytes(std::array::from_fn(|i| bytes[8 * n + i]));
+            let single = |n: usize| f64::from(f32::from_le_bytes(std::array::from_fn(|i| bytes[4 * n + i])));
+            f(std::array::from_fn(|n| if self.is_double { double(n) } else { single(n) }))?;
         }
         Ok(())
     }
@@ -58,7 +67,7 @@ impl Written {
 
     /// Each triangle with its two labels, which are 0 where it has none.
     pub(super) fn each_facet(&mut self, mut f: impl FnMut([u32; 3], [u32; 2]) -> io::Result<()>) -> io::Result<()> {
-        self.file.seek(SeekFrom::Start(self.start + VERTEX_BYTES * self.vertices))?;
+        self.file.seek(SeekFrom::Start(self.start + self.vertex_bytes() * self.vertices))?;
         for _ in 0..self.triangles {
             let mut bytes = [0; 21];
             self.file.read_exact(if self.is_tagged { &mut bytes } else { &mut bytes[..13] })?;

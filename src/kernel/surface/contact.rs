@@ -34,10 +34,10 @@ impl Contacts {
     }
 
     /// Adds a triangle by its corners in the world.
-    pub fn add(&mut self, labels: [u32; 2], corners: [[f32; 3]; 3]) {
+    pub fn add(&mut self, labels: [u32; 2], corners: [[f64; 3]; 3]) {
         let new = Contact { labels, area: 0.0, centre: [0.0; 3], triangles: 0 };
         let contact = self.known.entry(labels).or_insert(new);
-        let [a, b, c] = corners.map(|corner| sub(corner.map(f64::from), self.from));
+        let [a, b, c] = corners.map(|corner| sub(corner, self.from));
         let normal = cross(sub(b, a), sub(c, a));
         let area = 0.5 * dot(normal, normal).sqrt();
         contact.area += area;

@@ -57,8 +57,8 @@ impl SurfaceMeasure {
     }
 
     /// Adds a triangle, its corners as vertex numbers and as world positions.
-    pub fn add(&mut self, corners: [u32; 3], positions: [[f32; 3]; 3]) {
-        let [a, b, c] = positions.map(|p| std::array::from_fn(|i| f64::from(p[i]) - self.centre[i]));
+    pub fn add(&mut self, corners: [u32; 3], positions: [[f64; 3]; 3]) {
+        let [a, b, c] = positions.map(|p| sub(p, self.centre));
         // Divergence theorem: the tetrahedron from the centre to a triangle has the volume a . (b x c) / 6.
         self.volume6 += dot(a, cross(b, c));
         let normal = cross(sub(b, a), sub(c, a));
@@ -88,11 +88,11 @@ mod tests {
 
     #[test]
     fn a_tetrahedron_far_from_the_origin() {
-        let offset = 4096.0_f32;
+        let offset = 4_096_000.0;
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]];
-        let mut measure = SurfaceMeasure::new([4096.5; 3]);
+        let mut measure = SurfaceMeasure::new([4_096_000.5; 3]);
         for triangle in [[0_u32, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] {
-            measure.add(triangle, triangle.map(|v| corners[v as usize].map(|x| x + offset)));
+            measure.add(triangle, triangle.map(|v| corners[v as usize].map(|x: f64| x + offset)));
         }
         let found = measure.measures();
         assert!((found.volume - 1.0).abs() < 1e-12);

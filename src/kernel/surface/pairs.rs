@@ -27,11 +27,11 @@ pub struct Pairs {
 
 impl Pairs {
     /// Adds a triangle: its corners in the world, and their distances.
-    pub fn add(&mut self, labels: [u32; 2], corners: [[f32; 3]; 3], distances: [f64; 3]) {
+    pub fn add(&mut self, labels: [u32; 2], corners: [[f64; 3]; 3], distances: [f64; 3]) {
         let far = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
         let new = Pair { labels, area: 0.0, triangles: 0, extent: far, distance: [f64::INFINITY, f64::NEG_INFINITY] };
         let pair = self.known.entry(labels).or_insert(new);
-        let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+        let [a, b, c] = corners;
         let normal = cross(sub(b, a), sub(c, a));
         pair.area += 0.5 * dot(normal, normal).sqrt();
         pair.triangles += 1;
@@ -61,7 +61,7 @@ mod tests {
         let triangle = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, -1.0]];
         pairs.add([1, 3], triangle, [0.5, 0.25, 1.0]);
         pairs.add([1, 2], triangle, [2.0; 3]);
-        pairs.add([1, 3], triangle.map(|p| p.map(|x: f32| x + 1.0)), [0.75; 3]);
+        pairs.add([1, 3], triangle.map(|p| p.map(|x: f64| x + 1.0)), [0.75; 3]);
         let found = pairs.finish();
         assert_eq!(
             found.iter().map(|pair| (pair.labels, pair.triangles)).collect::<Vec<_>>(),

@@ -17,6 +17,8 @@ const VERTEX_LIMIT: u64 = u32::MAX as u64;
 #[derive(Clone, Debug)]
 pub struct Welder {
     geometry: Geometry,
+    /// Whether positions are those of f32: what is measured is then what a file in single precision holds.
+    is_single: bool,
     /// Numbers of the vertices that a later patch may share.
     shared: HashMap<VertexKey, u32>,
     /// The z index at which the current layer of cells starts.
@@ -25,7 +27,7 @@ pub struct Welder {
     triangles: u64,
     /// Number and world position of each vertex of the last patch.
     numbers: Vec<u32>,
-    world: Vec<[f32; 3]>,
+    world: Vec<[f64; 3]>,
 }
 
 impl Welder {
@@ -34,6 +36,7 @@ impl Welder {
     pub fn new(geometry: &Geometry) -> Self {
         Self {
             geometry: geometry.clone(),
+            is_single: geometry.fits_single(),
             shared: HashMap::new(),
             layer: i64::MIN,
             vertices: 0,
@@ -81,7 +84,7 @@ impl Welder {
     }
 
     /// The triangles of the patch added last, as vertex numbers of the mesh and world positions.
-    pub fn triangles_of<'a>(&'a self, patch: &'a Patch) -> impl Iterator<Item = ([u32; 3], [[f32; 3]; 3])> + 'a {
+    pub fn triangles_of<'a>(&'a self, patch: &'a Patch) -> impl Iterator<Item = ([u32; 3], [[f64; 3]; 3])> + 'a {
         patch.triangles.iter().map(|t| (t.map(|v| self.numbers[v as usize]), t.map(|v| self.world[v as usize])))
     }
 
@@ -95,7 +98,7 @@ impl Welder {
     }
 
     /// The number of a vertex: the one a former patch gave it, or the next one.
-    fn number(&mut self, key: VertexKey, cells: &Box3, world: [f32; 3], sink: &mut dyn MeshSink) -> Result<u32> {
+    fn number(&mut self, key: VertexKey, cells: &Box3, world: [f64; 3], sink: &mut dyn MeshSink) -> Result<u32> {
         let is_shared = touches_border(key, cells);
         if is_shared && let Some(&number) = self.shared.get(&key) {
             return Ok(number);
@@ -114,8 +117,10 @@ impl Welder {
         Ok(number)
     }
 
-    fn to_world(&self, position: [f64; 3]) -> [f32; 3] {
-        std::array::from_fn(|a| (self.geometry.origin[a] + position[a] * self.geometry.spacing[a]) as f32)
+    fn to_world(&self, position: [f64; 3]) -> [f64; 3] {
+        let world = |a: usize| self.geometry.origin[a] + position[a] * self.geometry.spacing[a];
+        let rounded = |v: f64| if self.is_single { f64::from(v as f32) } else { v };
+        std::array::from_fn(|a| rounded(world(a)))
     }
 }
 
@@ -178,7 +183,7 @@ mod tests {
             welder.add(&patch, &mut mesh).unwrap();
             let walked: Vec<_> = welder.triangles_of(&patch).collect();
             assert_eq!(walked.iter().map(|w| w.0).collect::<Vec<_>>(), mesh.triangles[start..]);
-            assert!(walked.iter().all(|(t, p)| t.map(|v| mesh.vertices[v as usize]) == *p));
+            assert!(walked.iter().all(|(t, p)| t.map(|v| mesh.vertices[v as usize].map(f64::from)) == *p));
         }
     }
 

@@ -11,7 +11,7 @@ use crate::kernel::distance::precision::Precision;
 use crate::kernel::image::palette::label_color;
 use crate::kernel::triangle::Triangle;
 use crate::pipeline::pyramid::{Reduce, write_levels};
-use crate::store::{BoxSource, Element, ElementType};
+use crate::store::{BoxSource, Element};
 
 /// Writes all fields that the settings ask for.
 ///
@@ -37,16 +37,33 @@ pub fn write_fields<P: Precision>(
         write_label_field(engine, geometry, sets, "nearest", &nearest, store)?;
     }
     if settings.closest_point {
-        let triangles: Vec<_> = (0..sets.mesh.len()).map(|n| Triangle::new(sets.mesh.corners(n))).collect();
-        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let group = format!("closest-point/{name}");
-            let spec = ImageSpec { name: &group, geometry, element: ElementType::F32, window: None };
-            let closest = ClosestPoint { solved, sets, triangles: &triangles, geometry, axis };
-            let stage = engine.stage(&format!("write closest {name}"), 0);
-            stage.voxels(geometry.domain().volume());
-            write_levels::<f32>(&stage, engine, store.image(&group, &spec)?.levels(), &closest, Reduce::Mean)?;
-            stage.finish();
+        // Single precision would move places that are far from zero.
+        if geometry.fits_single() {
+            write_closest_points::<f32, P>(engine, geometry, sets, solved, store)?;
+        } else {
+            write_closest_points::<f64, P>(engine, geometry, sets, solved, store)?;
         }
+    }
+    Ok(())
+}
+
+/// Writes the place on the nearest source, an image for each coordinate, as `T`.
+fn write_closest_points<T: Element, P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    solved: &Solved<'_, P>,
+    store: &StoreWriter,
+) -> Result<()> {
+    let triangles: Vec<_> = (0..sets.mesh.len()).map(|n| Triangle::new(sets.mesh.corners(n))).collect();
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let group = format!("closest-point/{name}");
+        let spec = ImageSpec { name: &group, geometry, element: T::TYPE, window: None };
+        let closest = ClosestPoint { solved, sets, triangles: &triangles, geometry, axis };
+        let stage = engine.stage(&format!("write closest {name}"), 0);
+        stage.voxels(geometry.domain().volume());
+        write_levels::<T>(&stage, engine, store.image(&group, &spec)?.levels(), &closest, Reduce::Mean)?;
+        stage.finish();
     }
     Ok(())
 }
@@ -125,12 +142,12 @@ struct ClosestPoint<'a, 'b, P> {
     axis: usize,
 }
 
-impl<P: Precision> BoxSource<f32> for ClosestPoint<'_, '_, P> {
+impl<P: Precision, T: Element> BoxSource<T> for ClosestPoint<'_, '_, P> {
     fn shape(&self) -> [i64; 3] {
         self.geometry.shape
     }
 
-    fn read_box(&self, part: &Box3, out: &mut [f32]) -> Result<()> {
+    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
         let mut sources = vec![NO_SOURCE; part.len()];
         self.solved.sources.read_box(part, &mut sources)?;
         let points = &self.sets.positions;
@@ -139,12 +156,12 @@ impl<P: Precision> BoxSource<f32> for ClosestPoint<'_, '_, P> {
                 let at = part.offset_of([x, y, z]);
                 let source = sources[at] as usize;
                 let triangle = || self.triangles.get(source.checked_sub(points.len())?);
-                out[at] = match points.get(source) {
-                    Some(point) => point[self.axis] as f32,
-                    None => triangle().map_or(f32::NAN, |triangle| {
-                        triangle.closest_point(self.geometry.position([x, y, z]))[self.axis] as f32
+                out[at] = T::from_f64(match points.get(source) {
+                    Some(point) => point[self.axis],
+                    None => triangle().map_or(f64::NAN, |triangle| {
+                        triangle.closest_point(self.geometry.position([x, y, z]))[self.axis]
                     }),
-                };
+                });
             }
         }
         Ok(())

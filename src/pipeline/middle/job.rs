@@ -106,7 +106,7 @@ pub fn middle<P: Precision>(
         let labelled = Labelled { geometry, shapes: &shapes, trees: &trees, sources: &*solved.sources, first_labels };
         let (measures, pairs) = match store {
             Some(store) => {
-                let mut mesh = PlyWriter::create_tagged(&store.file("meshes/surface.ply")?, geometry.unit.as_deref())?;
+                let mut mesh = PlyWriter::tagged_on_grid(&store.file("meshes/surface.ply")?, geometry)?;
                 let drawn = draw(&stage, &labelled, settings.surface, &mut mesh)?;
                 mesh.finish()?;
                 drawn

@@ -47,7 +47,7 @@ pub(super) fn write_faces(
     }
     let contacts = match store {
         Some(store) => {
-            let mut mesh = PlyWriter::create_tagged(&store.file("meshes/cells.ply")?, geometry.unit.as_deref())?;
+            let mut mesh = PlyWriter::tagged_on_grid(&store.file("meshes/cells.ply")?, geometry)?;
             let contacts = draw_faces(&stage, geometry, labels, &mut mesh)?;
             mesh.finish()?;
             let path = store.file("meshes/contacts.csv")?;

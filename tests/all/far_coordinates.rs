@@ -1,0 +1,132 @@
+//! Survey coordinates: a run far from zero gives what the same run gives at zero, in every field, file and message.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+
+use strandline::io::ome_zarr::ImageReader;
+
+use crate::common::ball::Bench;
+use crate::common::clouds::sphere;
+use crate::common::stores::volume;
+
+/// A national grid, and a place of which one axis counts billions.
+const FAR: [[f64; 3]; 2] = [[500_000.0, 4_000_000.0, 100.0], [-1e9, 7.0, 0.0]];
+
+/// A folder with the unit sphere as a cloud, `name.xyz`, at a place. Coordinates are multiples of 2^-20, which f64 keeps
+/// wherever they are.
+fn write_ball(bench: &Bench, name: &str, at: [f64; 3]) {
+    let keep = |v: f64| (v * 1_048_576.0).round() / 1_048_576.0;
+    let cloud = sphere([0.0; 3], 1.0, 500, |_| true);
+    let line = |p: &[f64; 3]| {
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|a| keep(p[a]) + at[a]);
+        format!("{x} {y} {z}\n")
+    };
+    bench.write(&format!("{name}.xyz"), &cloud.iter().map(line).collect::<String>());
+}
+
+fn measured(bench: &Bench, mesh: &str) -> [f64; 2] {
+    let found: serde_json::Value = serde_json::from_str(&bench.succeed(&format!("measure {mesh} --json"))).unwrap();
+    assert_eq!(found["closed"], true, "{mesh}: {found}");
+    ["volume", "area"].map(|key| found[key].as_f64().unwrap())
+}
+
+fn alike(a: [f64; 2], b: [f64; 2], within: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < within)
+}
+
+#[test]
+fn surfaces_far_from_zero_are_those_at_zero() {
+    let bench = Bench::bare();
+    write_ball(&bench, "near", [0.0; 3]);
+    let run = "--spacing 0.25 -q --overwrite";
+    bench.succeed(&format!("reconstruct near.xyz {run} -o out/near.zarr --mesh out/near.obj"));
+    let expected = measured(&bench, "out/near.obj");
+    assert!((expected[0] - 4.18879).abs() < 0.1 && (expected[1] - 12.566).abs() < 0.3, "{expected:?}");
+    let field = volume(&bench.path("out/near.zarr"));
+    for far in FAR {
+        write_ball(&bench, "far", far);
+        for ending in ["ply", "obj", "vtp", "stl"] {
+            bench.succeed(&format!("reconstruct far.xyz {run} -o out/far.zarr --mesh out/far.{ending}"));
+        }
+        for mesh in ["out/far.ply", "out/far.obj", "out/far.stl", "out/far.zarr/meshes/surface.ply"] {
+            assert!(alike(measured(&bench, mesh), expected, 1e-5), "{far:?} {mesh}: {:?}", measured(&bench, mesh));
+        }
+        let report = bench.json("out/far.zarr/report.json");
+        let told = ["volume", "area"].map(|key| report["result"][key].as_f64().unwrap());
+        assert!(alike(told, expected, 1e-5), "{far:?}: {told:?}");
+        let same = volume(&bench.path("out/far.zarr"));
+        let most = field.iter().zip(&same).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(same.len() == field.len() && most < 1e-3, "{far:?}: {most}");
+        // Every vertex lies where the sphere is.
+        let text = fs::read_to_string(bench.path("out/far.obj")).unwrap();
+        for line in text.lines().filter_map(|line| line.strip_prefix("v ")) {
+            let at: Vec<f64> = line.split(' ').map(|word| word.parse().unwrap()).collect();
+            let radius = (0..3).map(|a| (at[a] - far[a]).powi(2)).sum::<f64>().sqrt();
+            assert!((0.9..1.06).contains(&radius), "{far:?}: {line}");
+        }
+        let vtp = fs::read(bench.path("out/far.vtp")).unwrap();
+        assert!(String::from_utf8_lossy(&vtp[..600]).contains("Float64"));
+        // What STL is relative to is told by the file and the report.
+        let note = report["notes"].to_string();
+        let stl = fs::read(bench.path("out/far.stl")).unwrap();
+        let head = String::from_utf8_lossy(&stl[..80]).into_owned();
+        let anchor = head.strip_prefix("binary STL from ").unwrap().trim().to_owned();
+        let numbers: Vec<f64> = anchor.split(',').map(|word| word.parse().unwrap()).collect();
+        assert!((0..3).all(|a| (0.0..20.0).contains(&(far[a] - numbers[a]))), "{head}");
+        assert!(note.contains(&anchor.replace(',', ", ")) && note.contains("relative to"), "{note}");
+    }
+    let near = fs::read(bench.path("out/near.zarr/meshes/surface.ply")).unwrap();
+    assert!(String::from_utf8_lossy(&near[..300]).contains("property float x"), "near zero f32 is enough");
+}
+
+#[test]
+fn messages_keep_the_digits_that_matter() {
+    let bench = Bench::bare();
+    write_ball(&bench, "far", FAR[0]);
+    let told = bench.succeed("info far.xyz");
+    for line in ["lowest x, y, z   (499999.0", "3999999.00", "highest x, y, z  (500000.99", "4000000.99"] {
+        assert!(told.contains(line), "{line}: {told}");
+    }
+    assert!(!told.contains("0000000") && told.lines().all(|line| line.len() < 70), "{told}");
+    let printed = bench.succeed("reconstruct far.xyz --spacing 0.25 -o out/far.zarr");
+    let hole = printed.lines().find(|line| line.starts_with("largest hole")).unwrap();
+    let place = hole.split(['(', ')']).nth(1).unwrap();
+    let at: Vec<f64> = place.split(", ").map(|word| word.parse().unwrap()).collect();
+    let radius = (0..3).map(|a| (at[a] - FAR[0][a]).powi(2)).sum::<f64>().sqrt();
+    assert!((0.8..1.2).contains(&radius), "{hole}");
+    let told = bench.succeed("info out/far.zarr");
+    assert!(told.contains(", origin (49999"), "{told}");
+}
+
+/// Distances, closest points, and the place of the grid, in the store and read again.
+#[test]
+fn distances_far_from_zero_are_those_at_zero() {
+    let bench = Bench::bare();
+    write_ball(&bench, "near", [0.0; 3]);
+    let run = "--spacing 0.25 --padding 0.5 --closest-point -q --overwrite";
+    for (method, schedule) in [("vdt", "front"), ("dp", "front"), ("fsm", "sweep"), ("fmm", "sweep")] {
+        let flags = format!("{run} --method {method} --schedule {schedule}");
+        bench.succeed(&format!("distance near.xyz {flags} -o out/near.zarr"));
+        let near = volume(&bench.path("out/near.zarr"));
+        for far in FAR {
+            write_ball(&bench, "far", far);
+            bench.succeed(&format!("distance far.xyz {flags} -o out/far.zarr"));
+            let found = volume(&bench.path("out/far.zarr"));
+            let most = near.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(found.len() == near.len() && most < 1e-5, "{method} {far:?}: {most}");
+            let geometry = ImageReader::open(&bench.path("out/far.zarr")).unwrap().levels()[0].geometry.clone();
+            let report = bench.json("out/far.zarr/report.json");
+            for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+                assert!((geometry.origin[axis] - far[axis] + 1.5).abs() < 0.01, "{:?}", geometry.origin);
+                assert_eq!(report["grid"]["origin_zyx"][2 - axis], geometry.origin[axis]);
+                let [near, far_points] =
+                    ["near", "far"].map(|store| volume(&bench.path(&format!("out/{store}.zarr/closest-point/{name}"))));
+                let off = |(near, there): (&f64, &f64)| (there - far[axis] - near).abs();
+                let wrong = near.iter().zip(&far_points).map(off).filter(|off| *off > 1e-6).count();
+                // Of sources that are equally near another may be named.
+                assert!(wrong * 100 <= near.len(), "{method} {far:?} {name}: {wrong}");
+            }
+        }
+    }
+}
