@@ -100,6 +100,7 @@ pub(super) fn reconstruct_settings(args: &MotionArgs, method: Method) -> Result<
         method,
         motion: motion(args, defaults.motion)?,
         beta: optional("--beta", args.beta, ABOVE_ZERO)?,
+        keeps_grid: false,
     })
 }
 

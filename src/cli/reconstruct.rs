@@ -9,10 +9,11 @@ use serde::Serialize;
 
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
+use super::distance_args::GridArgs;
 use super::files::{export_mesh, mesh_format, tell_of_anchor};
-use super::grid::check_counts;
+use super::grid::{check_counts, grid};
 use super::outputs::Outputs;
-use super::reconstruct_args::ReconstructArgs;
+use super::reconstruct_args::{CloudGridArgs, ReconstructArgs};
 use super::report::{Hausdorff, Hole, Moves, Ran, Report};
 use super::text::{bytes, duration, grouped, number, place, triple};
 use super::{print, signals, table};
@@ -71,11 +72,38 @@ fn drop_isolated(cloud: Vec<[f64; 3]>, spacings: Option<f64>, console: &Console)
     Ok(kept)
 }
 
+/// The grid that was asked for, if one was, as fine as that around the cloud.
+fn laid_grid(
+    args: &CloudGridArgs,
+    around: &Geometry,
+    cloud: &[[f64; 3]],
+    console: &Console,
+) -> Result<Option<Geometry>> {
+    let (padding, origin, shape) = (args.padding, args.origin, args.shape);
+    if padding.is_none() && origin.is_none() {
+        return Ok(None);
+    }
+    let spacing = Some(around.spacing);
+    let asked = GridArgs { spacing, padding, origin, shape, like: None, image_spacing: None };
+    let high = |a: usize| cloud.iter().map(|p| p[a]).fold(f64::NEG_INFINITY, f64::max);
+    let laid = grid(&asked, (around.origin, [high(0), high(1), high(2)]), &mut Vec::new())?;
+    let outside =
+        cloud.iter().filter(|&&p| !laid.domain().contains(laid.to_voxels(p).map(|v| v.floor() as i64))).count();
+    if outside > 0 {
+        console.note(&format!(
+            "{} of {} points lie outside of the grid; the surface is that of all points, fields end with the grid",
+            grouped(outside as u64),
+            grouped(cloud.len() as u64)
+        ));
+    }
+    Ok(Some(laid))
+}
+
 impl Job {
     fn new(args: ReconstructArgs, typed: &[String]) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
-        let settings = config::reconstruct_settings(&args.motion, args.distance.method)?;
+        let mut settings = config::reconstruct_settings(&args.motion, args.distance.method)?;
         let spacing = config::spacing("--spacing", args.grid.spacing)?;
         config::check_ranks(args.ranks)?;
         let outputs = Outputs {
@@ -104,6 +132,9 @@ impl Job {
             let what = "all points lie in one place, which tells no spacing and encloses nothing";
             Error::input(what).at(&args.cloud)
         })?;
+        let laid = laid_grid(&args.grid, &grid, &cloud, &console)?;
+        settings.keeps_grid = laid.is_some();
+        let grid = laid.unwrap_or(grid);
         check_counts(grid.shape.map(|n| n as f64))?;
         refuse_too_fine(&grid, resources.memory)?;
         let typed = typed.to_vec();

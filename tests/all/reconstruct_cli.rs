@@ -4,9 +4,12 @@
 
 use std::fs;
 
+use serde_json::json;
+
 use crate::common::ball::Bench;
 use crate::common::clouds::sphere;
 use crate::common::meshes::{self, Form};
+use crate::common::stores::volume;
 
 /// A folder with a sphere of radius 2 as a cloud.
 fn bench() -> Bench {
@@ -130,5 +133,46 @@ fn what_cannot_be_done_is_refused_in_a_sentence() {
         assert_eq!(said.len(), 1, "{arguments}: {complaint}");
         assert!(words.iter().all(|word| said[0].contains(word)), "{arguments}: {complaint}");
         assert!(bench.entries("out").is_empty(), "{arguments}: {:?}", bench.entries("out"));
+    }
+}
+
+/// A grid that is asked for is the one that fields are written on, also where it cuts what the points enclose.
+#[test]
+fn fields_lie_on_the_grid_that_is_asked_for() {
+    let bench = bench();
+    let run = |name: &str, flags: &str| {
+        bench.succeed(&format!(
+            "reconstruct ball.xyz --spacing 0.25 -q --overwrite -o out/{name}.zarr {flags} --report out/{name}.json"
+        ));
+        (volume(&bench.path(&format!("out/{name}.zarr"))), bench.json(&format!("out/{name}.json")))
+    };
+    let (whole, report) = run("whole", "--origin -2.5,-1.5,-0.5 --shape 29,30,31");
+    let grid = &report["grid"];
+    assert_eq!(
+        [&grid["shape_zyx"], &grid["origin_zyx"], &grid["spacing_zyx"]],
+        [&json!([31, 30, 29]), &json!([-0.5, -1.5, -2.5]), &json!([0.25, 0.25, 0.25])]
+    );
+    assert_eq!(whole.len(), 29 * 30 * 31);
+    let inside = whole.iter().filter(|&&u| u > 0.5).count() as f64 / 64.0;
+    let told = report["result"]["volume"].as_f64().unwrap();
+    assert!((inside / told - 1.0).abs() < 0.03 && (told / 33.51 - 1.0).abs() < 0.03, "{inside}, {told}");
+    assert!(report["notes"].as_array().unwrap().is_empty(), "{}", report["notes"]);
+    // The surface is the same, whatever of it the fields show; they are the same where both grids have a voxel.
+    let (half, report) = run("half", "--origin -2.5,-1.5,-0.5 --shape 14,60,31");
+    assert_eq!(report["result"]["volume"].as_f64().unwrap(), told);
+    assert!(report["notes"].to_string().contains("of 1 500 points lie outside of the grid"), "{}", report["notes"]);
+    for (n, &u) in half.iter().enumerate() {
+        let (x, y, z) = (n % 14, n / 14 % 60, n / 14 / 60);
+        assert_eq!(u, if y < 30 { whole[(z * 30 + y) * 29 + x] } else { 0.0 }, "{x} {y} {z}");
+    }
+    // The papers' grid: room on every side, one voxel more than it needs.
+    let (_, report) = run("padded", "--padding 1");
+    assert_eq!(report["grid"]["shape_zyx"], json!([25, 25, 25]));
+    let origin = report["grid"]["origin_zyx"][0].as_f64().unwrap();
+    assert!((origin - 0.0).abs() < 0.01, "{origin}");
+    for (flags, word) in [("--origin 0,0,0", "--shape"), ("--padding -1", "--padding is -1")] {
+        let text = bench.run(&format!("reconstruct ball.xyz -o none {flags}"));
+        let said = String::from_utf8_lossy(&text.stderr).into_owned();
+        assert!(text.status.code() == Some(2) && said.contains(word), "{flags}: {said}");
     }
 }

@@ -7,6 +7,7 @@
 mod estimate;
 mod grid;
 mod isolated;
+mod on_grid;
 mod output;
 mod settings;
 

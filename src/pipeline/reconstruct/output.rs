@@ -1,9 +1,10 @@
 //! The whole job: search what the cloud encloses, move the surface, draw, measure and write it.
 
+use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage};
-use crate::grid::Geometry;
+use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::Band;
@@ -13,7 +14,7 @@ use crate::pipeline::evolve_ranks::evolve_on_ranks;
 use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::sheets::{Company, hold_sheets};
 use crate::pipeline::surface::{self, Drawn};
-use crate::store::ElementType;
+use crate::store::{BoxSource, ElementType};
 
 /// Points farther from the solved surface than so many largest spacings have been left by it.
 const LEFT_VOXELS: f64 = 0.6;
@@ -21,7 +22,7 @@ const LEFT_VOXELS: f64 = 0.6;
 /// What a reconstruction found.
 #[derive(Clone, Debug)]
 pub struct Reconstruction {
-    /// The grid that u lies on.
+    /// The grid that u is written on.
     pub geometry: Geometry,
     /// Where the start surface lay.
     pub beta: f64,
@@ -43,8 +44,8 @@ pub struct Reconstruction {
     pub lost_points: u64,
 }
 
-/// Reconstructs the surface of a cloud on a grid, whose box grows as far around the cloud as is needed; `store` gets
-/// the results, none of them when it is absent. Distance and level set are solved by all ranks of the engine, whose
+/// Reconstructs the surface of a cloud on a grid, on a box of it that grows as far around the cloud as is needed; `store`
+/// gets the results, none of them when it is absent. Distance and level set are solved by all ranks of the engine, whose
 /// number changes no bit.
 ///
 /// # Errors
@@ -71,6 +72,7 @@ pub fn reconstruct(
         Found::Nothing => return Err(encloses_nothing(grid)),
     };
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
+    let window = enclosure.window;
     let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
     let mut band = enclosure.into_band(engine, "")?;
     let stage = engine.stage("level set", 0);
@@ -94,11 +96,13 @@ pub fn reconstruct(
     let mesh = store.map(|store| store.file("meshes/surface.ply")).transpose()?;
     let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh.as_deref())?;
     stage.finish();
+    let written = if settings.keeps_grid { grid.clone() } else { geometry };
     if let Some(store) = store {
-        write_fields(engine, &geometry, &band, store)?;
+        let window = settings.keeps_grid.then_some(window);
+        write_fields(engine, &written, window, &band, store)?;
     }
     Ok(Reconstruction {
-        geometry,
+        geometry: written,
         beta,
         hole,
         spaces,
@@ -119,15 +123,25 @@ fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]]
     Ok(hold_sheets(geometry, cloud, &lost, Company::AT_THE_END, band))
 }
 
-fn write_fields(engine: &Engine, geometry: &Geometry, band: &Band, store: &StoreWriter) -> Result<()> {
+/// Writes the fields on a grid: that of the band, or with a window one in which the band has that box.
+fn write_fields(
+    engine: &Engine,
+    geometry: &Geometry,
+    window: Option<Box3>,
+    band: &Band,
+    store: &StoreWriter,
+) -> Result<()> {
     let farthest = f64::from(band.distance.absent(0));
-    for (group, name, field, high) in
-        [("", "levelset", &band.u, 1.0), ("distance", "distance", &band.distance, farthest)]
-    {
+    for (group, name, field, high, beyond) in [
+        ("", "levelset", &band.u, 1.0, 0.0),
+        ("distance", "distance", &band.distance, farthest, band.distance.absent(0)),
+    ] {
         let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
         let stage = engine.stage(&format!("write {name}"), 0);
         stage.voxels(geometry.domain().volume());
-        write_levels::<f32>(&stage, engine, store.image(group, &spec)?.levels(), field, Reduce::Mean)?;
+        let on_grid = window.map(|window| OnGrid { field, window, shape: geometry.shape, beyond });
+        let source: &dyn BoxSource<f32> = on_grid.as_ref().map_or(field as _, |on_grid| on_grid as _);
+        write_levels::<f32>(&stage, engine, store.image(group, &spec)?.levels(), source, Reduce::Mean)?;
         stage.finish();
     }
     Ok(())

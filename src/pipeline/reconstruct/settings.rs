@@ -13,6 +13,8 @@ pub struct ReconstructSettings {
     pub motion: Motion,
     /// Distance of the start surface from the cloud; automatic when none.
     pub beta: Option<f64>,
+    /// Whether fields are written on the grid as it was given; else on a box of it around what is found.
+    pub keeps_grid: bool,
 }
 
 /// The start is near the surface: it is worth the few steps more to let it come to rest.
@@ -20,6 +22,11 @@ const REST: Stop = Stop::Surface(0.005);
 
 impl Default for ReconstructSettings {
     fn default() -> Self {
-        Self { method: Method::VDT, motion: Motion { rho: 0.0, stop: REST, ..Motion::default() }, beta: None }
+        Self {
+            method: Method::VDT,
+            motion: Motion { rho: 0.0, stop: REST, ..Motion::default() },
+            beta: None,
+            keeps_grid: false,
+        }
     }
 }
