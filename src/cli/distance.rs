@@ -304,11 +304,14 @@ fn outside_note(geometry: &Geometry, sets: &DataSets) -> Option<String> {
     let (outside, all) = (count_outside(geometry, sets), sets.len() as u64);
     let which = match outside {
         0 => return None,
+        1 if all == 1 => "the only source lies outside of the grid or reaches".into(),
         _ if outside == all => format!("all {} sources lie outside of the grid or reach", grouped(all)),
         1 => format!("1 of {} sources lies outside of the grid or reaches", grouped(all)),
         _ => format!("{} of {} sources lie outside of the grid or reach", grouped(outside), grouped(all)),
     };
-    Some(format!("{which} out of it; distances are to all of them (--origin, --shape and --spacing say where it lies)"))
+    Some(format!(
+        "{which} out of it; such sources count like all others (--origin, --shape and --spacing say where it lies)"
+    ))
 }
 
 /// How far a voxel may be from the nearest source where all of them lie outside: half of the grid's diagonal more than its

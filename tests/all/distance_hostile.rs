@@ -181,7 +181,7 @@ fn sources_outside_the_grid() {
     for grid in ["--like image.tif", "--spacing 1 --origin 0,0,0 --shape 9,9,9"] {
         for (source, fixed, note) in [
             ("some.xyz", 1..9, Some("1 of 2 sources lies outside")),
-            ("across.obj", 9..10_000, Some("all 1 sources lie outside of the grid or reach out")),
+            ("across.obj", 9..10_000, Some("the only source lies outside of the grid or reaches out")),
             ("away.xyz", 100..10_000, Some("all 2 sources lie outside")),
             ("within.xyz", 1..9, None),
         ] {
