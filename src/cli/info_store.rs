@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::info::{Lines, line};
-use super::text::{number, triple};
+use super::text::{number, place};
 use crate::error::{Error, Result};
 use crate::io::ome_zarr::is_store;
 use crate::io::zarr_image::{LevelDescription, ZarrDescription, describe, holds_image};
@@ -54,7 +54,7 @@ fn image_lines(name: &str, image: &ZarrDescription) -> Lines {
         let origin = if level.origin == [0.0; 3] {
             String::new()
         } else {
-            format!(", origin {}", place(level.origin, finest(level.spacing)))
+            format!(", origin {}", place(level.origin, finest))
         };
         let number = if level.path.is_empty() { name.to_owned() } else { format!("{name}, level {}", level.path) };
         lines.push(line(&number, format!("{}{origin}", text.trim_end())));

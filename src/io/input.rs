@@ -18,6 +18,8 @@ const BUFFER: usize = 1 << 18;
 
 /// What is read from: a file, a pipe, or either through a decoder.
 type Bytes = Box<dyn Read>;
+/// So many bytes are looked at after the last that is read: a pipe may never end.
+const FAR: usize = 1 << 24;
 
 /// An opened file.
 pub struct Input {
@@ -92,6 +94,26 @@ impl Input {
         let mut input = self.through(|bytes| bytes)?;
         input.length = length;
         Ok(input)
+    }
+
+    /// Tells what stands after `what`, the last that is read; blanks do not count.
+    pub(super) fn tell_rest(&mut self, what: &str) -> Result<()> {
+        let (mut bytes, mut is_blank) = (0, true);
+        while bytes < FAR {
+            let piece = self.reader.fill_buf().map_err(|e| unreadable(&e))?;
+            if piece.is_empty() {
+                break;
+            }
+            is_blank &= piece.iter().all(u8::is_ascii_whitespace);
+            bytes += piece.len();
+            let read = piece.len();
+            self.reader.consume(read);
+        }
+        if !is_blank {
+            let more = if bytes < FAR { "" } else { " or more" };
+            self.notes.push(format!("{bytes}{more} bytes after {what} are left aside"));
+        }
+        Ok(())
     }
 
     /// The first bytes of the file, [`HEAD`] at most, as long as nothing has been read.

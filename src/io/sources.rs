@@ -1,6 +1,6 @@
 //! Sources of a distance from files: point clouds and triangle meshes, told apart by content, never by the name.
 //!
-//! [`FORMATS`] is the one table of what is read. Polygons become fans of triangles; a vertex that no face names is no
+//! [`FORMATS`] is the one table of what is read. Polygons are cut into triangles; a vertex that no face names is no
 //! source of a mesh.
 
 use std::path::Path;
@@ -131,7 +131,12 @@ pub fn describe(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>)>
 }
 
 fn read(input: &mut Input) -> Result<Source> {
+    let length = input.length;
     let head = input.head()?;
+    // What the length says counts for more than any looks.
+    if stl::has_binary_length(head, length) {
+        return stl::read(input);
+    }
     if let Some(format) = FORMATS.iter().find(|format| (format.sniff)(head)) {
         return (format.read)(input);
     }

@@ -199,7 +199,6 @@ fn unusable_text_is_refused_with_line_and_reason() {
         ("v 1 2 nan\n", &["line 1", "z is 'nan'", "not finite"]),
         ("v 1 2 1e999\n", &["line 1", "not finite"]),
         ("o name\n", &["holds no point"]),
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", &["line 4", "2 corners"]),
         ("v 0 0 0\nf 1 1 1\nf 1 2 1\n", &["line 3", "vertex '2'", "1 to 1"]),
         ("v 0 0 0\nf 1 0 1\n", &["line 2", "vertex '0'"]),
         ("v 0 0 0\nf 1 -2 1\n", &["line 2", "vertex '-2'"]),
@@ -221,7 +220,6 @@ fn unusable_text_is_refused_with_line_and_reason() {
         ("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n", &["line 6", "vertex -1 of 3"]),
         ("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1.5 1\n", &["line 6", "vertex 1.5"]),
         ("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n", &["line 6", "no face"]),
-        ("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1    \n", &["line 6", "2 corners"]),
         ("OFF\n0 0 0\n", &["holds no point"]),
         ("solid a\nendsolid a\n", &["without a triangle"]),
         ("solid a\n", &["line 1", "without endsolid"]),
@@ -258,7 +256,6 @@ fn ply_faces_that_lie_are_refused() {
         (one, "3 0 1 -1\n", &["line 13", "vertex -1"]),
         (one, "3 0 1\n", &["line 13", "'3 0 1'"]),
         (one, "3 0 1 2 7\n", &["line 13", "as declared"]),
-        (one, "2 0 1\n", &["line 13", "2 corners"]),
         (one, "-3 0 1\n", &["line 13", "length"]),
         (one, "1e18 0 1\n", &["line 13", "as declared"]),
         (one, "nan 0 1\n", &["line 13", "length"]),
@@ -287,7 +284,7 @@ fn ply_faces_that_lie_are_refused() {
 #[test]
 fn binary_stl_that_lies_is_refused() {
     let file = Form::StlBinary.write(&model());
-    for bytes in [&file[..file.len() - 1], &file[..file.len() - 50], &file[..100], &[&file[..], b"x"].concat()] {
+    for bytes in [&file[..file.len() - 1], &file[..file.len() - 50], &file[..100]] {
         let message = refusal(bytes);
         assert!(message.contains("12 triangles") && message.contains(&format!("has {}", bytes.len())), "{message}");
     }

@@ -3,13 +3,16 @@
 //! These readers are our own. The libraries for OBJ and STL read lines of any length into memory, tell no line in
 //! their messages, and let through coordinates that are not finite or a count that the file's length belies.
 
+mod ears;
+mod numbers;
 pub(super) mod obj;
 pub(super) mod off;
 mod polygon;
 pub(super) mod stl;
 mod stl_text;
 
-pub(super) use polygon::Fan;
+pub(super) use numbers::number;
+pub(super) use polygon::Faces;
 
 use super::points::refuse_empty;
 use super::sources::Source;
@@ -24,9 +27,8 @@ fn position<'a>(mut words: impl Iterator<Item = &'a str>, line: u64) -> Result<[
         let word = words
             .next()
             .ok_or_else(|| Error::input(format!("line {line} has no {name}; a vertex needs x, y and z")))?;
-        *value = word
-            .parse()
-            .map_err(|_| Error::input(format!("line {line}: {name} is {}, which is not a number", quoted(word))))?;
+        *value = number(word)
+            .ok_or_else(|| Error::input(format!("line {line}: {name} is {}, which is not a number", quoted(word))))?;
         if !value.is_finite() {
             return Err(Error::input(format!(
                 "line {line}: {name} is {}, which is not finite; delete the vertex",

@@ -1,11 +1,12 @@
 //! OBJ (Wavefront, Advanced Visualizer manual, appendix B): vertices `v x y z`, polygons `f`, text.
 //!
 //! A corner is `v`, `v/vt`, `v//vn` or `v/vt/vn`; vertices count from 1, or from -1 backwards to those already read.
-//! Everything else (normals, textures, groups, lines, points, materials) is left aside. Coordinates are f64.
+//! Everything else (normals, textures, groups, lines, points, materials) is left aside, and so are faces of one or two
+//! corners, with a note. Coordinates are f64.
 
 use std::io::BufRead;
 
-use super::{Fan, first_line, mesh_or_cloud, position};
+use super::{Faces, first_line, mesh_or_cloud, position};
 use crate::error::{Error, Result};
 use crate::grid::refuse_too_many;
 use crate::io::input::Input;
@@ -27,14 +28,16 @@ pub(in crate::io) fn is_obj(head: &[u8]) -> bool {
 /// Reads a mesh, or a cloud where the file has no faces.
 pub(in crate::io) fn read(input: &mut Input) -> Result<Source> {
     let mut lines = Lines::after(0, &mut input.reader);
-    let mut shape = Shape::default();
+    // Corners that do not exist are told by their line, once all vertices are known.
+    let mut shape = Shape { vertices: Vec::new(), faces: Faces::new(u64::MAX), highest: None };
     while let Some(text) = whole_line(&mut lines)? {
         shape.take(&text, lines.number)?;
     }
-    let Shape { vertices, triangles, highest } = shape;
+    let Shape { vertices, faces, highest } = shape;
     if let Some((vertex, line)) = highest.filter(|(vertex, _)| *vertex as usize >= vertices.len()) {
         return Err(no_vertex(&(u64::from(vertex) + 1).to_string(), line, vertices.len()));
     }
+    let triangles = faces.finish(&vertices, &mut input.notes);
     mesh_or_cloud(vertices, triangles)
 }
 
@@ -57,10 +60,10 @@ fn whole_line<R: BufRead>(lines: &mut Lines<'_, R>) -> Result<Option<String>> {
 }
 
 /// What has been read so far.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Shape {
     vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
+    faces: Faces,
     /// The highest vertex that a face names, counted from 0, and the first line that does; it may come later.
     highest: Option<(u32, u64)>,
 }
@@ -84,18 +87,15 @@ impl Shape {
 
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>, line: u64) -> Result<()> {
         let known = self.vertices.len();
-        let mut fan = Fan::new(&mut self.triangles, known as u64);
-        let mut push = |word: &str| {
+        for word in words {
             let vertex = corner(word, line, known)?;
             if self.highest.is_none_or(|(highest, _)| vertex > highest) {
                 self.highest = Some((vertex, line));
             }
-            fan.push_index(vertex)
-        };
-        for word in words {
-            push(word)?;
+            self.faces.push_index(vertex).map_err(|error| Error::input(format!("line {line}: {error}")))?;
         }
-        fan.finish().map_err(|error| Error::input(format!("line {line}: {error}")))
+        self.faces.end(|| format!("line {line}"));
+        Ok(())
     }
 }
 

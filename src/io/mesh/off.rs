@@ -1,37 +1,39 @@
 //! OFF (Object File Format, Geomview manual, section 4.2.5): counts, vertices, polygons, as text.
 //!
-//! `OFF`, or with letters before it for what follows each position (`ST`, `C`, `N`), which is left aside as colours of
-//! faces are. Comments start at `#`. One vertex or face a line; the counts may stand on the first line. Coordinates
-//! are f64. Four or n dimensions and the binary form are refused.
+//! `OFF`, or with letters before it for what follows each position (`ST`, `C`, `N`, in any order: programs differ), which
+//! is left aside as colours of faces are. Comments start at `#`. One vertex or face a line; the counts may stand on the
+//! first line, also without a blank before them (as in `ModelNet`). Coordinates are f64. Four or n dimensions and the
+//! binary form are refused.
 
 use std::io::BufRead;
 
-use super::{Fan, first_line, mesh_or_cloud, position};
+use super::{Faces, first_line, mesh_or_cloud, position};
 use crate::error::{Error, Result};
 use crate::grid::refuse_too_many;
 use crate::io::input::Input;
 use crate::io::sources::Source;
 use crate::io::text::{Lines, quoted};
 
-/// The fewest bytes of a vertex and of a face: `0 0 0`, `3 0 1 2` and a line end.
-const LEAST: [u64; 2] = [6, 8];
+/// The fewest bytes of a vertex and of a face: `0 0 0`, `0` for a face without corners, and a line end.
+const LEAST: [u64; 2] = [6, 2];
 
 /// True for what starts like an OFF file.
 pub(in crate::io) fn is_off(head: &[u8]) -> bool {
     // The binary form has the same first line.
     let text = &head[..head.iter().position(|&byte| byte == 0).unwrap_or(head.len())];
     let line = first_line(text).or_else(|| first_line(text.split(|&byte| byte == b'\n').next()?));
-    line.is_some_and(|line| line.split_whitespace().next().is_some_and(|word| prefix(word).is_some()))
+    line.is_some_and(|line| line.split_whitespace().next().is_some_and(|word| keyword(word).is_some()))
 }
 
-/// What stands before `OFF` in a keyword.
-fn prefix(word: &str) -> Option<&str> {
-    let prefix = word.strip_suffix("OFF")?;
-    let mut rest = prefix.strip_prefix("ST").unwrap_or(prefix);
-    for letter in ['C', 'N', '4', 'n'] {
-        rest = rest.strip_prefix(letter).unwrap_or(rest);
+/// A keyword cut in what stands before `OFF` and the number that may stand right after it.
+fn keyword(word: &str) -> Option<(&str, &str)> {
+    let (prefix, number) = word.split_once("OFF")?;
+    let mut rest = prefix.to_owned();
+    for part in ["ST", "C", "N", "4", "n"] {
+        rest = rest.replacen(part, "", 1);
     }
-    rest.is_empty().then_some(prefix)
+    let is_number = number.bytes().all(|byte| byte.is_ascii_digit());
+    (rest.is_empty() && is_number).then_some((prefix, number))
 }
 
 /// Reads a mesh, or a cloud where the file has no faces.
@@ -53,12 +55,14 @@ pub(in crate::io) fn read(input: &mut Input) -> Result<Source> {
         let line = element(&mut lines, "vertices", vertex_count, vertices.len() as u64)?;
         vertices.push(position(line.split_whitespace(), lines.number)?);
     }
-    let mut triangles = Vec::new();
+    let mut faces = Faces::new(vertex_count);
     for n in 0..face_count {
         let line = element(&mut lines, "faces", face_count, n)?;
-        let fan = Fan::new(&mut triangles, vertex_count);
-        face(&line, fan).map_err(|error| Error::input(format!("line {}: {error}", lines.number)))?;
+        face(&line, &mut faces).map_err(|error| Error::input(format!("line {}: {error}", lines.number)))?;
+        faces.end(|| format!("line {}", lines.number));
     }
+    input.tell_rest(&format!("the {face_count} faces that it declares"))?;
+    let triangles = faces.finish(&vertices, &mut input.notes);
     mesh_or_cloud(vertices, triangles)
 }
 
@@ -66,14 +70,15 @@ pub(in crate::io) fn read(input: &mut Input) -> Result<Source> {
 fn counts<R: BufRead>(lines: &mut Lines<'_, R>) -> Result<[u64; 2]> {
     let header = lines.advance_to_words()?.unwrap_or_default();
     let mut words = header.split_whitespace();
-    let keyword = words.next().unwrap_or_default();
-    if prefix(keyword).is_none_or(|prefix| prefix.contains(['4', 'n'])) {
+    let first = words.next().unwrap_or_default();
+    let Some((_, glued)) = keyword(first).filter(|(prefix, _)| !prefix.contains(['4', 'n'])) else {
         return Err(Error::input(format!(
             "is OFF of a kind that is not read, {}; give three dimensions",
-            quoted(keyword)
+            quoted(first)
         )));
-    }
-    let mut line = words.collect::<Vec<_>>().join(" ");
+    };
+    let glued = Some(glued).filter(|number| !number.is_empty());
+    let mut line = glued.into_iter().chain(words).collect::<Vec<_>>().join(" ");
     if line.eq_ignore_ascii_case("BINARY") {
         return Err(Error::input("is binary OFF, which is not read; save it as text or as PLY"));
     }
@@ -100,15 +105,15 @@ fn element<R: BufRead>(lines: &mut Lines<'_, R>, what: &str, declared: u64, read
 }
 
 /// A face: how many corners, the corners, and perhaps a colour.
-fn face(line: &str, mut fan: Fan<'_>) -> Result<()> {
+fn face(line: &str, faces: &mut Faces) -> Result<()> {
     let unlike = || Error::input(format!("{} is no face: give how many corners, then the corners", quoted(line)));
     let mut words = line.split_whitespace();
     let corners: u64 = words.next().and_then(|word| word.parse().ok()).ok_or_else(unlike)?;
     for _ in 0..corners {
         let vertex: f64 = words.next().and_then(|word| word.parse().ok()).ok_or_else(unlike)?;
-        fan.push(vertex)?;
+        faces.push(vertex)?;
     }
-    fan.finish()
+    Ok(())
 }
 
 #[cfg(test)]
@@ -117,10 +122,21 @@ mod tests {
 
     #[test]
     fn what_starts_an_off_file() {
-        for text in ["OFF\n3 1 0\n", "# a\n\nCOFF 3 1\n", "STCN4nOFF\n", "NOFF", "OFF BINARY\n\0\0\0\x08"] {
+        for text in [
+            "OFF\n3 1 0\n",
+            "# a\n\nCOFF 3 1\n",
+            "STCN4nOFF\n",
+            "NCSTOFF\n",
+            "NOFF",
+            "OFF BINARY\n\0\0\0\x08",
+            "OFF8 12 0\n",
+            "\t COFF8 12 0 # a\r\n",
+        ] {
             assert!(is_off(text.as_bytes()), "{text:?}");
         }
-        for text in ["off\n", "NCOFF\n", "OFFICE\n", "x y z\n", "1 2 3\n", "", "\0OFF\n", "LIST\n"] {
+        for text in
+            ["off\n", "NNOFF\n", "OFFICE\n", "OFF8x\n", "TSOFF\n", "x y z\n", "1 2 3\n", "", "\0OFF\n", "LIST\n"]
+        {
             assert!(!is_off(text.as_bytes()), "{text:?}");
         }
     }

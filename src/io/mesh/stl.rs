@@ -1,8 +1,10 @@
 //! STL (stereolithography, 3D Systems 1989): triangles with corners of their own, binary or text.
 //!
 //! Binary: 80 bytes of anything, a count, then 50 bytes a triangle: normal and corners as little-endian f32, and two
-//! more bytes. Many binary files start with the `solid` of the text form, so what tells them apart is whether they are
-//! text. Normals are left aside: the order of the corners says what is outside.
+//! more bytes. Many binary files start with the `solid` of the text form, and numbers may look like anything, so a file
+//! is binary when its length is what its count asks for; looks decide only where lengths do not agree (bytes after the
+//! last triangle, a count that was never filled in, pipes). Normals are left aside: the order of the corners says what is
+//! outside.
 
 use std::io::{ErrorKind, Read};
 
@@ -24,25 +26,37 @@ const OTHERS: [&[u8]; 7] = [b"II*\0", b"II+\0", b"MM\0", b"\x89PNG", b"\x93NUMPY
 
 /// True for what starts like an STL file.
 pub(in crate::io) fn is_stl(head: &[u8]) -> bool {
-    if first_binary_byte(head).is_none() {
-        let line = first_line(head).unwrap_or_default();
+    if is_text(head) {
+        let Some(line) = first_line(head) else { return first_binary_byte(head).is_some() };
         return line.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("solid"));
     }
     let is_other = OTHERS.iter().any(|magic| head.starts_with(magic)) || head.starts_with(b"\x1f\x8b");
-    head.len() >= HEADER && !is_other && (has_declared_length(head) || starts_with_triangle(head))
+    let whole = (head.len() < HEAD as usize - 3).then_some(head.len() as u64);
+    head.len() >= HEADER && !is_other && (has_binary_length(head, whole) || starts_with_triangle(head))
 }
 
-/// True for a small binary file, whole in its head, whose length is what its count asks for.
-fn has_declared_length(head: &[u8]) -> bool {
-    head.len() < HEAD as usize - 3 && head.len() as u64 == length_for(declared(head))
+/// True for a file of this length whose length is what the count of a binary file asks for.
+///
+/// Four bytes of text are a count that asks for more than 20 GB, so that no text is taken for binary.
+pub(in crate::io) fn has_binary_length(head: &[u8], length: Option<u64>) -> bool {
+    head.len() >= HEADER && length == Some(length_for(declared(head)))
 }
 
-/// True when the numbers of the first triangle, as far as they are there, look like lengths: finite, neither all zero
-/// nor tiny or huge beyond any unit.
+/// True for the text form, also with odd bytes in the name of its solid.
+fn is_text(head: &[u8]) -> bool {
+    let has = |word: &[u8]| head.windows(word.len()).any(|bytes| bytes.eq_ignore_ascii_case(word));
+    first_binary_byte(head).is_none()
+        || (head.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+            && has(b"outer loop")
+            && has(b"vertex"))
+}
+
+/// True when the numbers of the first triangle, as far as they are there, look like lengths: none is huge beyond any
+/// unit, and some are not tiny. Noise of any size stands for zero in many files.
 fn starts_with_triangle(head: &[u8]) -> bool {
-    let numbers = head[HEADER..].chunks_exact(4).take(12).map(float);
-    let mut nonzero = numbers.filter(|&x| x != 0.0).peekable();
-    nonzero.peek().is_some() && nonzero.all(|x| (1e-20..1e20).contains(&x.abs()))
+    // A normal may be anything, also no number.
+    let numbers = head[HEADER..].chunks_exact(4).skip(3).take(9).map(float);
+    numbers.clone().all(|x| x.abs() < 1e20) && numbers.clone().any(|x| x.abs() > 1e-20)
 }
 
 fn declared(head: &[u8]) -> u32 {
@@ -59,11 +73,10 @@ fn float(bytes: &[u8]) -> f32 {
 
 /// Reads a mesh, three vertices of its own for each triangle.
 pub(in crate::io) fn read(input: &mut Input) -> Result<Source> {
-    let corners = if first_binary_byte(input.head()?).is_none() {
-        stl_text::read(&mut input.reader)?
-    } else {
-        read_binary(input)?
-    };
+    let length = input.length;
+    let head = input.head()?;
+    let corners =
+        if !has_binary_length(head, length) && is_text(head) { stl_text::read(input)? } else { read_binary(input)? };
     if corners.is_empty() {
         return Err(Error::input("is STL without a triangle; give a mesh that has some"));
     }
@@ -75,14 +88,7 @@ pub(in crate::io) fn read(input: &mut Input) -> Result<Source> {
 fn read_binary(input: &mut Input) -> Result<Vec<[f64; 3]>> {
     let mut header = [0; HEADER];
     input.reader.read_exact(&mut header).map_err(|e| cut_off(&e, 0))?;
-    let count = declared(&header);
-    if let Some(length) = input.length.filter(|&length| length != length_for(count)) {
-        return Err(Error::input(format!(
-            "is binary STL that declares {count} triangles, which take {} bytes, but has {length}; the file is damaged \
-             or holds something else",
-            length_for(count)
-        )));
-    }
+    let count = counted(declared(&header), input)?;
     if 3 * u64::from(count) > MOST_SOURCES as u64 {
         return Err(Error::input(format!("declares {count} triangles, too many to be numbered; divide the mesh")));
     }
@@ -105,10 +111,29 @@ fn read_binary(input: &mut Input) -> Result<Vec<[f64; 3]>> {
             corners.push(position);
         }
     }
-    if input.reader.read(&mut [0]).map_err(|e| unreadable(&e))? > 0 {
-        return Err(Error::input(format!("is binary STL that declares {count} triangles but goes on after them")));
-    }
+    input.tell_rest(&format!("the {count} triangles that it declares"))?;
     Ok(corners)
+}
+
+/// The number of triangles: that which is declared, or what the length holds where a program never filled it in.
+fn counted(declared: u32, input: &mut Input) -> Result<u32> {
+    let Some(length) = input.length.filter(|&length| length < length_for(declared) || declared == 0) else {
+        return Ok(declared);
+    };
+    let held = length.saturating_sub(HEADER as u64);
+    if matches!(declared, 0 | u32::MAX) && held > 0 && held % RECORD as u64 == 0 {
+        let count = held / RECORD as u64;
+        input.notes.push(format!("declares {declared} triangles, but has the length of {count}, which are read"));
+        return Ok(u32::try_from(count).unwrap_or(u32::MAX));
+    }
+    if declared == 0 {
+        return Ok(0);
+    }
+    Err(Error::input(format!(
+        "is binary STL that declares {declared} triangles, which take {} bytes, but has {length}; the file is cut off, \
+         damaged or holds something else",
+        length_for(declared)
+    )))
 }
 
 fn cut_off(error: &std::io::Error, read: u32) -> Error {
@@ -132,11 +157,18 @@ mod tests {
     fn what_starts_an_stl_file() {
         assert!(is_stl(b"solid\n") && is_stl(b"\n SOLID a b\r\nfacet") && is_stl(&binary(0, &[])));
         assert!(is_stl(&binary(1_000_000_000, &[0.0, 0.0, 1.0, 5.0])));
+        assert!(is_stl(b"solid a\0\x01\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"));
         assert!(
             !is_stl(&binary(7, &[0.0; 40]))
                 && !is_stl(&binary(7, &[1e-39; 40]))
                 && !is_stl(&binary(7, &[f32::NAN; 40]))
         );
+        // Normals that could not be computed, and corners where noise stands for zero.
+        let noisy = [&[f32::NAN; 3][..], &[-6e-33, 1.0, 0.0], &[1e-41; 6]].concat();
+        assert!(is_stl(&binary(7, &noisy)));
+        let large = [binary(2000, &vec![0.0; 25_000]), vec![7; 16]].concat();
+        assert!(has_binary_length(&large, Some(84 + 50 * 2000)) && !has_binary_length(&large, None));
+        assert!(!has_binary_length(&large, Some(84 + 50 * 2000 + 1)) && !has_binary_length(b"solid", Some(5)));
         assert!(!is_stl(b"solidus\n") && !is_stl(b"facet\n") && !is_stl(b"\0\0\0") && !is_stl(b""));
         let tiff = [&b"II*\0"[..], &binary(0, &[])].concat();
         assert!(!is_stl(&tiff));

@@ -1,17 +1,19 @@
-//! The text form of STL: solids of facets, each a loop of three lines `vertex x y z`. Coordinates are f64.
+//! The text form of STL: solids of facets, each a loop of three lines `vertex x y z`. Coordinates are f64. A last solid
+//! that nothing ends is read, with a note, when its last facet is whole.
 
 use std::io::BufRead;
 
 use super::position;
 use crate::error::{Error, Result};
+use crate::io::input::Input;
 use crate::io::text::{Lines, quoted};
 
 /// The lines of a facet after its first, without their numbers.
 const FACET: [&str; 6] = ["outer", "vertex", "vertex", "vertex", "endloop", "endfacet"];
 
 /// Reads the corners of all facets of all solids, three a facet.
-pub(super) fn read(reader: &mut impl BufRead) -> Result<Vec<[f64; 3]>> {
-    let mut lines = Lines::after(0, reader);
+pub(super) fn read(input: &mut Input) -> Result<Vec<[f64; 3]>> {
+    let mut lines = Lines::after(0, &mut input.reader);
     let mut corners = Vec::new();
     let mut is_open = false;
     while let Some(line) = next_words(&mut lines)? {
@@ -22,8 +24,11 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Vec<[f64; 3]>> {
             _ => return Err(unlike(if is_open { "facet or endsolid" } else { "solid" }, &line, lines.number)),
         }
     }
-    if is_open {
-        return Err(Error::input(format!("ends after line {} without endsolid; the file is cut off", lines.number)));
+    let last = lines.number;
+    if is_open && !corners.is_empty() {
+        input.notes.push(format!("ends after line {last} without endsolid; it may be cut off"));
+    } else if is_open {
+        return Err(Error::input(format!("ends after line {last} without endsolid; the file is cut off")));
     }
     Ok(corners)
 }

@@ -25,6 +25,8 @@ pub(super) enum Scalar {
     U16,
     I32,
     U32,
+    I64,
+    U64,
     F32,
     F64,
 }
@@ -38,6 +40,8 @@ impl Scalar {
             "ushort" | "uint16" => Self::U16,
             "int" | "int32" => Self::I32,
             "uint" | "uint32" => Self::U32,
+            "int64" => Self::I64,
+            "uint64" => Self::U64,
             "float" | "float32" => Self::F32,
             "double" | "float64" => Self::F64,
             _ => return None,
@@ -50,7 +54,7 @@ impl Scalar {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
+            Self::I64 | Self::U64 | Self::F64 => 8,
         }
     }
 
@@ -69,6 +73,8 @@ impl Scalar {
             Self::U16 => f64::from(u16::from_le_bytes([a, b])),
             Self::I32 => f64::from(i32::from_le_bytes([a, b, c, d])),
             Self::U32 => f64::from(u32::from_le_bytes([a, b, c, d])),
+            Self::I64 => i64::from_le_bytes(word) as f64,
+            Self::U64 => u64::from_le_bytes(word) as f64,
             Self::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
             Self::F64 => f64::from_le_bytes(word),
         }
@@ -151,6 +157,7 @@ impl Header {
         match element.name.as_str() {
             "vertex" => format!("{} vertices", element.count),
             "face" => format!("{} faces", element.count),
+            "tristrips" => format!("{} lists of strips", element.count),
             name => format!("{} elements {}", element.count, quoted(name)),
         }
     }

@@ -1,7 +1,8 @@
 //! PLY (Turk 1994), text or binary in either byte order: vertices, and the faces where there are any.
 //!
-//! Elements other than `vertex` and `face`, and their other properties, are passed over. Faces have a list
-//! `vertex_indices` or `vertex_index`; polygons become fans of triangles.
+//! Elements other than `vertex`, `face` and `tristrips`, and their other properties, are passed over. Faces have a list
+//! `vertex_indices` or `vertex_index`; polygons are cut into triangles. Strips, as the scans of the Stanford repository have
+//! them, are lists of vertices of which every three in a row are a triangle; -1 ends one.
 
 mod body;
 mod faces;
@@ -9,16 +10,18 @@ mod header;
 mod vertices;
 
 use super::input::Input;
+use super::mesh::Faces;
 use super::points::refuse_empty;
 use super::sources::Source;
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
 use body::Body;
-use header::Header;
+use header::{Element, Header};
 
 /// True for what starts like a PLY file.
 pub(super) fn is_ply(head: &[u8]) -> bool {
-    head.starts_with(b"ply\n") || head.starts_with(b"ply\r")
+    let line = head.split(|&byte| byte == b'\n' || byte == b'\r').next().unwrap_or_default();
+    line.starts_with(b"ply") && line[3..].trim_ascii().is_empty() && head.len() > line.len()
 }
 
 /// Reads the vertices alone, perhaps none.
@@ -36,22 +39,26 @@ pub(super) fn read_vertices(input: &mut Input) -> Result<PointCloud> {
 pub(super) fn read(input: &mut Input) -> Result<Source> {
     let header = Header::read(&mut input.reader)?;
     let vertex = vertex_of(&header)?;
-    let face = header.elements.iter().position(|e| e.name == "face" && e.count > 0);
-    let last = face.map_or(vertex, |face| face.max(vertex));
+    let is_face = |e: &Element| ["face", "tristrips"].contains(&e.name.as_str()) && e.count > 0;
+    let last = header.elements.iter().rposition(is_face).map_or(vertex, |face| face.max(vertex));
     refuse_overlong(&header, last, input.length)?;
     let vertex_count = header.elements[vertex].count;
     let mut body = Body::after(&header, &mut input.reader);
-    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    let (mut vertices, mut found) = (Vec::new(), Faces::new(vertex_count));
     for (place, element) in header.elements[..=last].iter().enumerate() {
         if place == vertex {
             vertices = vertices::read(&mut body, element, input.length.is_some())?;
-        } else if Some(place) == face {
-            triangles = faces::read(&mut body, element, vertex_count)?;
+        } else if is_face(element) {
+            faces::read(&mut body, element, &mut found)?;
         } else {
             body.skip(element)?;
         }
     }
-    if face.is_some() {
+    if last + 1 == header.elements.len() {
+        input.tell_rest("the elements that it declares")?;
+    }
+    let triangles = found.finish(&vertices, &mut input.notes);
+    if !triangles.is_empty() {
         return Ok(Source::Mesh(TriangleMesh::new(vertices, triangles)?));
     }
     refuse_empty(PointCloud { positions: vertices, ..PointCloud::default() }).map(Source::Cloud)

@@ -6,6 +6,7 @@ use super::body::Body;
 use super::header::{Element, Encoding};
 use crate::error::{Error, Result};
 use crate::grid::refuse_too_many;
+use crate::io::mesh::number;
 use crate::io::text::{quoted, unreadable};
 
 /// Bytes of the pieces in which vertices are read.
@@ -68,20 +69,21 @@ fn read_text<R: BufRead>(
     Ok(())
 }
 
-/// The position in a line, when it has just the numbers that the vertex declares.
+/// The position in a line, when it has just as many words as the vertex declares numbers. Of the others only the lengths
+/// of lists need to be numbers: normals that could not be computed are written in many ways.
 fn position_in(line: &str, vertex: &Element, place: [usize; 3]) -> Option<[f64; 3]> {
     let mut words = line.split_whitespace();
     let mut position = [0.0; 3];
     for (i, property) in vertex.properties.iter().enumerate() {
-        let value: f64 = words.next()?.parse().ok()?;
+        let word = words.next()?;
         if property.list.is_some() {
-            let length = value as usize;
+            let length = number(word)? as usize;
             if length > 0 {
                 words.nth(length - 1)?;
             }
         }
         if let Some(axis) = place.iter().position(|&p| p == i) {
-            position[axis] = value;
+            position[axis] = number(word)?;
         }
     }
     words.next().is_none().then_some(position)
