@@ -39,7 +39,7 @@ pub(super) struct FieldJobArgs {
 }
 
 /// Where the grid lies.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Grid")]
 pub(super) struct GridArgs {
     /// Distance between voxel centres, one for all axes or three [default: 1/256 of the longest side]

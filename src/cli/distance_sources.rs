@@ -6,12 +6,14 @@ use super::console::Console;
 use super::distance_args::{DistanceJobArgs, GridArgs};
 use super::grid::check_spacing;
 use super::input::open_stack;
+use super::sources::read_told;
 use super::text::grouped;
 use crate::error::{Error, Result};
 use crate::exec::{Cancel, Progress};
 use crate::grid::{DataSets, Geometry, TriangleMesh, refuse_too_many};
 use crate::io::label_volume::{LabelVolume, is_label_volume, labels_of};
-use crate::io::sources::{Source, read_noted};
+use crate::io::sources::Source;
+use crate::kernel::solid::Solid;
 use crate::pipeline::label_borders::label_borders;
 
 /// What was read.
@@ -34,19 +36,13 @@ pub(super) fn read_sets(args: &DistanceJobArgs, console: &Console, cancel: &Canc
         } else if is_volume {
             return Err(without_inside("label volumes").at(path));
         } else {
-            let (source, notes) = read_noted(path)?;
-            for note in &notes {
-                console.note(note);
-            }
-            match source {
+            match read_told(path, &|text| console.note(text))? {
                 Source::Cloud(_) if args.choice.signed => return Err(without_inside("points").at(path)),
                 Source::Cloud(cloud) => read.sets.add_cloud(&cloud.positions),
-                Source::Mesh(mesh) => {
-                    if args.choice.signed {
-                        tell_of_holes(path, &mesh, console);
-                    }
-                    read.sets.add_mesh(&mesh);
+                Source::Mesh(mesh) if args.choice.signed => {
+                    read.sets.add_mesh(&turned_outside_out(path, mesh, console));
                 }
+                Source::Mesh(mesh) => read.sets.add_mesh(&mesh),
             }
         }
         refuse_too_many("sources", read.sets.len() as u64).map_err(|error| error.at(path))?;
@@ -97,10 +93,14 @@ fn add_labels(
     Ok(())
 }
 
-/// Says where a mesh has no inside and outside that all of it agrees on.
-fn tell_of_holes(path: &Path, mesh: &TriangleMesh, console: &Console) {
-    let edges = mesh.boundary_edges();
-    let name = path.display();
+/// The mesh as it is meant, for signs. Says what had to be done for that, and where it has no inside and outside that all
+/// of it agrees on.
+fn turned_outside_out(path: &Path, mesh: TriangleMesh, console: &Console) -> TriangleMesh {
+    let solid = Solid::new(mesh);
+    let (edges, name) = (solid.edges, path.display());
+    for sentence in solid.found.sentences() {
+        console.note(&format!("{name}: {sentence}"));
+    }
     if !edges.is_closed() {
         console.note(&format!(
             "{name} is open: {} boundary edges; inside is where it winds around more than half",
@@ -113,4 +113,5 @@ fn tell_of_holes(path: &Path, mesh: &TriangleMesh, console: &Console) {
             grouped(edges.flipped)
         ));
     }
+    solid.mesh
 }

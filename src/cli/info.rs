@@ -14,6 +14,7 @@ use crate::io::ome_zarr::is_store;
 use crate::io::points::{PointFile, Scale};
 use crate::io::sources::{Source, describe, is_standard_input};
 use crate::io::stacks::{self, Select};
+use crate::kernel::solid::Solid;
 use crate::pipeline::marks::split;
 
 /// Runs the command.
@@ -33,7 +34,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
             Source::Cloud(cloud) => {
                 points(&cloud, points_of.as_ref(), points_of.as_ref().map_or(&notes, |of| &of.notes))
             }
-            Source::Mesh(mesh) => triangles(&mesh),
+            Source::Mesh(mesh) => triangles(mesh, notes),
         }
     };
     let text = if args.json { format!("{document:#}\n") } else { table(&lines) };
@@ -127,10 +128,13 @@ fn points(cloud: &PointCloud, file: Option<&PointFile>, notes: &[String]) -> (Va
     (document, lines)
 }
 
-fn triangles(mesh: &TriangleMesh) -> (Value, Lines) {
+fn triangles(mesh: TriangleMesh, mut notes: Vec<String>) -> (Value, Lines) {
     let (low, high) = mesh.bounds().unwrap_or_default();
     let step = step_within(low, high);
-    let edges = mesh.boundary_edges();
+    let (vertices, count) = (mesh.vertices.len(), mesh.len());
+    let solid = Solid::new(mesh);
+    let edges = solid.edges;
+    notes.extend(solid.found.sentences());
     let mut closed = vec![edges.is_closed().to_string()];
     if !edges.is_closed() {
         closed.push(format!("{} boundary edges", grouped(edges.open)));
@@ -138,17 +142,19 @@ fn triangles(mesh: &TriangleMesh) -> (Value, Lines) {
     if !edges.is_oriented() {
         closed.push(format!("{} edges whose triangles disagree on what is outside", grouped(edges.flipped)));
     }
-    let lines = vec![
+    let mut lines = vec![
         line("kind", "triangle mesh"),
-        line("vertices", grouped(mesh.vertices.len() as u64)),
-        line("triangles", grouped(mesh.len() as u64)),
+        line("vertices", grouped(vertices as u64)),
+        line("triangles", grouped(count as u64)),
         line("closed", closed.join(", ")),
         line("lowest x, y, z", place(low, step)),
         line("highest x, y, z", place(high, step)),
     ];
+    lines.extend(notes.iter().map(|note| line("note", &**note)));
     let document = json!({
-        "kind": "mesh", "vertices": mesh.vertices.len(), "triangles": mesh.len(), "closed": edges.is_closed(),
-        "boundary_edges": edges.open, "flipped_edges": edges.flipped, "lowest_xyz": low, "highest_xyz": high,
+        "kind": "mesh", "vertices": vertices, "triangles": count, "closed": edges.is_closed(),
+        "boundary_edges": edges.open, "flipped_edges": solid.found.flipped_edges, "lowest_xyz": low,
+        "highest_xyz": high, "notes": notes,
     });
     (document, lines)
 }

@@ -51,11 +51,9 @@ fn image_lines(name: &str, image: &ZarrDescription) -> Lines {
         let spacing = level.spacing.map(|h| h.map_or("?".into(), number)).join(", ");
         let unit = level.unit.as_deref().unwrap_or("");
         let text = format!("{x} x {y} x {z} {}, spacing {spacing} {unit}", level.element);
-        let origin = if level.origin == [0.0; 3] {
-            String::new()
-        } else {
-            format!(", origin {}", place(level.origin, finest))
-        };
+        let finest = level.spacing.iter().flatten().copied().fold(1.0, f64::min);
+        let origin =
+            if level.origin == [0.0; 3] { String::new() } else { format!(", origin {}", place(level.origin, finest)) };
         let number = if level.path.is_empty() { name.to_owned() } else { format!("{name}, level {}", level.path) };
         lines.push(line(&number, format!("{}{origin}", text.trim_end())));
     }

@@ -1,5 +1,8 @@
 //! `strandline measure`: volume, area, closedness and pieces of a triangle mesh, and how far points lie from it.
+//!
+//! What is measured is the mesh as it is meant (`crate::kernel::solid`); notes tell where that is not the mesh as it came.
 
+use std::io::Write;
 use std::path::Path;
 
 use serde_json::json;
@@ -7,34 +10,36 @@ use serde_json::json;
 use super::args::MeasureArgs;
 use super::console::{Console, Voice};
 use super::print;
+use super::sources::read_told;
 use super::text::{grouped, number};
 use crate::error::{Error, Result};
 use crate::exec::Progress;
-use crate::grid::{BoundaryEdges, TriangleMesh};
-use crate::io::sources::{Source, read_noted, read_source};
+use crate::grid::TriangleMesh;
+use crate::io::sources::Source;
+use crate::kernel::solid::Solid;
 use crate::kernel::surface::{Hausdorff, Measures, PatchIndex, SurfaceMeasure};
 
 /// Runs the command.
 pub(super) fn run(args: &MeasureArgs) -> Result<()> {
-    let mesh = match read_source(&args.mesh)? {
+    let mesh = match read_told(&args.mesh, &note)? {
         Source::Mesh(mesh) => mesh,
         Source::Cloud(_) => return Err(Error::input("holds points and no triangle; give a mesh").at(&args.mesh)),
     };
     let points = args.points.as_deref().map(read_points).transpose()?;
-    let local = Local::new(&mesh).map_err(|error| error.at(&args.mesh))?;
-    let (measures, edges) = (local.measures(&mesh), mesh.boundary_edges());
-    let hausdorff = points.and_then(|points| local.distances(&mesh, &measures, &points));
-    print(&if args.json { as_json(&measures, edges, hausdorff) } else { as_lines(&measures, edges, hausdorff) });
+    let solid = Solid::new(mesh);
+    for sentence in solid.found.sentences() {
+        note(&format!("{}: {sentence}", args.mesh.display()));
+    }
+    let local = Local::new(&solid.mesh).map_err(|error| error.at(&args.mesh))?;
+    let measures = local.measures(&solid);
+    let hausdorff = points.and_then(|points| local.distances(&solid.mesh, &measures, &points));
+    print(&if args.json { as_json(&measures, &solid, hausdorff) } else { as_lines(&measures, &solid, hausdorff) });
     Ok(())
 }
 
 fn read_points(path: &Path) -> Result<Vec<[f64; 3]>> {
-    let (source, notes) = read_noted(path)?;
     let console = Console::new(Voice::of(false, false));
-    for note in &notes {
-        console.note(note);
-    }
-    Ok(match source {
+    Ok(match read_told(path, &|text| console.note(text))? {
         Source::Cloud(cloud) => cloud.positions,
         Source::Mesh(mesh) => mesh.vertices,
     })
@@ -57,12 +62,11 @@ impl Local {
             .ok_or_else(|| Error::input("reaches farther than single precision does; scale it down"))
     }
 
-    fn measures(&self, mesh: &TriangleMesh) -> Measures {
-        let names = mesh.welded();
+    fn measures(&self, solid: &Solid) -> Measures {
         let mut measure = SurfaceMeasure::new([0.0; 3]);
-        for triangle in &mesh.triangles {
-            measure
-                .add(triangle.map(|v| names[v as usize]), triangle.map(|v| self.vertices[v as usize].map(f64::from)));
+        for triangle in &solid.mesh.triangles {
+            let corners = triangle.map(|v| self.vertices[v as usize].map(f64::from));
+            measure.add(triangle.map(|v| solid.names[v as usize]), corners);
         }
         measure.measures()
     }
@@ -81,13 +85,18 @@ fn seen_from(middle: [f64; 3], point: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|a| point[a] - middle[a])
 }
 
-fn as_json(measures: &Measures, edges: BoundaryEdges, hausdorff: Option<Hausdorff>) -> String {
+fn as_json(measures: &Measures, solid: &Solid, hausdorff: Option<Hausdorff>) -> String {
+    let (edges, found) = (solid.edges, solid.found);
     let document = json!({
         "volume": measures.volume,
         "area": measures.area,
         "closed": edges.is_closed() && edges.is_oriented(),
         "boundary_edges": edges.open,
-        "flipped_edges": edges.flipped,
+        "flipped_edges": found.flipped_edges,
+        "turned_triangles": found.turned,
+        "doubled_triangles": found.doubled + found.two_sided,
+        "inverted_pieces": found.inverted,
+        "welded_within": found.welded_within,
         "components": measures.components,
         "triangles": measures.triangles,
         "vertices": measures.vertices,
@@ -96,7 +105,8 @@ fn as_json(measures: &Measures, edges: BoundaryEdges, hausdorff: Option<Hausdorf
     format!("{document:#}\n")
 }
 
-fn as_lines(measures: &Measures, edges: BoundaryEdges, hausdorff: Option<Hausdorff>) -> String {
+fn as_lines(measures: &Measures, solid: &Solid, hausdorff: Option<Hausdorff>) -> String {
+    let edges = solid.edges;
     let closed = match (edges.is_closed(), edges.is_oriented()) {
         (true, true) => "closed".into(),
         (true, false) => {
@@ -116,4 +126,9 @@ fn as_lines(measures: &Measures, edges: BoundaryEdges, hausdorff: Option<Hausdor
         lines.push(format!("points off  {} in the mean, {} at most", number(mean), number(max)));
     }
     lines.join("\n") + "\n"
+}
+
+fn note(text: &str) {
+    // Nobody is left to tell when stderr is closed.
+    let _ = writeln!(std::io::stderr(), "note: {text}");
 }

@@ -28,6 +28,7 @@ mod reconstruct_args;
 mod report;
 mod segment;
 mod signals;
+mod sources;
 mod table;
 mod text;
 mod values;

@@ -15,13 +15,14 @@ use super::grid::{check_counts, grid};
 use super::outputs::Outputs;
 use super::reconstruct_args::{CloudGridArgs, ReconstructArgs};
 use super::report::{Hausdorff, Hole, Moves, Ran, Report};
+use super::sources::read_told;
 use super::text::{bytes, duration, grouped, number, place, triple};
 use super::{print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
 use crate::io::ome_zarr::StoreWriter;
-use crate::io::sources::{Source, read_noted};
+use crate::io::sources::Source;
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, mean_spacing, reconstruct,
     without_isolated,
@@ -84,7 +85,7 @@ fn laid_grid(
         return Ok(None);
     }
     let spacing = Some(around.spacing);
-    let asked = GridArgs { spacing, padding, origin, shape, like: None, image_spacing: None };
+    let asked = GridArgs { spacing, padding, origin, shape, ..GridArgs::default() };
     let high = |a: usize| cloud.iter().map(|p| p[a]).fold(f64::NEG_INFINITY, f64::max);
     let laid = grid(&asked, (around.origin, [high(0), high(1), high(2)]), &mut Vec::new())?;
     let outside =
@@ -116,11 +117,7 @@ impl Job {
         args.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = config::resources(&args.resources, args.output.output.path())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
-        let (source, notes) = read_noted(&args.cloud)?;
-        for note in &notes {
-            console.note(note);
-        }
-        let cloud = match source {
+        let cloud = match read_told(&args.cloud, &|text| console.note(text))? {
             Source::Cloud(cloud) => cloud.positions,
             Source::Mesh(mesh) => {
                 console.note(&format!("{} is a mesh; its vertices are taken as points", args.cloud.display()));

@@ -1,5 +1,6 @@
 //! Sources of a distance: the triangles of a mesh in the world (docs/algorithms.md, "Triangles").
 
+use super::Weld;
 use crate::error::{Error, Result};
 
 /// The most sources that a distance field can tell apart: indices have 31 bits, of which the highest 257 mean none, or
@@ -94,10 +95,18 @@ impl TriangleMesh {
         }))
     }
 
-    /// Edges that are open or run the wrong way, after vertices of identical coordinates are taken for one.
+    /// Edges that are open or run the wrong way, after vertices of one place are taken for one.
     #[must_use]
     pub fn boundary_edges(&self) -> BoundaryEdges {
-        let names = self.welded();
+        self.edges_between(&self.weld().names)
+    }
+
+    /// The same, of vertices that have these names.
+    ///
+    /// # Panics
+    /// When there are fewer names than vertices.
+    #[must_use]
+    pub fn edges_between(&self, names: &[u32]) -> BoundaryEdges {
         let mut edges = Vec::with_capacity(3 * self.triangles.len());
         for triangle in &self.triangles {
             let [a, b, c] = triangle.map(|v| names[v as usize]);
@@ -118,20 +127,10 @@ impl TriangleMesh {
         found
     }
 
-    /// For each vertex the lowest number of a vertex at the same place.
+    /// Which vertices are one place, up to rounding.
     #[must_use]
-    pub fn welded(&self) -> Vec<u32> {
-        // Adding 0 makes one of the two zeros, which are equal but have different bits.
-        let key = |v: u32| self.vertices[v as usize].map(|x| (x + 0.0).to_bits());
-        let mut order: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        order.sort_unstable_by_key(|&v| (key(v), v));
-        let mut names = vec![0; order.len()];
-        for same in order.chunk_by(|&a, &b| key(a) == key(b)) {
-            for &v in same {
-                names[v as usize] = same[0];
-            }
-        }
-        names
+    pub fn weld(&self) -> Weld {
+        Weld::new(self)
     }
 }
 

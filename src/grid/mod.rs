@@ -13,6 +13,7 @@ mod sources;
 mod stencil;
 mod triangle_bins;
 mod voxel_triangle;
+mod weld;
 
 pub use box3::Box3;
 pub use brick_grid::{BrickGrid, BrickId};
@@ -24,3 +25,4 @@ pub use sources::{DataSets, PointCloud};
 pub use stencil::{FACES, Face, NEIGHBOURS_26};
 pub use triangle_bins::{TriangleBins, cells_beside};
 pub use voxel_triangle::VoxelTriangle;
+pub use weld::Weld;

@@ -36,6 +36,7 @@ pub mod forest;
 pub mod image;
 pub mod level_set;
 pub mod outline;
+pub mod solid;
 pub mod surface;
 pub mod triangle;
 pub(crate) mod vector;

@@ -18,6 +18,8 @@ mod gaussian;
 mod heat;
 mod level_set;
 mod maximum_principle;
+mod mesh_dialects;
+mod mesh_faults;
 mod mesh_ply;
 mod mesh_sources;
 mod middle;

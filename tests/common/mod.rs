@@ -9,6 +9,7 @@ pub(crate) mod meshes;
 pub(crate) mod npy;
 pub(crate) mod plain_reconstruction;
 pub(crate) mod plain_scheme;
+pub(crate) mod polyhedra;
 pub(crate) mod random;
 pub(crate) mod solve;
 pub(crate) mod stores;
