@@ -6,14 +6,15 @@
 //! would come out open. Corners may repeat: a hole is a part of the rim that a bridge, run through twice, leads to. A
 //! polygon that is not flat is cut as its shadow on the plane is. One that a fan from its first corner covers stays a fan.
 
+use std::collections::VecDeque;
+
+use super::corner_cells::Cells;
+
 /// A corner is straight within this, in squares of the polygon's size: the rounding of the products.
 const STRAIGHT: f64 = 1e-12;
 
-/// Polygons of fewer corners are searched whole.
-const FEW: usize = 32;
-
 /// At most so many looks at points for each corner: polygons that cross themselves everywhere must come to an end.
-const LOOKS: u64 = 4000;
+const LOOKS: u64 = 10_000;
 
 /// How a polygon was cut.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,48 +29,83 @@ pub(super) enum Cut {
 
 /// Cuts the polygon with these corners, four at least.
 pub(super) fn cut(corners: &[[f64; 3]]) -> Cut {
-    let Some(points) = seen_flat(corners) else { return Cut::Fan };
-    if is_star(&points) {
-        return Cut::Fan;
-    }
+    let points = match seen_flat(corners) {
+        Seen::Line => return Cut::Fan,
+        Seen::Cancelled => return Cut::Crossed((2..corners.len() as u32).map(|n| [0, n - 1, n]).collect()),
+        Seen::Plane(points) if is_star(&points) => return Cut::Fan,
+        Seen::Plane(points) => points,
+    };
+    let turns_once = turns_once(&points);
     let mut ring = Ring::new(points);
+    ring.crossed = !turns_once;
     let triangles = ring.clip();
     if ring.crossed { Cut::Crossed(triangles) } else { Cut::Ears(triangles) }
 }
 
-/// The corners in the plane of two axes from which the area is seen largest, counterclockwise, scaled by a power of two
-/// to the size of 1; none where all lie on a line or cancel each other's area.
-fn seen_flat(corners: &[[f64; 3]]) -> Option<Vec<[f64; 2]>> {
-    let from = *corners.first()?;
+/// A polygon as seen from where its area is largest.
+enum Seen {
+    /// All corners lie on a line.
+    Line,
+    /// Parts of it are wound around one way and parts the other way, so that no area is left.
+    Cancelled,
+    /// The corners in the plane of two axes, counterclockwise, scaled by a power of two to the size of 1.
+    Plane(Vec<[f64; 2]>),
+}
+
+fn seen_flat(corners: &[[f64; 3]]) -> Seen {
+    let from = corners[0];
     let local: Vec<[f64; 3]> = corners.iter().map(|p| std::array::from_fn(|a| p[a] / 4.0 - from[a] / 4.0)).collect();
     let size = local.iter().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
     if size == 0.0 {
-        return None;
+        return Seen::Line;
     }
     let (_, exponent) = libm::frexp(size);
     let scaled: Vec<[f64; 3]> = local.iter().map(|p| p.map(|x| libm::ldexp(x, -exponent))).collect();
-    let mut area = [0.0_f64; 3];
+    let (mut area, mut plain) = ([0.0_f64; 3], 0.0);
     for (n, p) in scaled.iter().enumerate() {
         let q = scaled[(n + 1) % scaled.len()];
         for (a, sum) in area.iter_mut().enumerate() {
             let (i, j) = ((a + 1) % 3, (a + 2) % 3);
-            *sum += p[i] * q[j] - p[j] * q[i];
+            let part = p[i] * q[j] - p[j] * q[i];
+            *sum += part;
+            plain += part.abs();
         }
     }
     let axis = (1..3).fold(0, |most, a| if area[a].abs() > area[most].abs() { a } else { most });
     if area[axis].abs() <= STRAIGHT {
-        return None;
+        return if plain > 1e-9 { Seen::Cancelled } else { Seen::Line };
     }
     let (mut i, mut j) = ((axis + 1) % 3, (axis + 2) % 3);
     if area[axis] < 0.0 {
         (i, j) = (j, i);
     }
-    Some(scaled.iter().map(|p| [p[i], p[j]]).collect())
+    Seen::Plane(scaled.iter().map(|p| [p[i], p[j]]).collect())
 }
 
 /// Twice the area of a triangle, positive where its corners turn counterclockwise.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// False for a polygon that turns more or less than once in all, as no simple one does; a spike, which may turn either
+/// way, tells nothing.
+fn turns_once(points: &[[f64; 2]]) -> bool {
+    let mut distinct = points.to_vec();
+    distinct.dedup();
+    if distinct.len() > 1 && distinct[0] == distinct[distinct.len() - 1] {
+        distinct.pop();
+    }
+    let (mut sum, n) = (0.0, distinct.len());
+    for at in 0..n {
+        let [p, q, r] = [distinct[(at + n - 1) % n], distinct[at], distinct[(at + 1) % n]];
+        let [u, v]: [[f64; 2]; 2] = [std::array::from_fn(|a| q[a] - p[a]), std::array::from_fn(|a| r[a] - q[a])];
+        let angle = libm::atan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1]);
+        if angle.abs() > std::f64::consts::PI - 1e-6 {
+            return true;
+        }
+        sum += angle;
+    }
+    (sum - std::f64::consts::TAU).abs() < 1.0
 }
 
 /// True when all of the polygon is seen from its first corner.
@@ -91,6 +127,18 @@ enum Asked {
     /// Any convex corner.
     Convex,
     Any,
+}
+
+impl Asked {
+    /// What is asked for next.
+    fn less(self) -> Self {
+        match self {
+            Self::Clear => Self::Free,
+            Self::Free => Self::Flat,
+            Self::Flat => Self::Convex,
+            Self::Convex | Self::Any => Self::Any,
+        }
+    }
 }
 
 /// What is left of a polygon.
@@ -118,41 +166,54 @@ impl Ring {
         }
     }
 
+    /// Corners wait in a line to be asked; one that is no ear is asked again once a neighbour is gone, or all have been.
     fn clip(&mut self) -> Vec<[u32; 3]> {
         let count = self.points.len();
         let most = LOOKS * count as u64;
         let mut triangles = Vec::with_capacity(count - 2);
-        let (mut at, mut since, mut asked) = (0_u32, 0, Asked::Clear);
+        let mut line: VecDeque<u32> = (0..count as u32).collect();
+        let mut waits = vec![true; count];
+        let (mut asked, mut has_clipped, mut passed_over) = (Asked::Clear, false, None);
         while triangles.len() + 3 < count {
-            let [a, b, c] = self.around(at);
-            if self.is_ear([a, b, c], asked) {
-                self.crossed |= asked >= Asked::Convex;
-                triangles.push([a, b, c]);
-                self.gone[b as usize] = true;
-                self.after[a as usize] = c;
-                self.before[c as usize] = a;
-                // Leaving out the next corner makes fewer slivers than a fan would have.
-                at = self.after[c as usize];
-                since = 0;
-                asked = if self.looks > most { Asked::Any } else { Asked::Clear };
+            let Some(at) = line.pop_front() else {
+                asked = if has_clipped { Asked::Clear } else { asked.less() };
+                has_clipped = false;
+                line.extend((0..count as u32).filter(|&corner| !self.gone[corner as usize]));
+                for &corner in &line {
+                    waits[corner as usize] = true;
+                }
+                continue;
+            };
+            // Leaving out the next corner makes fewer slivers than a fan would have.
+            if passed_over.take() == Some(at) && !line.is_empty() {
+                line.push_back(at);
                 continue;
             }
-            at = self.after[at as usize];
-            since += 1;
-            if since + triangles.len() > count {
-                since = 0;
-                asked = match asked {
-                    Asked::Clear => Asked::Free,
-                    Asked::Free => Asked::Flat,
-                    Asked::Flat => Asked::Convex,
-                    Asked::Convex | Asked::Any => Asked::Any,
-                };
-            }
+            waits[at as usize] = false;
             if self.looks > most {
                 asked = Asked::Any;
             }
+            let [a, b, c] = self.around(at);
+            if self.gone[at as usize] || !self.is_ear([a, b, c], asked) {
+                continue;
+            }
+            self.crossed |= asked >= Asked::Convex;
+            triangles.push([a, b, c]);
+            self.gone[b as usize] = true;
+            self.after[a as usize] = c;
+            self.before[c as usize] = a;
+            (asked, has_clipped, passed_over) = (Asked::Clear, true, Some(c));
+            for corner in [c, a] {
+                if !std::mem::replace(&mut waits[corner as usize], true) {
+                    line.push_back(corner);
+                }
+            }
         }
-        triangles.push(self.around(at));
+        let last = (0..count as u32).find(|&corner| !self.gone[corner as usize]).unwrap_or(0);
+        let rest = self.around(last);
+        let [p, q, r] = rest.map(|corner| self.place(corner));
+        self.crossed |= turn(p, q, r) < -STRAIGHT;
+        triangles.push(rest);
         triangles
     }
 
@@ -189,7 +250,7 @@ impl Ring {
         let [lo, hi] =
             [f64::min, f64::max].map(|pick| -> [f64; 2] { std::array::from_fn(|a| pick(pick(p[a], q[a]), r[a])) });
         let mut looks = 0;
-        let found = self.cells.beside(lo, hi).any(|cell| {
+        let found = self.cells.beside(lo.map(|x| x - STRAIGHT), hi.map(|x| x + STRAIGHT)).any(|cell| {
             looks += 1;
             cell.iter().any(|&other| {
                 looks += 1;
@@ -205,56 +266,6 @@ impl Ring {
         });
         self.looks += looks;
         found
-    }
-}
-
-/// Corners by squares of the plane.
-struct Cells {
-    lo: [f64; 2],
-    /// Squares along each axis for each unit of length.
-    scale: [f64; 2],
-    side: usize,
-    starts: Vec<u32>,
-    order: Vec<u32>,
-}
-
-impl Cells {
-    fn new(points: &[[f64; 2]]) -> Self {
-        let side = if points.len() < FEW { 1 } else { ((points.len() as f64).sqrt() as usize).min(1024) };
-        let bound = |pick: fn(f64, f64) -> f64, start: f64| -> [f64; 2] {
-            std::array::from_fn(|a| points.iter().fold(start, |best, p| pick(best, p[a])))
-        };
-        let (lo, hi) = (bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY));
-        let scale = std::array::from_fn(|a| if hi[a] > lo[a] { side as f64 / (hi[a] - lo[a]) } else { 0.0 });
-        let mut cells = Self { lo, scale, side, starts: vec![0; side * side + 1], order: vec![0; points.len()] };
-        let square = |cells: &Self, p: [f64; 2]| cells.along(1, p[1]) * side + cells.along(0, p[0]);
-        for &p in points {
-            let at = square(&cells, p);
-            cells.starts[at + 1] += 1;
-        }
-        for n in 1..cells.starts.len() {
-            cells.starts[n] += cells.starts[n - 1];
-        }
-        let mut next = cells.starts.clone();
-        for (n, &p) in points.iter().enumerate() {
-            let at = square(&cells, p);
-            cells.order[next[at] as usize] = n as u32;
-            next[at] += 1;
-        }
-        cells
-    }
-
-    fn along(&self, axis: usize, x: f64) -> usize {
-        (((x - self.lo[axis]) * self.scale[axis]).max(0.0) as usize).min(self.side - 1)
-    }
-
-    /// The corners of the squares that a box touches, square by square.
-    fn beside(&self, lo: [f64; 2], hi: [f64; 2]) -> impl Iterator<Item = &[u32]> {
-        let range = |a: usize| self.along(a, lo[a] - STRAIGHT)..=self.along(a, hi[a] + STRAIGHT);
-        let columns = range(0);
-        range(1)
-            .flat_map(move |y| columns.clone().map(move |x| y * self.side + x))
-            .map(|at| &self.order[self.starts[at] as usize..self.starts[at + 1] as usize])
     }
 }
 
@@ -355,6 +366,12 @@ mod tests {
 
     #[test]
     fn polygons_that_cross_themselves_are_told_and_end() {
+        let bow = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0]];
+        let lopsided = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]];
+        let pentagram = [[0.0, 3.0], [2.0, -2.0], [-3.0, 1.0], [3.0, 1.0], [-2.0, -2.0]];
+        for points in [&bow[..], &lopsided, &pentagram] {
+            assert!(matches!(cut(&lifted(points)), Cut::Crossed(found) if found.len() == points.len() - 2));
+        }
         let mut far = 1_u64;
         let mut random = || {
             far = far.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

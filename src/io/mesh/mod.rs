@@ -3,6 +3,7 @@
 //! These readers are our own. The libraries for OBJ and STL read lines of any length into memory, tell no line in
 //! their messages, and let through coordinates that are not finite or a count that the file's length belies.
 
+mod corner_cells;
 mod ears;
 mod numbers;
 pub(super) mod obj;
