@@ -25,6 +25,7 @@ mod mesh_sources;
 mod middle;
 mod middle_labels;
 mod neighbours;
+mod point_forms;
 mod points;
 mod ranks;
 mod reconstruct;
