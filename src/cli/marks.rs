@@ -41,7 +41,8 @@ pub(super) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Con
         let file = read_points(path)?;
         let note = |note: &str| console.note(&format!("{}: {note}", path.display()));
         file.notes.iter().for_each(|told| note(told));
-        let is_sure = reading.points_in.is_some() || file.scales != [Scale::Physical; 3] || file.units != [None; 3];
+        let is_told = |axis: usize| file.scales[axis] != Scale::Physical || file.units[axis].is_some();
+        let is_sure = reading.points_in.is_some() || (0..3).all(is_told);
         let cloud = placed(file, reading, note).map_err(|error| error.at(path))?;
         if !marks.cloud.is_empty() && marks.cloud.contours.is_empty() != cloud.contours.is_empty() {
             let (this, other) =

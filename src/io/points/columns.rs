@@ -257,7 +257,7 @@ fn number(field: &str) -> Option<(f64, Option<Decimals>)> {
     if let Ok(value) = field.parse() {
         return Some((value, field.contains('.').then_some(Decimals::Point)));
     }
-    let is_decimal = field.matches(',').count() == 1 && !field.contains('.');
+    let is_decimal = field.matches(',').count() == 1 && !field.contains('.') && !field.ends_with(',');
     let value = is_decimal.then(|| field.replace(',', ".").parse().ok()).flatten()?;
     Some((value, Some(Decimals::Comma)))
 }
@@ -315,6 +315,6 @@ mod tests {
         assert_eq!(number("-1,5e2"), Some((-150.0, Some(Decimals::Comma))));
         assert_eq!(number("1.5"), Some((1.5, Some(Decimals::Point))));
         assert_eq!(number("7"), Some((7.0, None)));
-        assert!(["1.234,5", "1,234,567", ",", "a,b"].into_iter().all(|text| number(text).is_none()));
+        assert!(["1.234,5", "1,234,567", ",", "1,", "a,b"].into_iter().all(|text| number(text).is_none()));
     }
 }

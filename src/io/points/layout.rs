@@ -86,9 +86,7 @@ impl Layout {
                 continue;
             }
             let separator = told.map_or_else(|| Separator::of(text), Separator::Char);
-            if starts_with_number(text)
-                || separator.split(text).into_iter().take(3).filter(|f| is_number(f)).count() == 3
-            {
+            if holds_numbers(text, separator, last_comment) {
                 if let Some((_, complaint)) = complaint {
                     return Err(complaint);
                 }
@@ -117,7 +115,7 @@ impl Layout {
         if let (true, Ok(count)) = (alone(text), text.parse::<u64>()) {
             let next =
                 after.iter().map(|line| uncommented(line).trim()).find(|text| !text.is_empty()).unwrap_or_default();
-            if !alone(next) || Separator::of(next) != Separator::Blanks {
+            if !next.is_empty() && (!alone(next) || Separator::of(next) != Separator::Blanks) {
                 let separator = Separator::of(next);
                 let rows: Vec<Vec<&str>> = after.iter().take(3).map(|line| separator.split(line)).collect();
                 let numbered = |(n, row): (usize, &Vec<&str>)| row.len() == 5 && row[0].parse() == Ok(n);
@@ -126,11 +124,8 @@ impl Layout {
                 return Self::Xyz { separator, columns, first_line: number + 1, counted: Some(count) };
             }
         }
-        let names = comment.trim_start_matches(['#', '/', ' ']);
-        let names =
-            names.strip_prefix("columns").map_or(names, |rest| rest.trim_start().trim_start_matches(['=', ':']));
-        let columns = [Separator::of(names), separator].into_iter().find_map(|s| Columns::named(&s.split(names)).ok());
-        Self::Xyz { separator, columns: columns.unwrap_or(Columns::FIRST_THREE), first_line: number, counted: None }
+        let columns = commented(comment, separator).unwrap_or(Columns::FIRST_THREE);
+        Self::Xyz { separator, columns, first_line: number, counted: None }
     }
 
     fn header(line: &str, text: &str, separator: Separator, number: u64) -> Result<Self> {
@@ -151,6 +146,23 @@ impl Layout {
         let columns = named(&names.iter().map(AsRef::as_ref).collect::<Vec<_>>(), number)?;
         Ok(Self::Csv { separator, columns, header_line: number })
     }
+}
+
+/// The columns that a comment names, also as 3D Slicer does: `# columns = id,x,y,z`.
+fn commented(comment: &str, separator: Separator) -> Option<Columns> {
+    let names = comment.trim_start_matches(['#', '/', ' ']);
+    let names = names.strip_prefix("columns").map_or(names, |rest| rest.trim_start().trim_start_matches(['=', ':']));
+    [Separator::of(names), separator].into_iter().find_map(|s| Columns::named(&s.split(names)).ok())
+}
+
+/// True for a line of numbers: in its first fields, or where a comment before it names the coordinates.
+fn holds_numbers(text: &str, separator: Separator, comment: &str) -> bool {
+    let fields = separator.split(text);
+    let are_numbers =
+        |columns: [usize; 3]| columns.into_iter().all(|n| fields.get(n).is_some_and(|field| is_number(field)));
+    starts_with_number(text)
+        || are_numbers([0, 1, 2])
+        || commented(comment, separator).is_some_and(|columns| are_numbers(columns.position))
 }
 
 fn named(names: &[&str], line: u64) -> Result<Columns> {

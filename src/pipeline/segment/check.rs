@@ -81,6 +81,7 @@ fn check_on(marks: &ObjectMarks, image: &Geometry, guessed: [bool; 3]) -> Result
     let mut notes = Vec::new();
     if outside > 0 {
         let verb = if outside == 1 { "mark lies" } else { "marks lie" };
+        let hint = hint.filter(|_| outside as f64 > (1.0 - FITTING) * points.len() as f64);
         let hint = hint.map_or(String::new(), |hint| format!(": {hint}"));
         notes.push(format!("{outside} {verb} outside of the image (object {object}, {} in all){hint}", points.len()));
     }
@@ -231,7 +232,9 @@ fn other_reading(points: &[[f64; 3]], outside: usize, image: &Geometry) -> Optio
     }
     if fits(&|p| [p[0] * h[0], p[1] * h[1], p[2]]) && h[..2] != [1.0; 2] {
         return Some(
-            "their x and y look like pixels: multiply them by the spacing, or name them x [px], y [px]".into(),
+            "their x and y look like pixels: multiply them by the spacing, name them x [px], y [px], or give --points-in \
+             voxels where z counts slices too"
+                .into(),
         );
     }
     if fits(&|p| p.map(|v| v / 1000.0)) {

@@ -9,20 +9,22 @@ const TELLING: usize = 8;
 /// An object so few voxels wide was hardly marked on this image by lengths.
 const HARDLY_MARKED: f64 = 4.0;
 /// Two objects whose boxes share so much of what both fill are likely one.
-const SAME: f64 = 0.6;
+const SAME: f64 = 0.5;
 
 /// What speaks against reading an object's marks as lengths, where the image has other spacings than 1.
 #[must_use]
 pub fn doubts(marks: &ObjectMarks, image: &Geometry) -> Vec<String> {
     let points = marks.contours.concat();
     let object = marks.object;
-    if points.is_empty() || !points.iter().all(|&p| fits_as_voxels(p, image)) {
+    if points.is_empty() {
         return Vec::new();
     }
-    let odd = [0, 1, 2].map(|axis| is_odd(&points, axis, image));
+    let fits =
+        [0, 1, 2].map(|axis| points.iter().all(|p| p[axis] >= -0.5 && p[axis] <= image.shape[axis] as f64 + 0.5));
+    let odd = [0, 1, 2].map(|axis| fits[axis] && is_odd(&points, axis, image));
     let whole = [0, 1, 2].map(|axis| is_whole(&points, axis));
     let spacing = triple(image.spacing);
-    if whole == [true; 3] && odd.contains(&true) && !contours_are_slices(marks, image) {
+    if fits == [true; 3] && whole == [true; 3] && odd.contains(&true) && !contours_are_slices(marks, image) {
         return vec![format!(
             "all marks of object {object} are whole numbers; if they are voxel indices, multiply them by the spacing \
              {spacing}, or give --points-in voxels"
@@ -46,7 +48,8 @@ pub fn doubts(marks: &ObjectMarks, image: &Geometry) -> Vec<String> {
         let (low, high) = limits(&points, axis);
         (high - low) / image.spacing[axis]
     };
-    if points.len() >= TELLING && wide(0) < HARDLY_MARKED && wide(1) < HARDLY_MARKED && image.spacing[..2] != [1.0; 2] {
+    let narrow = fits[0] && fits[1] && wide(0) < HARDLY_MARKED && wide(1) < HARDLY_MARKED;
+    if points.len() >= TELLING && narrow && image.spacing[..2] != [1.0; 2] {
         return vec![format!(
             "the marks of object {object} span {:.1} x {:.1} x {:.1} voxels; if they are voxel indices, give --points-in \
              voxels",
@@ -56,10 +59,6 @@ pub fn doubts(marks: &ObjectMarks, image: &Geometry) -> Vec<String> {
         )];
     }
     Vec::new()
-}
-
-fn fits_as_voxels(point: [f64; 3], image: &Geometry) -> bool {
-    (0..3).all(|a| point[a] >= -0.5 && point[a] <= image.shape[a] as f64 + 0.5)
 }
 
 fn is_whole(points: &[[f64; 3]], axis: usize) -> bool {
