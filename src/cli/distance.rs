@@ -76,7 +76,7 @@ impl Job {
         outputs.check()?;
         let resources = config::resources(&args.job.resources, args.job.output.output.path())?;
         let console = Arc::new(Console::new(Voice::of(args.job.output.quiet, args.job.output.verbose)));
-        let Read { sets, volume } = read_sets(&args, &console, &cancel)?;
+        let Read { sets, volume } = read_sets(&args, resources.memory, &console, &cancel)?;
         let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
         let mut notes = Vec::new();
         let geometry = match volume {

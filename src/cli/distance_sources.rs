@@ -7,7 +7,7 @@ use super::distance_args::{DistanceJobArgs, GridArgs};
 use super::grid::check_spacing;
 use super::input::open_stack;
 use super::sources::read_told;
-use super::text::grouped;
+use super::text::{bytes, grouped};
 use crate::error::{Error, Result};
 use crate::exec::{Cancel, Progress};
 use crate::grid::{DataSets, Geometry, TriangleMesh, refuse_too_many};
@@ -24,13 +24,18 @@ pub(super) struct Read {
 }
 
 /// Reads all sources; a cloud or mesh is one data set with the next label, a label volume as many as it has labels.
-pub(super) fn read_sets(args: &DistanceJobArgs, console: &Console, cancel: &Cancel) -> Result<Read> {
+pub(super) fn read_sets(args: &DistanceJobArgs, memory: u64, console: &Console, cancel: &Cancel) -> Result<Read> {
     check_spacing("--image-spacing", args.job.grid.image_spacing)?;
     let mut read = Read { sets: DataSets::default(), volume: None };
     for path in &args.sources {
         let is_volume = is_label_volume(path);
         if is_volume && !args.choice.signed {
             let volume = open_volume(path, &args.job.grid, console)?;
+            if volume.reading_bytes() > memory {
+                let needed = bytes(volume.reading_bytes());
+                let error = format!("needs {needed} to be read, for its chunks or planes; give more with --memory");
+                return Err(Error::failed(error).at(path));
+            }
             add_labels(&mut read.sets, path, &volume, console, cancel)?;
             read.volume.get_or_insert_with(|| volume.geometry().clone());
         } else if is_volume {

@@ -81,6 +81,18 @@ impl Box3 {
         (self.lo[2]..self.hi[2]).flat_map(move |z| (self.lo[1]..self.hi[1]).map(move |y| (y, z)))
     }
 
+    /// The boxes of a shape, laid from voxel (0, 0, 0) on, that hold voxels of this one, cut to it, x fastest.
+    pub fn tiles(self, edge: [i64; 3]) -> impl Iterator<Item = Self> {
+        let first = |a: usize| self.lo[a].div_euclid(edge[a]);
+        let end = |a: usize| (self.hi[a] - 1).div_euclid(edge[a]) + 1;
+        let places = Self::new([first(0), first(1), first(2)], [end(0), end(1), end(2)]);
+        let cut = move |place: [i64; 3]| {
+            let lo: [i64; 3] = std::array::from_fn(|a| place[a] * edge[a]);
+            Self::new(lo, std::array::from_fn(|a| lo[a] + edge[a])).intersect(&self)
+        };
+        places.rows().flat_map(move |(y, z)| (places.lo[0]..places.hi[0]).map(move |x| cut([x, y, z])))
+    }
+
     /// The place of `voxel` in a dense `[z][y][x]` array over this box.
     #[must_use]
     pub fn offset_of(&self, voxel: [i64; 3]) -> usize {
@@ -98,6 +110,14 @@ mod tests {
     fn volume_passes_32_bits() {
         assert_eq!(Box3::from_shape([4096, 4096, 4096]).volume(), 1 << 36);
         assert_eq!(Box3::new([0; 3], [-1, 5, 5]).volume(), 0);
+    }
+
+    #[test]
+    fn tiles_cover_a_box_once() {
+        let part = Box3::new([3, 0, 5], [11, 4, 6]);
+        let tiles: Vec<Box3> = part.tiles([4, 3, 2]).collect();
+        assert_eq!(tiles[0], Box3::new([3, 0, 5], [4, 3, 6]));
+        assert_eq!((tiles.len(), tiles.iter().map(Box3::len).sum::<usize>()), (6, part.len()));
     }
 
     #[test]

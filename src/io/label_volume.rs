@@ -64,9 +64,17 @@ impl LabelVolume {
     }
 
     /// The boxes in which it is stored, x fastest, laid on a regular grid.
+    pub fn natural_boxes(&self) -> impl Iterator<Item = Box3> {
+        self.geometry.domain().tiles(self.stack.natural_shape())
+    }
+
+    /// Bytes that are held while its labels are read box by box.
     #[must_use]
-    pub fn natural_boxes(&self) -> Vec<Box3> {
-        self.stack.natural_boxes(&self.geometry.domain())
+    pub fn reading_bytes(&self) -> u64 {
+        let natural = Box3::from_shape(self.stack.natural_shape()).volume();
+        let [width, height, _] = self.geometry.shape.map(i64::unsigned_abs);
+        // Values, labels and their marks; and the labels of the plane before.
+        self.stack.decoding_bytes() + natural * (self.stack.element().size() as u64 + 8) + width * height * 4
     }
 
     /// Reads the labels of a box into `out`, dense `[z][y][x]`.

@@ -1,4 +1,4 @@
-//! Stacks of planes from files and folders, told apart by content. [`FORMATS`] is the one table of what is read.
+//! Stacks and other 3-D images from files and folders, told apart by content. [`FORMATS`] is the one table of what is read.
 
 use std::fs::File;
 use std::io::Read;

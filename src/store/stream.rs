@@ -73,15 +73,7 @@ pub trait VolumeSource: Sync {
 
     /// The natural boxes that hold voxels of `part`, cut to it, x fastest.
     fn natural_boxes(&self, part: &Box3) -> Vec<Box3> {
-        let edge = self.natural_shape();
-        let first = |a: usize| part.lo[a].div_euclid(edge[a]);
-        let end = |a: usize| (part.hi[a] - 1).div_euclid(edge[a]) + 1;
-        let places = Box3::new([first(0), first(1), first(2)], [end(0), end(1), end(2)]);
-        let cut = |place: [i64; 3]| {
-            let lo: [i64; 3] = std::array::from_fn(|a| place[a] * edge[a]);
-            Box3::new(lo, std::array::from_fn(|a| lo[a] + edge[a])).intersect(part)
-        };
-        places.rows().flat_map(|(y, z)| (places.lo[0]..places.hi[0]).map(move |x| cut([x, y, z]))).collect()
+        part.tiles(self.natural_shape()).collect()
     }
 }
 

@@ -44,4 +44,5 @@ mod signals;
 mod tiff_derived;
 mod tiff_handmade;
 mod tiff_hostile;
+mod zarr_input;
 mod zarr_readers;

@@ -16,6 +16,7 @@ pub(crate) mod stores;
 pub(crate) mod textbook;
 pub(crate) mod tiff_bytes;
 pub(crate) mod tiff_planes;
+pub(crate) mod zarr_files;
 
 use std::path::PathBuf;
 

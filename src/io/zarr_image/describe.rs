@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use super::find::Found;
 use super::node::{Node, children};
 use super::{axes, find, lengths, open_level};
 use crate::error::{Error, Result};
@@ -59,32 +60,51 @@ pub fn describe(path: &Path) -> Result<ZarrDescription> {
     let found = find::find(path, None)?;
     let mut notes = found.notes.clone();
     let (mut levels, mut names) = (Vec::new(), Vec::new());
+    let mut unreadable = None;
     for number in found.level.map_or(0..found.multiscale.levels.len(), |level| level..level + 1) {
-        let opened = open_level(&found, number)?;
-        let space = axes::places(&opened.axes).map_err(|reason| Error::input(reason).at(&opened.folder))?;
         let mut told = Vec::new();
-        let lengths = lengths(&opened.axes, space, opened.placed.as_ref(), &mut told);
-        if levels.is_empty() {
-            notes.extend(told);
+        match describe_level(&found, number, &mut told) {
+            Ok((level, axes)) => {
+                if levels.is_empty() {
+                    notes.extend(told);
+                    names = axes;
+                }
+                levels.push(level);
+            }
+            Err(error) => {
+                // One level that is not there does not hide the others.
+                notes.push(format!("level {number} cannot be read: {error}"));
+                unreadable.get_or_insert(error);
+            }
         }
-        names = opened.axes.iter().map(|axis| axis.name.clone()).collect();
-        let plain = |list: &[NonZeroU64]| list.iter().map(|n| n.get()).collect();
-        levels.push(LevelDescription {
-            path: found.multiscale.levels[number].path.clone(),
-            format: Node::read(&opened.folder)?.map_or(3, |node| node.format),
-            shape: space.map(|axis| opened.array.shape[axis] as i64),
-            stored_shape: opened.array.shape.clone(),
-            spacing: lengths.spacing,
-            origin: lengths.origin,
-            unit: lengths.unit,
-            element: opened.array.kind.name().to_owned(),
-            chunks: plain(&opened.array.chunk),
-            shards: opened.array.shards().map(plain),
-            codecs: codecs_of(&opened.folder)?,
-        });
+    }
+    if let Some(error) = unreadable.filter(|_| levels.is_empty()) {
+        return Err(error);
     }
     let multiscale = found.multiscale;
     Ok(ZarrDescription { version: multiscale.version, name: multiscale.name, axes: names, levels, notes })
+}
+
+/// One level, and the names of its axes.
+fn describe_level(found: &Found, number: usize, notes: &mut Vec<String>) -> Result<(LevelDescription, Vec<String>)> {
+    let opened = open_level(found, number)?;
+    let space = axes::places(&opened.axes).map_err(|reason| Error::input(reason).at(&opened.folder))?;
+    let lengths = lengths(&opened.axes, space, opened.placed.as_ref(), notes);
+    let plain = |list: &[NonZeroU64]| list.iter().map(|n| n.get()).collect();
+    let level = LevelDescription {
+        path: found.multiscale.levels[number].path.clone(),
+        format: Node::read(&opened.folder)?.map_or(3, |node| node.format),
+        shape: space.map(|axis| opened.array.shape[axis] as i64),
+        stored_shape: opened.array.shape.clone(),
+        spacing: lengths.spacing,
+        origin: lengths.origin,
+        unit: lengths.unit,
+        element: opened.array.kind.name().to_owned(),
+        chunks: plain(&opened.array.chunk),
+        shards: opened.array.shards().map(plain),
+        codecs: codecs_of(&opened.folder)?,
+    };
+    Ok((level, opened.axes.iter().map(|axis| axis.name.clone()).collect()))
 }
 
 /// Whether a folder is an array or a group that names a multiscale image, or tries to.

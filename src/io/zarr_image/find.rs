@@ -108,7 +108,9 @@ fn array(path: &Path, node: &Node) -> Result<Found> {
         let name = real.strip_prefix(folder).unwrap_or(&real);
         let Some(found) = multiscales(folder, &around)? else { continue };
         if let Some(level) = found.multiscale.levels.iter().position(|level| Path::new(&level.path) == name) {
-            let folder = path.ancestors().nth(up).filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(folder);
+            // As it was typed, where no link is on the way.
+            let typed = path.ancestors().nth(up).filter(|typed| typed.canonicalize().is_ok_and(|real| real == folder));
+            let folder = typed.unwrap_or(folder);
             return Ok(Found { folder: folder.to_path_buf(), level: Some(level), ..found });
         }
     }
