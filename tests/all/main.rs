@@ -14,6 +14,7 @@ mod distance_papers;
 mod far_coordinates;
 mod flood;
 mod fsm_sources;
+mod fuzz;
 mod gaussian;
 mod heat;
 mod level_set;

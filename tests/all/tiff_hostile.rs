@@ -12,10 +12,10 @@ use crate::common::tiff_bytes::{PageBytes, Value, bytes_u16, gray_page, tiff_fil
 use crate::common::{shared_data, tiff_planes};
 
 /// The variable that tells the test below that it runs under the memory limit.
-const LIMITED: &str = "STRANDLINE_TEST_LIMITED";
+pub(crate) const LIMITED: &str = "STRANDLINE_TEST_LIMITED";
 
 /// Runs the same test in a process of its own that cannot have more than 1 GiB of address space.
-fn rerun_limited(test: &str) {
+pub(crate) fn rerun_limited(test: &str) {
     let program = std::env::current_exe().unwrap();
     let script = "ulimit -v 1048576 && exec \"$0\" --exact \"$1\" --test-threads=1";
     let output = Command::new("sh").args(["-c", script]).arg(program).arg(test).env(LIMITED, "1").output().unwrap();
@@ -58,7 +58,7 @@ fn check_sums(path: &Path, sums: &[f64]) {
 }
 
 /// Small valid files of every kind that can be made here.
-fn seeds() -> Vec<(String, Vec<u8>)> {
+pub(crate) fn seeds() -> Vec<(String, Vec<u8>)> {
     let values: Vec<u16> = (0..15).map(|n| 300 * n).collect();
     let page = |big| gray_page(5, 3, 16, bytes_u16(&values, big));
     let ome = "<OME xmlns=\"x\" UUID=\"urn:uuid:1\"><Image><Pixels DimensionOrder=\"XYZCT\" SizeX=\"5\" SizeY=\"3\" SizeZ=\"2\" \
