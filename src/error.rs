@@ -14,12 +14,14 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ErrorKind {
-    /// The command line or a setting makes no sense (exit code 2).
+    /// The command line or a setting makes no sense, such as too small a budget (exit code 2).
     Usage,
     /// An input cannot be used: unreadable, malformed, empty, hostile (exit code 2).
     Input,
-    /// The run failed: disk full, unwritable output, too small a budget (exit code 1).
+    /// The run failed: disk full, unwritable output (exit code 1).
     Failed,
+    /// The surface of an object vanished while it moved (exit code 1).
+    Vanished,
     /// Some of several parts of a run failed, and the others are done (exit code 3).
     Partly,
     /// SIGINT or SIGTERM asked the run to end (exit code 130 or 143).
@@ -51,6 +53,11 @@ impl Error {
     /// A run that cannot go on.
     pub fn failed(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Failed, message)
+    }
+
+    /// An object of which nothing is left.
+    pub fn vanished(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Vanished, message)
     }
 
     /// A run some of whose parts failed.
@@ -98,7 +105,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self.kind {
             ErrorKind::Usage | ErrorKind::Input => 2,
-            ErrorKind::Failed => 1,
+            ErrorKind::Failed | ErrorKind::Vanished => 1,
             ErrorKind::Partly => 3,
             ErrorKind::Interrupted { signal } => u8::try_from(128 + signal).unwrap_or(130),
         }

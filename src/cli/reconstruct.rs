@@ -24,10 +24,13 @@ use crate::grid::Geometry;
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::Source;
 use crate::pipeline::reconstruct::{
-    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, mean_spacing, reconstruct,
+    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct, typical_spacing,
     without_isolated,
 };
 use crate::store::free_space;
+
+/// Of so many points one may be off the surface without a word.
+const MOST_LOST: u64 = 20;
 
 /// A reconstruction that is ready to start: the cloud is read and checked.
 struct Job {
@@ -62,7 +65,7 @@ pub(super) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
 /// Leaves out points that stand alone, if that was asked for, and says how many.
 fn drop_isolated(cloud: Vec<[f64; 3]>, spacings: Option<f64>, console: &Console) -> Result<Vec<[f64; 3]>> {
     let Some(spacings) = config::above_zero("--drop-isolated", spacings)? else { return Ok(cloud) };
-    let Some(spacing) = mean_spacing(&cloud) else { return Ok(cloud) };
+    let Some(spacing) = typical_spacing(&cloud) else { return Ok(cloud) };
     let kept = without_isolated(&cloud, spacings * spacing);
     let dropped = (cloud.len() - kept.len()) as u64;
     console.note(&format!(
@@ -201,6 +204,7 @@ impl Job {
         let store = target.as_deref().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
         let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, store.as_ref())
             .map_err(|error| error.at(&self.args.cloud))?;
+        self.tell_lost(&found);
         tell_of_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
@@ -215,6 +219,19 @@ impl Job {
             self.report(engine, &found).write(path)?;
         }
         Ok(found)
+    }
+
+    /// Says where the surface is not that of the points.
+    fn tell_lost(&self, found: &Reconstruction) {
+        let (lost, all) = (found.lost_points, self.cloud.len() as u64);
+        if MOST_LOST * lost > all {
+            self.console.note(&format!(
+                "{} of {} points are farther than a voxel from the surface; where it has shrunk away from them a larger --beta \
+                 may hold it, where they are stray points --drop-isolated leaves them out",
+                grouped(lost),
+                grouped(all)
+            ));
+        }
     }
 
     fn report(&self, engine: &Engine, found: &Reconstruction) -> Report<Settings, Found> {

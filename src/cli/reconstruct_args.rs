@@ -36,7 +36,7 @@ pub(super) struct ReconstructArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Grid")]
 pub(super) struct CloudGridArgs {
-    /// Distance between voxel centres, one for all axes or three [default: half the mean spacing of the points]
+    /// Distance between voxel centres, one for all axes or three [default: half the spacing of the points]
     #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
     pub(super) spacing: Option<[f64; 3]>,
     /// Write fields on the grid that has this room around the points, a length [default: as much as is solved]
@@ -49,7 +49,7 @@ pub(super) struct CloudGridArgs {
     #[arg(long, value_name = "NX,NY,NZ", value_parser = parse_whole_triple, allow_hyphen_values = true,
           requires_all = ["origin", "spacing"])]
     pub(super) shape: Option<[i64; 3]>,
-    /// Leave out points that have not three others within so many mean spacings [without a number: 4]
+    /// Leave out points that have not three others within so many of the points' spacings [without a number: 4]
     #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "4", allow_hyphen_values = true)]
     pub(super) drop_isolated: Option<f64>,
 }

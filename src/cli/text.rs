@@ -1,36 +1,15 @@
 //! Numbers, sizes and times as people read them.
 
+use crate::grid::digits;
+
 /// A number with four significant digits, no trailing zeros.
 pub(super) fn number(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return value.to_string();
-    }
-    let magnitude = libm::log10(value.abs()).floor() as i32;
-    if !(-4..9).contains(&magnitude) {
-        return format!("{value:.3e}");
-    }
-    let decimals = (3 - magnitude).max(0) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
-}
-
-/// A coordinate, with as many decimals as tell a tenth of `step` and no zeros at their end: what matters on a grid of that
-/// spacing, however far from zero it lies. Where no step is known, ten digits.
-pub(super) fn coordinate(value: f64, step: f64) -> String {
-    let step = if step > 0.0 && step.is_finite() { step } else { 1e-8 * value.abs() };
-    if value == 0.0 || value.abs() >= 1e15 || !value.is_finite() || step <= 0.0 {
-        return number(value);
-    }
-    let decimals = (1.0 - libm::log10(step).floor()).clamp(0.0, 15.0) as usize;
-    let text = format!("{value:.decimals$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    if text == "-0" { "0".into() } else { text.into() }
+    digits::number(value)
 }
 
 /// `(x, y, z)`, a place on a grid of spacing `step`.
 pub(super) fn place(values: [f64; 3], step: f64) -> String {
-    let [x, y, z] = values.map(|value| coordinate(value, step));
-    format!("({x}, {y}, {z})")
+    digits::place(values, step)
 }
 
 /// A whole number in groups of three digits.
@@ -93,24 +72,6 @@ mod tests {
             (1e-7, "1.000e-7"),
         ] {
             assert_eq!(number(value), text);
-        }
-    }
-
-    #[test]
-    fn places_keep_the_digits_that_matter() {
-        for (value, step, text) in [
-            (500_000.123_456, 0.076, "500000.123"),
-            (3_999_999.999_96, 0.076, "4000000"),
-            (1_000_000_000.25, 0.1, "1000000000.25"),
-            (-0.000_01, 0.1, "0"),
-            (12.345, 10.0, "12"),
-            (123_456.7, 1000.0, "123457"),
-            (0.000_123_4, 1e-6, "0.0001234"),
-            (500_000.4, 0.0, "500000.4"),
-            (0.1 + 0.2, 0.0, "0.3"),
-            (1e300, 1.0, "1.000e300"),
-        ] {
-            assert_eq!(coordinate(value, step), text);
         }
     }
 

@@ -3,6 +3,8 @@
 //! Index and coordinate triples are `[x, y, z]` everywhere in the crate; arrays lie `[z][y][x]`, x fastest.
 //! Indices are 64 bit: a product of extents may pass 2^31.
 
+pub mod digits;
+
 mod box3;
 mod brick_grid;
 mod brick_set;

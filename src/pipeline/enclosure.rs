@@ -12,7 +12,7 @@ use super::vicinity::{Vicinity, voxel_bounds};
 use super::watershed::{Sides, watershed};
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, Geometry, digits};
 use crate::kernel::level_set::persistence::PERSISTENCE;
 use crate::store::BrickArray;
 
@@ -83,6 +83,30 @@ pub struct Hole {
     pub place: [f64; 3],
 }
 
+/// The deepest space that a cloud has, whether it is closed enough or not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deepest {
+    /// Its largest hole.
+    pub hole: Hole,
+    /// The largest distance to the cloud in it.
+    pub depth: f64,
+}
+
+impl Deepest {
+    fn of(basins: &[Basin], geometry: &Geometry) -> Option<Self> {
+        let basin = basins.iter().max_by(|a, b| a.depth.total_cmp(&b.depth))?;
+        let hole = Hole { width: 2.0 * f64::from(basin.saddle), place: geometry.position(basin.place) };
+        Some(Self { hole, depth: f64::from(basin.depth) })
+    }
+
+    /// A beta at which the start surface closes the hole and leaves room inside.
+    #[must_use]
+    pub fn beta(&self) -> Option<f64> {
+        // A hair from either end: on the grid both are known to that.
+        digits::shortest_between(0.5 * self.hole.width * 1.005, self.depth * 0.995)
+    }
+}
+
 /// A cloud that encloses something, on a grid that reaches far enough around it.
 pub struct Enclosure {
     /// The grid of its box.
@@ -96,6 +120,7 @@ pub struct Enclosure {
     distance: BrickArray<f32>,
     inside: BrickArray<u8>,
     basins: Vec<Basin>,
+    deepest: Option<Deepest>,
     sheet: Vec<u32>,
 }
 
@@ -103,10 +128,10 @@ pub struct Enclosure {
 pub enum Found {
     /// Something enclosed.
     Enclosed(Box<Enclosure>),
-    /// Nothing at the beta that was asked for; a larger one than this saddle would do.
-    Leaks(f32),
-    /// Nothing.
-    Nothing,
+    /// Nothing at the beta that was asked for; a larger one would do.
+    Leaks(Deepest),
+    /// Nothing; at most a space that is not deep enough for its holes.
+    Nothing(Option<Deepest>),
 }
 
 /// The reach that a search begins with on a grid, for a beta that was asked for.
@@ -139,7 +164,7 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         // No ball fits the box around the cloud that is larger.
         let all = 2.0 * farthest > search.extents().into_iter().fold(f64::INFINITY, f64::min) + grid.max_spacing();
         if sides.basins.is_empty() && all {
-            return Ok(Found::Nothing);
+            return Ok(Found::Nothing(around.deepest(engine, search)?));
         }
         if !sides.basins.is_empty() && all && !enough(&sides) {
             for part in POCKET_RADII {
@@ -175,12 +200,13 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|basin| search.holds(basin, beta))) else {
             stage.finish();
             // The deepest comes first; noise is as deep as its saddle.
-            let basin = tagging.basins.first().filter(|b| b.depth >= PERSISTENCE * b.saddle);
-            if let (Some(_), Some(basin)) = (search.beta, basin) {
-                return Ok(Found::Leaks(basin.saddle));
+            let deepest = Deepest::of(&tagging.basins, &around.vicinity.geometry);
+            let persists = deepest.filter(|d| d.depth >= f64::from(PERSISTENCE) * 0.5 * d.hole.width);
+            if let (Some(_), Some(deepest)) = (search.beta, persists) {
+                return Ok(Found::Leaks(deepest));
             }
             if farthest > search.extents().into_iter().fold(0.0, f64::max) {
-                return Ok(Found::Nothing);
+                return Ok(Found::Nothing(deepest));
             }
             farthest *= 2.0;
             continue;
@@ -192,12 +218,13 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
             farthest = half_width.max(outer) + 3.0 * grid.max_spacing();
             continue;
         }
+        let deepest = Deepest::of(&tagging.basins, &around.vicinity.geometry);
         tagging.basins.retain(|basin| search.holds(basin, beta));
         let inside = tagging.inside(&stage, engine, beta as f32)?;
         stage.finish();
         let reaches = Reaches { inner: half_width as f32, outer: outer as f32 };
         let enclosure = around.enclosed(beta, reaches, inside, tagging.basins, Vec::new());
-        return Ok(Found::Enclosed(Box::new(enclosure)));
+        return Ok(Found::Enclosed(Box::new(Enclosure { deepest, ..enclosure })));
     }
 }
 
@@ -239,6 +266,14 @@ impl Around {
         Ok(sides)
     }
 
+    /// The deepest space of a cloud that encloses nothing: what a given beta could start from.
+    fn deepest(&self, engine: &Engine, search: &Search<'_>) -> Result<Option<Deepest>> {
+        let stage = self.tagging(engine, search);
+        let tagging = tag(&stage, engine, &self.sources(search), &self.distance, 1.0)?;
+        stage.finish();
+        Ok(Deepest::of(&tagging.basins, &self.vicinity.geometry))
+    }
+
     fn tagging<'a>(&self, engine: &'a Engine, search: &Search<'_>) -> Stage<'a> {
         let set = self.distance.set();
         let stage = engine.stage(&format!("tagging{}", search.suffix), 0);
@@ -255,7 +290,8 @@ impl Around {
         sheet: Vec<u32>,
     ) -> Enclosure {
         let Vicinity { geometry, window, .. } = self.vicinity;
-        Enclosure { geometry, window, beta, reaches, distance: self.distance, inside, basins, sheet }
+        let deepest = Deepest::of(&basins, &geometry);
+        Enclosure { geometry, window, beta, reaches, distance: self.distance, inside, basins, deepest, sheet }
     }
 }
 
@@ -265,6 +301,13 @@ impl Enclosure {
     pub fn hole(&self) -> Option<Hole> {
         let basin = self.basins.iter().max_by(|a, b| a.saddle.total_cmp(&b.saddle))?;
         Some(Hole { width: 2.0 * f64::from(basin.saddle), place: self.geometry.position(basin.place) })
+    }
+
+    /// A beta that the start surface may have, where another one failed: larger than this, and no larger than the
+    /// deepest space has room for.
+    #[must_use]
+    pub fn larger_beta(&self) -> Option<f64> {
+        self.deepest.and_then(|deepest| deepest.beta()).filter(|&beta| beta > self.beta)
     }
 
     /// Number of enclosed spaces.

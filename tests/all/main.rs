@@ -38,6 +38,7 @@ mod wavefront;
 
 mod citations;
 mod cli;
+mod clouds_cli;
 mod layering;
 mod outlines;
 #[cfg(target_os = "linux")]

@@ -10,9 +10,11 @@ mod isolated;
 mod on_grid;
 mod output;
 mod settings;
+mod spacing;
 
 pub use estimate::{Estimate, estimate, least_memory};
-pub use grid::{grid_for, mean_spacing};
+pub use grid::grid_for;
 pub use isolated::without_isolated;
 pub use output::{Reconstruction, reconstruct};
 pub use settings::ReconstructSettings;
+pub use spacing::typical_spacing;

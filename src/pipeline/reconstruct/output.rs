@@ -4,11 +4,11 @@ use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage};
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, Geometry, digits};
 use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::Band;
-use crate::pipeline::enclosure::{Found, Hole, Search, Start, enclose, first_reach_for};
+use crate::pipeline::enclosure::{Deepest, Found, Hole, Search, Start, enclose, first_reach_for};
 use crate::pipeline::evolve::Evolution;
 use crate::pipeline::evolve_ranks::evolve_on_ranks;
 use crate::pipeline::pyramid::{Reduce, write_levels};
@@ -49,7 +49,7 @@ pub struct Reconstruction {
 /// number changes no bit.
 ///
 /// # Errors
-/// When the cloud encloses nothing, the output cannot be written, scratch runs out, or the run is interrupted.
+/// When the cloud encloses nothing, the surface vanishes, the output cannot be written, scratch runs out, or the run is interrupted.
 pub fn reconstruct(
     engine: &Engine,
     grid: &Geometry,
@@ -68,11 +68,12 @@ pub fn reconstruct(
     };
     let enclosure = match enclose(engine, &search)? {
         Found::Enclosed(enclosure) => enclosure,
-        Found::Leaks(saddle) => return Err(leaks(settings, saddle)),
-        Found::Nothing => return Err(encloses_nothing(grid)),
+        Found::Leaks(deepest) => return Err(leaks(settings, grid, &deepest)),
+        Found::Nothing(deepest) => return Err(encloses_nothing(settings, grid, deepest.as_ref())),
     };
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
     let window = enclosure.window;
+    let larger_beta = enclosure.larger_beta();
     let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
     let mut band = enclosure.into_band(engine, "")?;
     let stage = engine.stage("level set", 0);
@@ -96,6 +97,9 @@ pub fn reconstruct(
     let mesh = store.map(|store| store.file("meshes/surface.ply")).transpose()?;
     let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh.as_deref())?;
     stage.finish();
+    if measures.triangles == 0 || lost_points == cloud.len() as u64 {
+        return Err(vanished(settings, grid, larger_beta));
+    }
     let written = if settings.keeps_grid { grid.clone() } else { geometry };
     if let Some(store) = store {
         let window = settings.keeps_grid.then_some(window);
@@ -147,18 +151,44 @@ fn write_fields(
     Ok(())
 }
 
-fn leaks(settings: &ReconstructSettings, saddle: f32) -> Error {
+fn leaks(settings: &ReconstructSettings, grid: &Geometry, deepest: &Deepest) -> Error {
     let beta = settings.beta.unwrap_or_default();
+    let larger = deepest.beta().map_or(String::new(), |beta| format!(", or give --beta {beta}"));
     Error::input(format!(
-        "with --beta {beta} the start leaks through a hole {:.4} wide; leave --beta out or give more than {saddle:.4}",
-        2.0 * saddle
+        "with --beta {beta} the start leaks through {}; leave --beta out{larger}",
+        hole_of(&deepest.hole, grid)
     ))
 }
 
-fn encloses_nothing(grid: &Geometry) -> Error {
+fn hole_of(hole: &Hole, grid: &Geometry) -> String {
+    let place = digits::place(hole.place, grid.min_spacing());
+    format!("a hole {} wide at {place}", digits::number(hole.width))
+}
+
+fn encloses_nothing(settings: &ReconstructSettings, grid: &Geometry, deepest: Option<&Deepest>) -> Error {
+    let spacing = digits::number(grid.min_spacing());
+    let with = settings.beta.map_or(String::new(), |beta| format!(" with --beta {beta}"));
+    let Some((deepest, beta)) = deepest.and_then(|deepest| Some((deepest, deepest.beta()?))) else {
+        return Error::input(format!(
+            "the points enclose nothing at the spacing {spacing}{with}: outside reaches everywhere; give points of all \
+             sides of the body, or a finer --spacing if they lie denser than that"
+        ));
+    };
+    let depth = digits::number(deepest.depth);
+    let hole = hole_of(&deepest.hole, grid);
     Error::input(format!(
-        "the points enclose nothing at the spacing {}: no space inside is twice as deep as its widest opening; give a \
-         finer --spacing if they lie denser than that, or points of all sides of the body",
-        grid.min_spacing()
+        "the points enclose nothing at the spacing {spacing}{with}: the deepest space is {depth} deep, which has {hole}, and \
+         a space has to be deeper than its hole is wide; give --beta {beta} if the body is that thin, else points of all \
+         sides of it, or a finer --spacing if they lie denser than that"
     ))
+}
+
+fn vanished(settings: &ReconstructSettings, grid: &Geometry, larger_beta: Option<f64>) -> Error {
+    let spacing = digits::number(grid.min_spacing());
+    let what = match (larger_beta, settings.beta) {
+        (Some(larger), _) => format!("give a larger --beta, such as {larger}"),
+        (None, Some(_)) => format!("leave --beta out, or give a --spacing finer than {spacing}"),
+        (None, None) => format!("give a --spacing finer than {spacing}, or less smoothing (--delta)"),
+    };
+    Error::vanished(format!("the surface vanished: it shrank away from all points; {what}"))
 }

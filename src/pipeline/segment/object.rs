@@ -8,11 +8,11 @@ use super::shape_start::begin;
 use super::survey::{Outlined, Trust};
 use crate::error::{Error, Result};
 use crate::exec::Engine;
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, Geometry, digits};
 use crate::kernel::image::grey_range::GreyRange;
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::band::Band;
-use crate::pipeline::enclosure::{self, Found, Hole, Search, enclose};
+use crate::pipeline::enclosure::{self, Deepest, Found, Hole, Search, enclose};
 use crate::pipeline::evolve::{Evolution, evolve};
 use crate::pipeline::image_terms::{edges, presmooth};
 use crate::pipeline::intensity::Normalised;
@@ -86,6 +86,8 @@ pub(super) struct Solution {
     pub cloud_points: u64,
     /// Where the start surface lay.
     pub beta: f64,
+    /// A larger beta that may do where this one does not.
+    pub larger_beta: Option<f64>,
     /// The cloud's largest hole.
     pub hole: Option<Hole>,
     /// Number of voxels that were solved.
@@ -145,17 +147,18 @@ pub(super) fn solve<T: Element>(
     };
     let enclosure = match enclose(engine, &search)? {
         Found::Enclosed(enclosure) => enclosure,
-        Found::Leaks(saddle) => return Err(leak(marks, settings, saddle, picture.geometry)),
-        Found::Nothing => return Err(encloses_nothing(marks, picture.geometry)),
+        Found::Leaks(deepest) => return Err(leak(marks, settings, &deepest, picture.geometry)),
+        Found::Nothing(deepest) => return Err(encloses_nothing(marks, picture.geometry, deepest.as_ref())),
     };
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
-    let beta = enclosure.beta;
+    let (beta, larger_beta) = (enclosure.beta, enclosure.larger_beta());
     let band = enclosure.into_band(engine, &suffix)?;
     // Marks that a cloud is made of are dense, and edges make results worse where marks are good.
     let edges = !loose || settings.image == ImageModel::Edge;
     let forces = Forces { edges: edges && settings.uses_image(), ..Forces::of_settings(settings) };
-    Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole, rests: false }
-        .solve(engine, picture, marks, settings, &forces)
+    let begun =
+        Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole, rests: false };
+    Ok(Solution { larger_beta, ..begun.solve(engine, picture, marks, settings, &forces)? })
 }
 
 /// What moves an object's surface, beside its curvature and the settings.
@@ -239,6 +242,7 @@ impl Begun {
             distance,
             cloud_points,
             beta,
+            larger_beta: None,
             hole,
             band_voxels,
             evolution,
@@ -283,23 +287,31 @@ fn needs_outlines(marks: &ObjectMarks, settings: &SegmentSettings) -> Error {
     ))
 }
 
-fn leak(marks: &ObjectMarks, settings: &SegmentSettings, saddle: f32, image: &Geometry) -> Error {
+fn leak(marks: &ObjectMarks, settings: &SegmentSettings, deepest: &Deepest, image: &Geometry) -> Error {
     let (object, beta) = (marks.object, settings.beta.unwrap_or_default());
-    let unit = image.unit.as_deref().unwrap_or("(no unit)");
+    let larger = deepest.beta().map_or(String::new(), |beta| format!(", or give --beta {beta}"));
     Error::input(format!(
-        "with --beta {beta} the start of object {object} leaks through a hole {:.3} {unit} wide; leave --beta out or \
-         give more than {saddle:.3}",
-        2.0 * saddle
+        "with --beta {beta} the start of object {object} leaks through a hole {} wide; leave --beta out{larger}",
+        with_unit(deepest.hole.width, image)
     ))
 }
 
-fn encloses_nothing(marks: &ObjectMarks, image: &Geometry) -> Error {
+fn with_unit(length: f64, image: &Geometry) -> String {
+    format!("{} {}", digits::number(length), image.unit.as_deref().unwrap_or("(no unit)"))
+}
+
+fn encloses_nothing(marks: &ObjectMarks, image: &Geometry, deepest: Option<&Deepest>) -> Error {
     let object = marks.object;
+    // A hole, and what closes it, are worth telling where the flood found any space at all.
+    let told = deepest.and_then(|deepest| Some((deepest, deepest.beta()?)));
+    let hole = told.map_or(String::new(), |(deepest, beta)| {
+        format!(", or give --beta {beta}: the deepest space has a hole {} wide", with_unit(deepest.hole.width, image))
+    });
     if !marks.drawn {
         return Error::input(format!(
             "the points of object {object} enclose nothing at this spacing; where they are outlines, give each a number in \
              a column named contour (object,contour,x,y,z): without it they are one loose cloud, which needs points all \
-             around"
+             around{hole}"
         ));
     }
     if let Some(number) = not_flat(marks, image) {
@@ -310,6 +322,6 @@ fn encloses_nothing(marks: &ObjectMarks, image: &Geometry) -> Error {
     }
     Error::input(format!(
         "the marks of object {object} enclose nothing at this spacing; mark its border all around, on every few \
-         slices, in the order of the contour"
+         slices, in the order of the contour{hole}"
     ))
 }

@@ -59,7 +59,7 @@ pub(super) fn solve_all<T: Element>(
         let outlined = outlined[n].as_ref();
         let solved = solve(engine, &picture, &local[n], outlined.zip(trusts[n]), settings).and_then(|solution| {
             let solution = solution.moved(origin);
-            let mut report = draw(engine, &solution, &objects[n], store, several)?;
+            let mut report = draw(engine, &solution, &objects[n], settings, store, several)?;
             if let Some(outlined) = outlined.filter(|_| settings.cross_validate) {
                 report.cross_validation = cross_validate(engine, outlined, &grid)?;
             }
@@ -67,7 +67,7 @@ pub(super) fn solve_all<T: Element>(
         });
         match solved {
             // One object that cannot be solved does not stop the others.
-            Err(error) if error.kind() == ErrorKind::Input && several => {
+            Err(error) if matches!(error.kind(), ErrorKind::Input | ErrorKind::Vanished) && several => {
                 Ok(Err(Refused { label: objects[n].object, reason: error.to_string() }))
             }
             other => other.map(Ok),
@@ -157,6 +157,7 @@ fn draw(
     engine: &Engine,
     solution: &Solution,
     marks: &ObjectMarks,
+    settings: &SegmentSettings,
     store: Option<&StoreWriter>,
     several: bool,
 ) -> Result<ObjectReport> {
@@ -168,7 +169,8 @@ fn draw(
         surface::draw(&stage, u, geometry, &marks.contours.concat(), mesh.as_deref())?;
     stage.voxels(solution.band_voxels);
     stage.finish();
-    if let Err(error) = check_surface(marks, geometry, hausdorff) {
+    let left = check_left(marks, solution, measures.triangles, settings);
+    if let Err(error) = left.and_then(|()| check_surface(marks, geometry, hausdorff)) {
         // Nothing stays of what is refused; a file that cannot be removed goes with its store.
         let _ = mesh.map(std::fs::remove_file);
         return Err(error);
@@ -202,6 +204,21 @@ fn draw(
 
 /// Marks lie so many largest spacings from their surface in the mean, at most.
 const MOST_OFF: f64 = 4.0;
+
+/// Refuses an object that shrank to nothing from a start that was asked for.
+fn check_left(marks: &ObjectMarks, solution: &Solution, triangles: u64, settings: &SegmentSettings) -> Result<()> {
+    let object = marks.object;
+    if triangles > 0 {
+        return Ok(());
+    }
+    let what = match (&marks.seed, settings.beta, solution.larger_beta) {
+        (Some(_), _, _) => "the image did not hold it; give its --seed a larger radius, or a larger --rho".to_owned(),
+        (None, Some(_), Some(larger)) => format!("give a larger --beta, such as {larger}"),
+        (None, Some(_), None) => "leave --beta out, or mark its border on more slices".to_owned(),
+        (None, None, _) => return Ok(()),
+    };
+    Err(Error::vanished(format!("the surface of object {object} vanished: it shrank to nothing; {what}")))
+}
 
 /// Refuses a surface that is not that of the marks.
 fn check_surface(marks: &ObjectMarks, geometry: &Geometry, hausdorff: Option<Hausdorff>) -> Result<()> {

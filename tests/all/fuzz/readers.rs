@@ -4,11 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use strandline::error::Result;
-use strandline::grid::Geometry;
+use strandline::grid::{Box3, Geometry};
 use strandline::io::label_volume::LabelVolume;
 use strandline::io::ome_zarr::{ImageSpec, StoreWriter};
 use strandline::io::points::read_cloud;
 use strandline::io::sources::read_source;
+use strandline::io::stacks::open_stack;
 use strandline::io::tiff_stack::{Select, TiffStack};
 use strandline::store::{Element, PlaneSource};
 
@@ -110,10 +111,13 @@ fn planes(path: &Path) -> Result<()> {
 }
 
 fn labels(folder: &Path) -> Result<()> {
-    let volume = LabelVolume::of_store(folder)?;
-    let [width, height, depth] = volume.geometry().shape;
+    let stack = open_stack(folder, Select::default())?;
+    let [width, height, depth] = stack.shape();
+    let geometry = Geometry { shape: [width, height, depth], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+    let volume = LabelVolume::new(folder, stack, geometry);
     let size = width.saturating_mul(height).max(1);
-    (0..depth.min(MOST_VOXELS / size).min(MOST_PLANES)).try_for_each(|z| volume.read_planes(z..z + 1, &mut Vec::new()))
+    (0..depth.min(MOST_VOXELS / size).min(MOST_PLANES))
+        .try_for_each(|z| volume.read_box(&Box3::new([0, 0, z], [width, height, z + 1]), &mut Vec::new()))
 }
 
 fn tables() -> Vec<Files> {
