@@ -13,6 +13,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::text::{duration, grouped};
 use crate::exec::Progress;
 
+/// Notes that are said; the report has all.
+const MOST_NOTES: usize = 20;
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 const BETWEEN_DRAWINGS: Duration = Duration::from_millis(200);
 
@@ -201,8 +203,15 @@ impl Progress for Console {
     }
 
     fn note(&self, line: &str) {
-        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(line.into());
-        if self.voice != Voice::Quiet {
+        let before = {
+            let mut notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
+            notes.push(line.into());
+            notes.len() - 1
+        };
+        if before == MOST_NOTES {
+            self.say("more notes are in the report alone");
+        }
+        if self.voice != Voice::Quiet && before < MOST_NOTES {
             draw_line(&self.lock(), &format!("note: {line}"));
         }
     }

@@ -9,6 +9,7 @@ use super::print;
 use super::segment::{Job, Names};
 use super::values::Output;
 use crate::error::{Error, Result};
+use crate::store::Unfinished;
 
 const STACK: &[u8] = include_bytes!("../../data/arabidopsis-embryo.tif");
 const MARKS: &[u8] = include_bytes!("../../data/arabidopsis-marks.csv");
@@ -23,6 +24,7 @@ pub(super) fn run(args: &DemoArgs, typed: &[String]) -> Result<()> {
         return Err(Error::usage(what).at(&args.output));
     }
     let folder = tempfile::tempdir().map_err(|e| Error::from_io("cannot make a temporary folder", &e))?;
+    let _passes = Unfinished::new(folder.path());
     let unpack = |name: &str, bytes: &[u8]| -> Result<PathBuf> {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes)

@@ -8,6 +8,7 @@ use half::f16;
 
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
+use super::disk::Disk;
 use super::distance_args::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
 use super::distance_report::{Found, Settings, describe_found};
 use super::distance_sources::{Read, read_sets};
@@ -26,7 +27,7 @@ use crate::kernel::distance::outside::count_outside;
 use crate::kernel::distance::precision::Precision;
 use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, Textbook, distance};
 use crate::pipeline::middle::{LabelMode, MiddleSettings, SurfaceKind, middle};
-use crate::store::free_space;
+use crate::store::Unfinished;
 
 /// A distance that is ready to be computed: all inputs are read and checked.
 struct Job {
@@ -124,7 +125,11 @@ impl Job {
         self.console.clear();
         let found = result?;
         if !self.args.job.output.quiet {
-            print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)));
+            let output = &self.args.job.output;
+            let [labels_in, pairs_in] = ["", "meshes/pairs.csv"]
+                .map(|table| table::whole_in(output.output.path().is_some(), output.report.is_some(), table));
+            let told = describe_found(&found, &labels_in, &pairs_in);
+            print(&format!("{}\n{told}", table::stages(&engine.reports())));
         }
         Ok(())
     }
@@ -135,6 +140,7 @@ impl Job {
         // A mesh comes out of a store, if only for a while.
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let _passes = Unfinished::new(passing.path());
         let target: Option<PathBuf> = match output.output.path() {
             Some(path) => Some(path.to_path_buf()),
             None => mesh.map(|_| passing.path().join("passing.zarr")),
@@ -190,19 +196,32 @@ impl Job {
                 bytes(needs.scratch)
             ))
         })?;
-        let on_disk = needs.scratch.saturating_sub(window / 2);
-        match free_space(&self.resources.scratch) {
-            Some(free) if free < on_disk => Err(Error::failed(format!(
-                "a grid of {} voxels needs {} of temporary fields, but {} are free and {} of memory are allowed; give \
-                 a larger --spacing, or another folder with --scratch",
-                grouped(self.geometry.domain().volume()),
-                bytes(needs.scratch),
-                bytes(free),
-                bytes(self.resources.memory)
-            ))
-            .at(&self.resources.scratch)),
-            _ => Ok(window),
+        let output = self.args.job.output.output.path();
+        let mesh = self.middle.as_ref().is_some_and(|choice| choice.mesh.is_some());
+        let written = if output.is_some() || mesh { self.written() } else { 0 };
+        Disk {
+            what: format!("a grid of {} voxels", grouped(self.geometry.domain().volume())),
+            scratch: &self.resources.scratch,
+            needed: needs.scratch.saturating_sub(window / 2),
+            output: output.unwrap_or(&self.resources.scratch),
+            written,
+            coarser: "a larger --spacing",
         }
+        .check(&self.console)?;
+        Ok(window)
+    }
+
+    /// Bytes of the output, if nothing of it could be compressed.
+    fn written(&self) -> u64 {
+        let element = match self.args.job.field.precision {
+            PrecisionArg::F16 => 2,
+            PrecisionArg::F32 => 4,
+            PrecisionArg::F64 => 8,
+        };
+        let labels = if self.middle.is_some() { 5 } else { 4 * u64::from(self.settings.labels) };
+        let places = 3 * element * u64::from(self.settings.closest_point);
+        // Coarser levels are an eighth each of the one before.
+        self.geometry.domain().volume().saturating_mul(element + labels + places).saturating_mul(8) / 7
     }
 
     /// Refuses more bricks than there are numbers for.

@@ -7,13 +7,15 @@ use serde::Serialize;
 use super::config::Resources;
 use super::distance::MiddleChoice;
 use super::distance_args::{DistanceJobArgs, PrecisionArg};
+use super::table::cut;
 use super::text::{grouped, number};
 use crate::kernel::distance::Neighbours;
 use crate::kernel::surface::Pair;
 use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Schedule};
 use crate::pipeline::middle::{LabelMode, MiddleFound, SurfaceKind};
 
-pub(super) fn describe_found(found: &Found) -> String {
+/// What was found, in some lines; `whole_in` says where all labels are told, `pairs_in` all pairs of them.
+pub(super) fn describe_found(found: &Found, whole_in: &str, pairs_in: &str) -> String {
     let mut lines = vec![format!(
         "largest distance {}; {} voxels fixed by sources, {} not reached",
         number(found.max),
@@ -22,12 +24,16 @@ pub(super) fn describe_found(found: &Found) -> String {
     )];
     let triangles = found.triangle_distances;
     lines.extend(triangles.map(|n| format!("{} distances to triangles were computed to fix voxels", grouped(n))));
-    lines.extend(found.label_voxels.iter().map(|(label, n)| format!("label {label}: {} voxels", grouped(*n))));
-    lines.extend(found.middle.iter().flat_map(describe_middle));
+    // In the order of the numbers: as text 10 comes before 2.
+    let mut labels: Vec<_> = found.label_voxels.iter().collect();
+    labels.sort_by_key(|(label, _)| label.parse::<u64>().unwrap_or(u64::MAX));
+    let labels = labels.into_iter().map(|(label, n)| format!("label {label}: {} voxels", grouped(*n))).collect();
+    lines.extend(cut(labels, "labels", whole_in));
+    lines.extend(found.middle.iter().flat_map(|middle| describe_middle(middle, pairs_in)));
     lines.join("\n") + "\n"
 }
 
-fn describe_middle(middle: &Middle) -> Vec<String> {
+fn describe_middle(middle: &Middle, pairs_in: &str) -> Vec<String> {
     let volume = middle.volume.map_or(String::new(), |volume| format!("closed, volume {}, ", number(volume)));
     let mut lines = vec![format!(
         "surface: {volume}area {}, {} triangles in {} pieces",
@@ -35,7 +41,7 @@ fn describe_middle(middle: &Middle) -> Vec<String> {
         grouped(middle.triangles),
         middle.components
     )];
-    lines.extend(middle.pairs.iter().map(|pair| {
+    let pairs = middle.pairs.iter().map(|pair| {
         format!(
             "labels {} and {}: area {}, from {} to {} off both",
             pair.labels[0],
@@ -44,7 +50,8 @@ fn describe_middle(middle: &Middle) -> Vec<String> {
             number(pair.distance.min),
             number(pair.distance.max)
         )
-    }));
+    });
+    lines.extend(cut(pairs.collect(), "pairs of labels", pairs_in));
     lines
 }
 

@@ -16,6 +16,9 @@ use crate::io::sources::Source;
 use crate::kernel::solid::Solid;
 use crate::pipeline::label_borders::label_borders;
 
+/// Labels that have fewer voxels in the mean are grey values.
+const FEWEST_VOXELS: u64 = 16;
+
 /// What was read.
 pub(super) struct Read {
     pub(super) sets: DataSets,
@@ -86,8 +89,15 @@ fn add_labels(
         grouped(borders.len() as u64),
         grouped(points as u64)
     ));
-    if 2 * points as u64 > volume.geometry().domain().volume() {
-        console.note(&format!("{}: most voxels are borders; is it an image, and no label volume?", path.display()));
+    let voxels = volume.geometry().domain().volume();
+    if 2 * points as u64 > voxels || FEWEST_VOXELS * borders.len() as u64 > voxels {
+        console.note(&format!(
+            "{}: {} labels on {} voxels, {} % of which are borders; is it an image, and no label volume?",
+            path.display(),
+            grouped(borders.len() as u64),
+            grouped(voxels),
+            100 * points as u64 / voxels.max(1)
+        ));
     }
     for (label, positions) in borders {
         let numbered = before.checked_add(label).filter(|label| *label < u32::MAX).ok_or_else(|| {

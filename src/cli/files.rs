@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::exec::Progress;
 use crate::grid::Geometry;
 use crate::io::mesh_export::{FORMATS, Format};
+use crate::store::Unfinished;
 
 /// Writes a file through `write`; it gets its name, and replaces what had it, only when all is written.
 pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
@@ -21,11 +22,12 @@ pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<&File>)
         .suffix(".part")
         .permissions(Permissions::from_mode(0o666))
         .tempfile_in(folder_of(path))?;
+    let unfinished = Unfinished::new(file.path());
     let mut sink = BufWriter::new(file.as_file());
     write(&mut sink)?;
     sink.flush()?;
     drop(sink);
-    file.persist(path).map_err(|error| error.error)?;
+    unfinished.finish(|| file.persist(path)).map_err(|error| error.error)?;
     Ok(())
 }
 

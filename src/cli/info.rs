@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::args::InfoArgs;
 use super::info_store::store;
 use super::print;
+use super::table::cut;
 use super::text::{grouped, number, place};
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
@@ -42,11 +43,15 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     Ok(())
 }
 
+/// Names and what is told of them.
 pub(super) type Lines = Vec<(String, String)>;
 
 fn table(lines: &Lines) -> String {
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    lines.iter().fold(String::new(), |text, (name, value)| text + &format!("{name:<width$}  {value}\n"))
+    let told = |(name, value): &(String, String)| format!("{name:<width$}  {value}");
+    let (objects, others): (Vec<_>, Vec<_>) = lines.iter().partition(|(name, _)| name.starts_with("object "));
+    let objects = cut(objects.into_iter().map(told).collect(), "objects", "(--json tells all)");
+    others.into_iter().map(told).chain(objects).fold(String::new(), |text, line| text + &line + "\n")
 }
 
 pub(super) fn line(name: &str, value: impl Into<String>) -> (String, String) {

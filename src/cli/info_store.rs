@@ -1,13 +1,14 @@
-//! What `info` tells of a Zarr store: its images with axes, levels, chunks and codecs, and what a run of ours reported.
+//! What `info` tells of a Zarr store: its images with axes, levels, chunks, codecs and range, its meshes and tables, and
+//! what a run of ours reported.
 
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
 use super::info::{Lines, line};
+use super::store_contents::{contents, groups, range};
 use super::text::{number, place};
 use crate::error::{Error, Result};
-use crate::io::ome_zarr::is_store;
 use crate::io::zarr_image::{LevelDescription, ZarrDescription, describe, holds_image};
 
 /// What a store holds, as JSON and as lines.
@@ -19,7 +20,13 @@ pub(super) fn store(path: &Path) -> Result<(Value, Lines)> {
         match describe(&path.join(&group)) {
             Ok(image) => {
                 lines.extend(image_lines(name, &image));
-                images.insert(name.into(), image.levels.iter().map(level_json).collect());
+                let mut levels: Vec<Value> = image.levels.iter().map(level_json).collect();
+                if let Some((level, [low, high])) = range(&path.join(&group))? {
+                    let of = if level == 0 { String::new() } else { format!(" on level {}", image.levels[level].path) };
+                    lines.push(line(&format!("{name}, values"), format!("{} to {}{of}", number(low), number(high))));
+                    levels[level]["range"] = json!([low, high]);
+                }
+                images.insert(name.into(), levels.into());
                 let (version, axes, notes) = (&image.version, &image.axes, &image.notes);
                 stored.insert(
                     name.into(),
@@ -36,12 +43,15 @@ pub(super) fn store(path: &Path) -> Result<(Value, Lines)> {
         describe(path)?;
         return Err(Error::input("holds no image that can be read").at(path));
     }
+    let files = contents(path);
+    let named = files.iter().map(|(name, what)| (name.clone(), json!(what))).collect::<Map<_, _>>();
+    lines.extend(files);
     let report = std::fs::read(path.join("report.json")).ok().and_then(|text| serde_json::from_slice(&text).ok());
     if let Some(report) = &report {
         lines.extend(summary(report));
     }
     let result = report.as_ref().map_or(Value::Null, |report| report["result"].clone());
-    Ok((json!({ "kind": "store", "images": images, "stored": stored, "result": result }), lines))
+    Ok((json!({ "kind": "store", "images": images, "stored": stored, "files": named, "result": result }), lines))
 }
 
 fn image_lines(name: &str, image: &ZarrDescription) -> Lines {
@@ -86,24 +96,6 @@ fn level_json(level: &LevelDescription) -> Value {
         "unit": level.unit, "type": level.element, "zarr_format": level.format, "stored_shape": level.stored_shape,
         "chunks": level.chunks, "shards": level.shards, "codecs": level.codecs,
     })
-}
-
-/// The groups in which our stores keep images, the root first.
-fn groups(store: &Path) -> Vec<String> {
-    let below = |folder: &str| {
-        let entries = std::fs::read_dir(store.join(folder)).into_iter().flatten().flatten();
-        let mut names: Vec<String> = entries
-            .filter(|entry| is_store(&entry.path()))
-            .map(|entry| format!("{folder}/{}", entry.file_name().to_string_lossy()))
-            .collect();
-        names.sort();
-        names
-    };
-    let mut groups = vec![String::new(), "levelset".into()];
-    groups.extend(below("levelset"));
-    groups.extend(below("labels"));
-    groups.extend(below("closest-point"));
-    groups
 }
 
 /// The inputs that a report names: an image, or sources.

@@ -7,6 +7,7 @@ mod args;
 mod config;
 mod console;
 mod demo;
+mod disk;
 mod distance;
 mod distance_args;
 mod distance_report;
@@ -29,6 +30,7 @@ mod report;
 mod segment;
 mod signals;
 mod sources;
+mod store_contents;
 mod table;
 mod text;
 mod values;
@@ -55,9 +57,17 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let typed: Vec<String> = arguments.iter().map(|a| a.to_string_lossy().into_owned()).collect();
-    match catch_unwind(AssertUnwindSafe(|| execute(cli, &typed))) {
+    let ended = catch_unwind(AssertUnwindSafe(|| execute(cli, &typed)));
+    if !signals::speak_last() {
+        // The process ends in another thread, which says so.
+        loop {
+            std::thread::park();
+        }
+    }
+    match ended {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
+            let error = signals::seen(error);
             complain(&error.to_string());
             ExitCode::from(error.exit_code())
         }

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
+use super::disk::Disk;
 use super::distance_args::GridArgs;
 use super::files::{export_mesh, mesh_format, tell_of_anchor};
 use super::grid::{check_counts, grid};
@@ -27,7 +28,7 @@ use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct, typical_spacing,
     without_isolated,
 };
-use crate::store::free_space;
+use crate::store::Unfinished;
 
 /// Of so many points one may be off the surface without a word.
 const MOST_LOST: u64 = 20;
@@ -149,17 +150,19 @@ impl Job {
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, estimate: &Estimate) -> Result<u64> {
         let window = Budget { total: self.resources.memory }.window(estimate.held)?;
-        match free_space(&self.resources.scratch) {
-            Some(free) if free < estimate.least_scratch.saturating_sub(window / 2) => Err(Error::failed(format!(
-                "{} voxels near the points need {} of temporary fields, but {} are free; give a larger --spacing, or \
-                 another folder with --scratch",
-                grouped(estimate.near_voxels),
-                bytes(estimate.least_scratch),
-                bytes(free)
-            ))
-            .at(&self.resources.scratch)),
-            _ => Ok(window),
+        // Two fields of the whole box, their coarser levels an eighth each of the one before; far from the points they are
+        // constant and take nothing.
+        let written = if self.needs_store() { 8 * estimate.near_voxels.saturating_mul(8) / 7 } else { 0 };
+        Disk {
+            what: format!("a grid with {} voxels near the points", grouped(estimate.near_voxels)),
+            scratch: &self.resources.scratch,
+            needed: estimate.scratch.saturating_sub(window / 2),
+            output: self.args.output.output.path().unwrap_or(&self.resources.scratch),
+            written,
+            coarser: "a larger --spacing",
         }
+        .check(&self.console)?;
+        Ok(window)
     }
 
     /// What the run will take, in a few lines.
@@ -197,6 +200,7 @@ impl Job {
         // The mesh comes out of a store, if only for a while.
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let _passes = Unfinished::new(passing.path());
         let target: Option<PathBuf> = match output.output.path() {
             Some(path) => Some(path.to_path_buf()),
             None => self.needs_store().then(|| passing.path().join("passing.zarr")),

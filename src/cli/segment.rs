@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::args::SegmentArgs;
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
+use super::disk::Disk;
 use super::files::{export_mesh, mesh_format, tell_of_anchor};
 use super::input::{crop_box, open_stack};
 use super::marks::{Marks, Reading, look_at_marks, read_marks};
@@ -24,7 +25,7 @@ use crate::pipeline::segment::{
     Estimate, Grids, Guides, ImageModel, ObjectReport, Outcome, Refused, SegmentSettings, check_lengths, check_seed,
     check_smoothing, estimate, segment,
 };
-use crate::store::free_space;
+use crate::store::Unfinished;
 
 /// A segmentation that is ready to start: all inputs are open and checked.
 pub(super) struct Job {
@@ -146,25 +147,15 @@ impl Job {
     /// Refuses a run that cannot fit memory or disk.
     pub(super) fn fits(&self, estimate: &Estimate) -> Result<u64> {
         let window = Budget { total: self.resources.memory }.window(estimate.held)?;
-        if let Some(free) = free_space(&self.resources.scratch) {
-            if free < estimate.least_scratch {
-                return Err(Error::failed(format!(
-                    "needs at least {} for temporary fields but only {} are free; free some space or name another \
-                     folder with --scratch",
-                    bytes(estimate.least_scratch),
-                    bytes(free)
-                ))
-                .at(&self.resources.scratch));
-            }
-            if free < estimate.scratch {
-                self.console.note(&format!(
-                    "temporary fields may need {} but only {} are free in {}",
-                    bytes(estimate.scratch),
-                    bytes(free),
-                    self.resources.scratch.display()
-                ));
-            }
+        Disk {
+            what: format!("an image with {} voxels near the marks", grouped(estimate.near_voxels)),
+            scratch: &self.resources.scratch,
+            needed: estimate.scratch.saturating_sub(window / 2),
+            output: self.args.output.store().unwrap_or(&self.resources.scratch),
+            written: estimate.output,
+            coarser: "a part of the image with --crop; a spacing of the image that is wrong is put right with --image-spacing",
         }
+        .check(&self.console)?;
         Ok(window)
     }
 
@@ -192,12 +183,17 @@ impl Job {
         self.console.clear();
         let outcome = result?;
         if !self.args.output.quiet {
-            print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome)));
+            print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())));
         }
         match outcome.refused.as_slice() {
             [] => Ok(outcome),
-            refused => Err(refusal(refused, outcome.objects.len())),
+            refused => Err(refusal(refused, outcome.objects.len(), &self.whole_in())),
         }
+    }
+
+    /// Where all objects are told.
+    fn whole_in(&self) -> String {
+        table::whole_in(self.args.output.store().is_some(), self.args.output.report.is_some(), "")
     }
 
     fn solve_and_write(&self, engine: &Engine) -> Result<Outcome> {
@@ -205,6 +201,7 @@ impl Job {
         // What is drawn from fields that nobody wants to keep needs them for a while all the same.
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let _passes = Unfinished::new(passing.path());
         let store = match output.store() {
             Some(path) => Some(StoreWriter::create(path, output.overwrite)?),
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
@@ -358,13 +355,14 @@ impl Job {
     }
 
     fn print_plan(&self, estimate: &Estimate) {
-        let mut lines = vec![self.describe()];
+        let (mut lines, mut objects) = (vec![self.describe()], Vec::new());
         for object in split(&self.marks.cloud) {
             let points: usize = object.contours.iter().map(Vec::len).sum();
             let file = self.marks.files[&object.object].display();
             let contours = if object.drawn { format!(" on {} contours", object.contours.len()) } else { String::new() };
-            lines.push(format!("object {}: {points} marks{contours}, {file}", object.object));
+            objects.push(format!("object {}: {points} marks{contours}, {file}", object.object));
         }
+        lines.extend(table::cut(objects, "objects", "(info FILE --json has them all)"));
         for (n, seed) in self.args.seed.iter().enumerate() {
             let at = place(seed.centre, 0.1 * seed.radius);
             lines.push(format!("seed {}: a ball of radius {} at {at}", n + 1, number(seed.radius)));
@@ -383,9 +381,10 @@ impl Job {
 }
 
 /// A line for each object that could not be solved.
-fn refusal(refused: &[Refused], solved: usize) -> Error {
+fn refusal(refused: &[Refused], solved: usize, whole_in: &str) -> Error {
     let all = refused.len() + solved;
-    let reasons: Vec<String> = refused.iter().map(|refused| refused.reason.clone()).collect();
+    let reasons = refused.iter().map(|refused| refused.reason.clone()).collect();
+    let reasons = table::cut(reasons, "objects", whole_in);
     Error::partly(format!("{} of {all} objects could not be solved: {}", refused.len(), reasons.join("\n")))
 }
 

@@ -1,13 +1,31 @@
-//! SIGINT and SIGTERM: the first asks the run to end in order, the second ends it at once.
+//! SIGINT and SIGTERM: the first asks the run to end in order, the second ends it at once. A run that has not ended a
+//! while after the first, since it reads a slow disk or is in a long computation, is ended from here, and what it had begun
+//! to write is removed.
 
+use std::process::exit;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::thread;
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 
+use super::complain;
 use crate::error::{Error, Result};
 use crate::exec::Cancel;
+use crate::store::remove_unfinished;
+
+/// How often it is looked whether a signal came.
+const LOOK: Duration = Duration::from_millis(100);
+/// How long a run may take to end in order.
+const PATIENCE: Duration = Duration::from_millis(1200);
+
+/// True once somebody has said, or is about to say, how the process ends.
+static ENDS: AtomicBool = AtomicBool::new(false);
+/// The signal that asked for the end, or 0.
+static ASKED: AtomicUsize = AtomicUsize::new(0);
 
 /// A flag that the first signal sets.
 pub(super) fn cancel_on_signals() -> Result<Cancel> {
@@ -23,5 +41,38 @@ pub(super) fn cancel_on_signals() -> Result<Cancel> {
     // A file that grows past its limit is then an error of the write, which names the file, and not the end.
     flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))
         .map_err(|error| Error::from_io("cannot listen to signals", &error))?;
+    let asked = cancel.flag();
+    let watch = move || {
+        while asked.load(Relaxed) == 0 {
+            thread::sleep(LOOK);
+        }
+        ASKED.store(asked.load(Relaxed), Relaxed);
+        thread::sleep(PATIENCE);
+        if speak_last() {
+            end(asked.load(Relaxed));
+        }
+    };
+    thread::Builder::new().spawn(watch).map_err(|error| Error::from_io("cannot listen to signals", &error))?;
     Ok(cancel)
+}
+
+/// Whether the caller is the one who says how the process ends: the first who asks.
+pub(super) fn speak_last() -> bool {
+    !ENDS.swap(true, Relaxed)
+}
+
+/// What an error is to the user: after a signal, what fails because all goes away is no failure of its own.
+pub(super) fn seen(error: Error) -> Error {
+    match ASKED.load(Relaxed) {
+        0 => error,
+        signal => Error::interrupted(signal as i32),
+    }
+}
+
+/// Ends the process in the middle of whatever it does.
+fn end(signal: usize) -> ! {
+    remove_unfinished();
+    let error = Error::interrupted(signal as i32);
+    complain(&error.to_string());
+    exit(i32::from(error.exit_code()))
 }

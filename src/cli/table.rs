@@ -6,8 +6,59 @@ use super::text::{grouped, number, place};
 use crate::exec::StageReport;
 use crate::pipeline::segment::Outcome;
 
-/// The stages of a run.
+/// Rows of a table on a terminal; what has more is whole in the report.
+pub(super) const MOST_ROWS: usize = 10;
+/// Stages that are told one by one; of more those of a kind are told as one.
+const MOST_STAGES: usize = 30;
+
+/// The first lines of many, and how many more there are where.
+pub(super) fn cut(mut lines: Vec<String>, of: &str, place: &str) -> Vec<String> {
+    let all = lines.len();
+    // One line more takes no more room than to say that there is one.
+    if all > MOST_ROWS + 1 {
+        lines.truncate(MOST_ROWS);
+        lines.push(format!("... {} more {of} {place}", grouped((all - MOST_ROWS) as u64)));
+    }
+    lines
+}
+
+/// Where all that a run found is told, for a run with these outputs.
+pub(super) fn whole_in(store: bool, report: bool, table: &str) -> String {
+    match (store, report) {
+        (true, _) if !table.is_empty() => format!("in report.json and {table}"),
+        (true, _) => "in report.json".into(),
+        (false, true) => "in the report".into(),
+        (false, false) => "(--report FILE or an output has them all)".into(),
+    }
+}
+
+/// The stages of a run; those of many objects summed up by kind.
 pub(super) fn stages(reports: &[StageReport]) -> String {
+    if reports.len() <= MOST_STAGES {
+        return rows_of(reports);
+    }
+    let mut kinds: Vec<(String, usize, StageReport)> = Vec::new();
+    for stage in reports {
+        let kind = stage.name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end();
+        match kinds.iter_mut().find(|(name, ..)| name == kind) {
+            Some((_, times, sum)) => {
+                *times += 1;
+                sum.seconds += stage.seconds;
+                sum.voxels += stage.voxels;
+                sum.brick_loads += stage.brick_loads;
+                sum.peak_rss_bytes = sum.peak_rss_bytes.max(stage.peak_rss_bytes);
+            }
+            None => kinds.push((kind.into(), 1, stage.clone())),
+        }
+    }
+    let named = |(name, times, sum): (String, usize, StageReport)| {
+        let name = if times > 1 { format!("{name}, {times} times") } else { sum.name.clone() };
+        StageReport { name, ..sum }
+    };
+    rows_of(&kinds.into_iter().map(named).collect::<Vec<_>>())
+}
+
+fn rows_of(reports: &[StageReport]) -> String {
     let mut rows = vec![["stage", "seconds", "voxels", "Mvoxel/s", "brick loads", "peak MiB"].map(String::from)];
     for stage in reports {
         let rate = stage.voxels as f64 / 1e6 / stage.seconds.max(1e-9);
@@ -24,7 +75,7 @@ pub(super) fn stages(reports: &[StageReport]) -> String {
 }
 
 /// The objects: their surfaces, then how they were solved.
-pub(super) fn objects(outcome: &Outcome) -> String {
+pub(super) fn objects(outcome: &Outcome, whole_in: &str) -> String {
     let unit = outcome.geometry.unit.as_deref().unwrap_or("voxel spacings without a unit");
     let mut surfaces = vec![
         ["object", "label voxels", "volume", "area", "surface", "pieces", "marks off, mean", "largest"]
@@ -33,7 +84,9 @@ pub(super) fn objects(outcome: &Outcome) -> String {
     let mut solver = vec![
         ["object", "points", "beta", "largest hole", "at x, y, z", "image", "steps", "ended by"].map(String::from),
     ];
-    for object in &outcome.objects {
+    let all = outcome.objects.len();
+    let shown = if all > MOST_ROWS + 1 { MOST_ROWS } else { all };
+    for object in &outcome.objects[..shown] {
         let distance = |of: fn(&crate::kernel::surface::Hausdorff) -> f64| {
             object.hausdorff.as_ref().map_or("-".into(), |h| number(of(h)))
         };
@@ -59,8 +112,12 @@ pub(super) fn objects(outcome: &Outcome) -> String {
         ]);
     }
     let neighbours = neighbours(outcome);
+    let more = match all - shown {
+        0 => String::new(),
+        more => format!("... {} more objects {whole_in}\n", grouped(more as u64)),
+    };
     format!(
-        "{}\n{}{neighbours}(lengths, areas and volumes in {unit}, squared and cubed)\n",
+        "{}\n{}{more}{neighbours}(lengths, areas and volumes in {unit}, squared and cubed)\n",
         aligned(&surfaces),
         aligned(&solver)
     )
@@ -99,6 +156,29 @@ fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_tables_are_cut() {
+        let lines = |n: usize| (0..n).map(|k| format!("label {k}")).collect::<Vec<_>>();
+        for n in [0, 1, 10, 11] {
+            assert_eq!(cut(lines(n), "labels", "in report.json"), lines(n));
+        }
+        let cut = cut(lines(1500), "labels", &whole_in(true, false, ""));
+        assert_eq!((cut.len(), &*cut[9], &*cut[10]), (11, "label 9", "... 1 490 more labels in report.json"));
+    }
+
+    #[test]
+    fn stages_of_many_objects_are_summed_up() {
+        let named = |name: String| StageReport { name, seconds: 1.5, voxels: 7, ..StageReport::default() };
+        let all: Vec<StageReport> = std::iter::once(named("read stack".into()))
+            .chain((1..=40).flat_map(|n| [named(format!("level set {n}")), named(format!("write u {n}"))]))
+            .collect();
+        let text = stages(&all);
+        assert_eq!(text.lines().count(), 4, "{text}");
+        let line = text.lines().find(|line| line.starts_with("level set, 40 times")).unwrap();
+        assert!(line.contains("60.00") && line.contains("280"), "{line}");
+        assert_eq!(stages(&all[..5]).lines().count(), 6);
+    }
 
     #[test]
     fn the_widest_stages_fit_a_hundred_columns() {

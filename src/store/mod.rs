@@ -6,10 +6,12 @@ mod element;
 mod free_space;
 mod slot_file;
 mod stream;
+mod unfinished;
 mod window;
 
 pub use brick_array::{BrickArray, Scratch};
 pub use element::{Element, ElementType, Sample, SamplesMut};
 pub use free_space::free_space;
 pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, NoMesh, PlaneSource, VolumeSource};
+pub use unfinished::{Unfinished, remove_all as remove_unfinished};
 pub use window::{Traffic, Window};

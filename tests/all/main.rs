@@ -43,6 +43,7 @@ mod layering;
 mod outlines;
 #[cfg(target_os = "linux")]
 mod signals;
+mod terminal;
 mod tiff_derived;
 mod tiff_handmade;
 mod tiff_hostile;

@@ -91,3 +91,34 @@ fn what_a_killed_run_leaves_goes_with_the_next_one() {
     bench.succeed("segment image.tif --points marks.csv -o out/x.zarr -q");
     assert_eq!(bench.entries("out"), ["x.zarr"]);
 }
+
+/// A pipe that nobody writes to: the run waits in a call of the system, and looks at no flag.
+#[test]
+fn a_run_that_cannot_look_up_ends_all_the_same() {
+    let bench = Bench::bare();
+    let made = std::process::Command::new("mkfifo").arg(bench.path("points.xyz")).status().unwrap();
+    assert!(made.success());
+    for (command, signal, code) in [
+        ("reconstruct points.xyz -o out/x.zarr", "INT", 130),
+        ("distance points.xyz -o out/x.zarr --spacing 1", "TERM", 143),
+    ] {
+        let mut command = bench.command(command);
+        let child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+        let status = format!("/proc/{}/status", child.id());
+        // Bit 1 of the signals that are caught is SIGINT's, bit 14 SIGTERM's; both are once the run has begun.
+        let caught = || {
+            let text = fs::read_to_string(&status).unwrap();
+            let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim().to_owned();
+            u64::from_str_radix(&mask, 16).unwrap()
+        };
+        while caught() & (1 << 1) == 0 || caught() & (1 << 14) == 0 {
+            std::thread::yield_now();
+        }
+        let sent = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), said.lines().last()), (Some(code), Some(SENTENCE)), "{said}");
+        assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty());
+    }
+}

@@ -77,7 +77,7 @@ impl ImageReader {
     }
 
     fn read<T: ElementOwned + Into<f64>>(&self, level: &StoredLevel, part: &Box3) -> Result<Vec<f64>> {
-        let fault = |error: &dyn std::fmt::Display| Error::failed(format!("cannot be read: {error}")).at(&self.folder);
+        let fault = |error: &dyn std::fmt::Display| Error::input(format!("cannot be read: {error}")).at(&self.folder);
         let store = FilesystemStore::new(&self.folder).map_err(|e| fault(&e))?;
         let array = Array::open(Arc::new(store), &format!("/{}", level.path)).map_err(|e| fault(&e))?;
         let ranges = [2, 1, 0].map(|a| part.lo[a] as u64..part.hi[a] as u64);

@@ -12,7 +12,7 @@ use super::level::LevelWriter;
 use super::metadata::{self, ImageSpec, LabelSpec};
 use super::pyramid::{LevelPlan, plan_levels};
 use crate::error::{Error, Result};
-use crate::store::ElementType;
+use crate::store::{ElementType, Unfinished};
 
 const METADATA: &str = "zarr.json";
 
@@ -22,6 +22,8 @@ pub struct StoreWriter {
     path: PathBuf,
     overwrite: bool,
     partial: TempDir,
+    /// Says so to whoever ends the process.
+    unfinished: Unfinished,
     /// Says to other runs that somebody works on `partial`.
     _claim: Option<File>,
     /// Names of the label images; also the lock under which group documents are written.
@@ -61,7 +63,8 @@ impl StoreWriter {
             .map_err(|error| io_error("the output cannot be created in its folder", &error).at(&path))?;
         // Locked before anything is in it: see `abandoned`.
         let claim = abandoned::claim(partial.path());
-        let store = Self { path, overwrite, partial, _claim: claim, labels: Mutex::default() };
+        let unfinished = Unfinished::new(partial.path());
+        let store = Self { path, overwrite, partial, unfinished, _claim: claim, labels: Mutex::default() };
         store.ensure_groups(Path::new("")).map_err(|error| error.at(&store.path))?;
         Ok(store)
     }
@@ -123,15 +126,19 @@ impl StoreWriter {
             let mut old = self.partial.path().as_os_str().to_owned();
             old.push(REPLACED);
             let old = PathBuf::from(old);
-            fs::rename(&self.path, &old).map_err(fault)?;
-            if let Err(error) = fs::rename(self.partial.path(), &self.path) {
-                fs::rename(&old, &self.path).map_err(fault)?;
-                return Err(fault(error));
-            }
+            self.unfinished.finish(|| {
+                fs::rename(&self.path, &old).map_err(fault)?;
+                if let Err(error) = fs::rename(self.partial.path(), &self.path) {
+                    fs::rename(&old, &self.path).map_err(fault)?;
+                    return Err(fault(error));
+                }
+                Ok(())
+            })?;
+            let _goes = Unfinished::new(&old);
             let left = |error| io_error("the output is complete, but the one it replaces cannot be removed", &error);
             fs::remove_dir_all(&old).map_err(|error| left(error).at(&old))?;
         } else {
-            fs::rename(self.partial.path(), &self.path).map_err(fault)?;
+            self.unfinished.finish(|| fs::rename(self.partial.path(), &self.path)).map_err(fault)?;
         }
         // The folder has its final name: nothing is left to clean up.
         let _ = self.partial.keep();

@@ -114,7 +114,7 @@ impl TiffFile {
                 "bytes {offset} to {end} are needed but the file ends at {len}: it is truncated or damaged"
             )));
         }
-        self.file.read_exact_at(out, offset).map_err(|e| Error::from_io("cannot read", &e).at(&self.path))
+        self.file.read_exact_at(out, offset).map_err(|e| self.error(format!("cannot be read: {e}")))
     }
 
     fn read_up_to(&self, offset: u64, most: u64) -> Result<Vec<u8>> {

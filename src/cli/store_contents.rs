@@ -1,0 +1,100 @@
+//! What lies in a store: its groups, the range of an image's values, its meshes and tables.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+use super::text::{bytes, grouped};
+use crate::error::Result;
+use crate::grid::Box3;
+use crate::io::ome_zarr::{ImageReader, is_store};
+
+/// Groups lie no deeper than this: `labels/segmentation`, `levelset/object-1`.
+const DEEPEST: usize = 3;
+/// Voxels of a level that are read to tell the range of its values; the finest level that has no more is taken.
+const MOST_READ: u64 = 1 << 26;
+/// Planes that are read at a time.
+const SLAB: i64 = 64;
+/// A header of a mesh or a table is not longer than this.
+const HEADER_LINES: usize = 64;
+
+/// The groups of a store, the root first.
+pub(super) fn groups(store: &Path) -> Vec<String> {
+    let mut found = vec![String::new()];
+    let mut next = 0;
+    while let Some(group) = found.get(next).cloned() {
+        next += 1;
+        let depth = if group.is_empty() { 0 } else { group.split('/').count() };
+        let below = |path: PathBuf| {
+            let name = path.file_name()?.to_string_lossy().into_owned();
+            is_store(&path).then(|| if group.is_empty() { name } else { format!("{group}/{name}") })
+        };
+        if depth < DEEPEST {
+            let here = found.len();
+            found.extend(entries(&store.join(&group)).into_iter().filter_map(below));
+            found[here..].sort();
+        }
+    }
+    found
+}
+
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect()
+}
+
+/// The smallest and largest value of an image of ours, and the level that was read for them; none where no level is small
+/// enough, and of images by other programs.
+pub(super) fn range(path: &Path) -> Result<Option<(usize, [f64; 2])>> {
+    let Ok(image) = ImageReader::open(path) else { return Ok(None) };
+    let small = |n: &usize| image.levels()[*n].geometry.domain().volume() <= MOST_READ;
+    let Some(level) = (0..image.levels().len()).find(small) else { return Ok(None) };
+    let [width, height, depth] = image.levels()[level].geometry.shape;
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    for z in (0..depth).step_by(SLAB as usize) {
+        let part = Box3::new([0, 0, z], [width, height, (z + SLAB).min(depth)]);
+        // Voxels without a closest point hold no number, and take no part.
+        for value in image.read_box(level, &part)? {
+            range = [range[0].min(value), range[1].max(value)];
+        }
+    }
+    Ok((range[0] <= range[1]).then_some((level, range)))
+}
+
+/// The files beside the images, and what each holds.
+pub(super) fn contents(store: &Path) -> Vec<(String, String)> {
+    files(store).iter().filter_map(|file| described(store, file)).collect()
+}
+
+/// The files of the root and its folders without arrays, by name.
+fn files(store: &Path) -> Vec<PathBuf> {
+    let is_plain = |path: &PathBuf| path.is_file() && path.file_name().is_none_or(|name| name != "zarr.json");
+    let mut found: Vec<PathBuf> = entries(store).into_iter().filter(is_plain).collect();
+    found.extend(entries(&store.join("meshes")).into_iter().filter(is_plain));
+    found.sort();
+    found
+}
+
+/// A file's name in the store and what it holds.
+fn described(store: &Path, file: &Path) -> Option<(String, String)> {
+    let name = file.strip_prefix(store).ok()?.to_string_lossy().into_owned();
+    let length = file.metadata().ok()?.len();
+    // What is no text ends the lines.
+    let header: Vec<String> =
+        BufReader::new(File::open(file).ok()?).lines().take(HEADER_LINES).map_while(std::io::Result::ok).collect();
+    let count = |element: &str| {
+        let line =
+            header.iter().find_map(|line| line.strip_prefix("element ")?.strip_prefix(element)?.strip_prefix(' '))?;
+        line.trim().parse::<u64>().ok()
+    };
+    let what = match (count("vertex"), count("face")) {
+        (Some(vertices), Some(faces)) => {
+            format!("mesh of {} vertices, {} triangles, {}", grouped(vertices), grouped(faces), bytes(length))
+        }
+        _ if file.extension().is_some_and(|ending| ending == "csv") => {
+            let rows = BufReader::new(File::open(file).ok()?).lines().count().saturating_sub(1);
+            format!("table of {} rows: {}", grouped(rows as u64), header.first()?)
+        }
+        _ => bytes(length),
+    };
+    Some((name, what))
+}
