@@ -78,7 +78,13 @@ impl Error {
     }
 
     fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
-        Self { kind, message: message.into(), path: None }
+        let mut message = message.into();
+        // What files and other libraries say may hold anything; a message is one line and moves no cursor. A run that
+        // failed in part lists its reasons, each a message of its own.
+        if kind != ErrorKind::Partly && message.contains(char::is_control) {
+            message = message.chars().map(shown).collect();
+        }
+        Self { kind, message, path: None }
     }
 
     /// Names the file that the error concerns; the first name given stays.
@@ -112,6 +118,11 @@ impl Error {
     }
 }
 
+/// A character as it may stand in a message.
+fn shown(c: char) -> String {
+    if c.is_control() { c.escape_debug().to_string() } else { c.to_string() }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.path {
@@ -122,3 +133,14 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_one_line_whatever_they_quote() {
+        let error = Error::input("expected '>' not '\n', then \u{1b}[2J \u{b5}m").at(Path::new("a.tif"));
+        assert_eq!(error.to_string(), r"a.tif: expected '>' not '\n', then \u{1b}[2J µm");
+    }
+}
