@@ -27,7 +27,7 @@ pub(super) fn groups(store: &Path) -> Vec<String> {
         let depth = if group.is_empty() { 0 } else { group.split('/').count() };
         let below = |path: PathBuf| {
             let name = path.file_name()?.to_string_lossy().into_owned();
-            is_store(&path).then(|| if group.is_empty() { name } else { format!("{group}/{name}") })
+            is_group(&path).then(|| if group.is_empty() { name } else { format!("{group}/{name}") })
         };
         if depth < DEEPEST {
             let here = found.len();
@@ -36,6 +36,16 @@ pub(super) fn groups(store: &Path) -> Vec<String> {
         }
     }
     found
+}
+
+/// True for a folder that holds images, false for an array, a level of one.
+fn is_group(path: &Path) -> bool {
+    let is_array = || {
+        let text = fs::read(path.join("zarr.json")).ok()?;
+        let document: serde_json::Value = serde_json::from_slice(&text).ok()?;
+        (document["node_type"] == "array").then_some(())
+    };
+    is_store(path) && !path.join(".zarray").exists() && is_array().is_none()
 }
 
 fn entries(folder: &Path) -> Vec<PathBuf> {
