@@ -173,18 +173,16 @@ fn an_image_is_segmented_alike_from_tiff_and_zarr() {
     let ball = Ball::small();
     let bench = Bench::new(&ball);
     let [x, y, z] = ball.geometry.shape.map(|n| n as usize);
-    bench.succeed("segment image.tif --points marks.csv -o tiff.zarr -q");
-    for (number, chunks) in [[1, y, x], [7, 16, 16], [3, 2, 5]].into_iter().enumerate() {
+    let crop = "--crop 3:38,:,1:19";
+    bench.succeed(&format!("segment image.tif --points marks.csv {crop} -o tiff.zarr -q"));
+    let tiff = contents(&bench.path("tiff.zarr"));
+    for (number, chunks) in [[1, y, x], [7, 16, 16]].into_iter().enumerate() {
         let path = bench.path(&format!("image{number}.zarr"));
         let [hx, hy, hz] = ball.geometry.spacing;
         group(&path, 2, "zyx", &scale(&[hz, hy, hx]), &Value::Null);
         plain_array_v2(&path.join("0"), [z, y, x], chunks, &ball.voxels(), "C");
-        for crop in ["", "--crop 3:38,:,1:19"] {
-            bench.succeed(&format!("segment image.tif --points marks.csv {crop} --overwrite -o tiff.zarr -q"));
-            bench.succeed(&format!("segment image{number}.zarr --points marks.csv {crop} --overwrite -o own.zarr -q"));
-            let [tiff, own] = ["tiff.zarr", "own.zarr"].map(|name| contents(&bench.path(name)));
-            same(&tiff, &own, &format!("chunks {chunks:?} {crop}"));
-        }
+        bench.succeed(&format!("segment image{number}.zarr --points marks.csv {crop} --overwrite -o own.zarr -q"));
+        same(&tiff, &contents(&bench.path("own.zarr")), &format!("chunks {chunks:?}"));
     }
 }
 
@@ -338,9 +336,9 @@ fn metadata_that_lie_cost_nothing() {
     fails("chunks of more than 2 GiB");
     // The chunk holds less than it says, and then more.
     written(&|node| node["chunk_grid"]["configuration"]["chunk_shape"] = json!([20, 24, 1 << 19]));
-    fails("where 503316480 are due");
+    fails("expected 503316480");
     written(&|node| node["chunk_grid"]["configuration"]["chunk_shape"] = json!([1, 1, 28]));
-    fails("where 56 are due");
+    fails("expected 56");
     written(&|node| node["codecs"][1] = json!({"name": "lzma"}));
     fails("lzma");
     written(&|node| node["data_type"] = json!("complex64"));
