@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::args::ResourceArgs;
+use super::pages_args::PagesArgs;
 use super::values::{
     Output, parse_method, parse_neighbours, parse_spacing, parse_triple, parse_whole_triple, solvers_help,
 };
@@ -61,6 +62,8 @@ pub(super) struct GridArgs {
     /// Distance between voxel centres of label volumes and of --like, in place of what the file says
     #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
     pub(super) image_spacing: Option<[f64; 3]>,
+    #[command(flatten)]
+    pub(super) pages: PagesArgs,
 }
 
 /// How distance is computed.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::console::Console;
-use super::distance_args::DistanceJobArgs;
+use super::distance_args::{DistanceJobArgs, GridArgs};
 use super::grid::check_spacing;
 use super::input::open_stack;
 use super::text::grouped;
@@ -13,7 +13,6 @@ use crate::grid::{DataSets, Geometry, TriangleMesh, refuse_too_many};
 use crate::io::label_volume::{LabelVolume, is_label_volume};
 use crate::io::ome_zarr::is_store;
 use crate::io::sources::{Source, read_source};
-use crate::io::stacks::Select;
 use crate::pipeline::label_borders::label_borders;
 
 /// What was read.
@@ -30,7 +29,7 @@ pub(super) fn read_sets(args: &DistanceJobArgs, console: &Console, cancel: &Canc
     for path in &args.sources {
         let is_volume = is_label_volume(path);
         if is_volume && !args.choice.signed {
-            let volume = open_volume(path, args.job.grid.image_spacing, console)?;
+            let volume = open_volume(path, &args.job.grid, console)?;
             add_labels(&mut read.sets, path, &volume, console, cancel)?;
             read.volume.get_or_insert_with(|| volume.geometry().clone());
         } else if is_volume {
@@ -56,15 +55,19 @@ fn without_inside(what: &str) -> Error {
     Error::input(format!("holds {what}, which have no inside here; --signed needs triangle meshes"))
 }
 
-fn open_volume(path: &Path, spacing: Option<[f64; 3]>, console: &Console) -> Result<LabelVolume> {
+fn open_volume(path: &Path, grid: &GridArgs, console: &Console) -> Result<LabelVolume> {
+    let spacing = grid.image_spacing;
     if is_store(path) {
+        if grid.pages.is_given() {
+            return Err(Error::usage("is a store; --axes and --image-index are for TIFF files").at(path));
+        }
         let mut volume = LabelVolume::of_store(path)?;
         if let Some(spacing) = spacing {
             volume.set_spacing(spacing);
         }
         return Ok(volume);
     }
-    let stack = open_stack(path, Select::default(), spacing)?;
+    let stack = open_stack(path, grid.pages.select(0, 0), spacing)?;
     for note in &stack.notes {
         console.note(note);
     }

@@ -4,7 +4,6 @@ use super::distance_args::GridArgs;
 use super::input::open_stack;
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
-use crate::io::stacks::Select;
 
 /// Voxels along the longest side where no spacing is given.
 const DEFAULT_VOXELS: f64 = 256.0;
@@ -15,7 +14,7 @@ const DEFAULT_PADDING: f64 = 1.0 / 6.0;
 /// The grid that was asked for; `bounds` is the box of all sources. Adds what the user should know to `notes`.
 pub(super) fn grid(args: &GridArgs, (low, high): ([f64; 3], [f64; 3]), notes: &mut Vec<String>) -> Result<Geometry> {
     if let Some(image) = &args.like {
-        let stack = open_stack(image, Select { channel: 0, time: 0 }, args.image_spacing)?;
+        let stack = open_stack(image, args.pages.select(0, 0), args.image_spacing)?;
         notes.extend(stack.notes);
         return Ok(stack.geometry);
     }
@@ -91,9 +90,17 @@ pub(super) fn check_counts(counts: [f64; 3]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::pages_args::PagesArgs;
 
-    const NOTHING: GridArgs =
-        GridArgs { spacing: None, padding: None, origin: None, shape: None, like: None, image_spacing: None };
+    const NOTHING: GridArgs = GridArgs {
+        spacing: None,
+        padding: None,
+        origin: None,
+        shape: None,
+        like: None,
+        image_spacing: None,
+        pages: PagesArgs::NOTHING,
+    };
 
     fn around(args: &GridArgs, low: [f64; 3], high: [f64; 3]) -> Result<Geometry> {
         grid(args, (low, high), &mut Vec::new())

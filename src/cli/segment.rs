@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
-use crate::io::stacks::{Select, Stack};
+use crate::io::stacks::Stack;
 use crate::pipeline::marks::{split, split_and_seed};
 use crate::pipeline::segment::{
     Estimate, Grids, Guides, ImageModel, ObjectReport, Outcome, Refused, SegmentSettings, check_lengths, check_seed,
@@ -86,7 +86,7 @@ impl Job {
         args.output.picture.as_deref().map(picture::check_name).transpose()?;
         let resources = config::resources(&args.resources, args.output.store())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
-        let select = Select { channel: args.picture.channel, time: args.picture.time };
+        let select = args.picture.pages.select(args.picture.channel, args.picture.time);
         let opened = open_stack(&args.image, select, spacing)?;
         opened.notes.iter().for_each(|note| console.note(note));
         let crop = crop_box(args.picture.crop, opened.geometry.shape)?;
@@ -309,6 +309,8 @@ impl Job {
             seeds: self.args.seed.iter().map(|s| [s.centre[0], s.centre[1], s.centre[2], s.radius]).collect(),
             output: output.store().map(|path| path.display().to_string()),
             channel: picture.channel,
+            axes: picture.pages.axes.map(|axes| axes.to_string()),
+            image_index: picture.pages.image_index,
             time: picture.time,
             crop_xyz: crop_xyz(&self.crop),
             image_type: outcome.element.name(),

@@ -35,7 +35,10 @@ mod layering;
 mod outlines;
 #[cfg(target_os = "linux")]
 mod signals;
+mod slice_folders;
+mod tiff_axes;
 mod tiff_derived;
+mod tiff_dialects;
 mod tiff_handmade;
 mod tiff_hostile;
 mod zarr_readers;

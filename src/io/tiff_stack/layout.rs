@@ -4,34 +4,7 @@ use crate::error::Result;
 
 use super::ifd::TiffFile;
 use super::page::Page;
-
-/// An axis along which planes follow each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Axis {
-    Channel,
-    Z,
-    Time,
-}
-
-impl Axis {
-    /// The axis of an OME or ImageJ letter.
-    pub(super) fn from_letter(letter: char) -> Option<Self> {
-        match letter {
-            'C' => Some(Self::Channel),
-            'Z' => Some(Self::Z),
-            'T' => Some(Self::Time),
-            _ => None,
-        }
-    }
-
-    fn letter(self) -> char {
-        match self {
-            Self::Channel => 'C',
-            Self::Z => 'Z',
-            Self::Time => 'T',
-        }
-    }
-}
+pub(super) use crate::io::page_axes::Axis;
 
 /// The number of planes along each axis, fastest axis first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +24,11 @@ impl Dimensions {
     /// Planes in all; `None` past 64 bits.
     pub(super) fn count(&self) -> Option<u64> {
         self.0.iter().try_fold(1_u64, |product, &(_, n)| product.checked_mul(n))
+    }
+
+    /// The axes of more than one plane, slowest first.
+    pub(super) fn long(&self) -> Vec<(Axis, u64)> {
+        self.0.iter().rev().copied().filter(|&(_, n)| n > 1).collect()
     }
 
     /// The number of the plane, counted from 0, in the order of the file.
@@ -99,6 +77,8 @@ pub(super) struct Description {
     pub(super) unit: Option<String>,
     /// True when the planes may follow the first one without pages of their own.
     pub(super) single_page: bool,
+    /// Why pages cannot be taken for planes of rows, unless the user says what they are.
+    pub(super) objection: Option<String>,
     /// What the user should know about the choice that was made.
     pub(super) notes: Vec<String>,
 }
@@ -106,7 +86,15 @@ pub(super) struct Description {
 impl Description {
     /// A file that says nothing about its planes.
     pub(super) fn none() -> Self {
-        Self { dimensions: None, runs: None, spacing: [None; 3], unit: None, single_page: false, notes: Vec::new() }
+        Self {
+            dimensions: None,
+            runs: None,
+            spacing: [None; 3],
+            unit: None,
+            single_page: false,
+            objection: None,
+            notes: Vec::new(),
+        }
     }
 
     /// The page of every wanted plane, counted from 0.
@@ -118,7 +106,7 @@ impl Description {
         if let Some(beyond) = pages.iter().find(|&&page| page >= available) {
             return Err(file.error(format!(
                 "the description places a plane on page {} but the file holds {available} pages: it is truncated or \
-                 was edited",
+                 was edited; give --axes zyx to read the pages that are there as slices",
                 beyond.saturating_add(1)
             )));
         }
@@ -136,7 +124,11 @@ fn pages_of_runs(file: &TiffFile, runs: &[Run], planes: &[u64]) -> Result<Vec<u6
         let after = sorted.partition_point(|(_, run)| run.plane <= plane);
         let holder = sorted[..after].last().filter(|(_, run)| plane - run.plane < run.count);
         let Some((_, run)) = holder else {
-            return Err(file.error(format!("the OME-XML names no page for plane {}", plane + 1)));
+            return Err(file.error(format!(
+                "the OME-XML names no page for plane {}: the file is truncated or was edited; give --axes zyx to read \
+                 the pages that are there as slices",
+                plane + 1
+            )));
         };
         pages.push(run.page.saturating_add(plane - run.plane));
     }
