@@ -97,40 +97,38 @@ impl Description {
         }
     }
 
-    /// The page of every wanted plane, counted from 0.
-    pub(super) fn pages(&self, file: &TiffFile, planes: &[u64], available: u64) -> Result<Vec<u64>> {
-        let pages = match &self.runs {
-            None => planes.to_vec(),
-            Some(runs) => pages_of_runs(file, runs, planes)?,
+    /// The page of every wanted plane, counted from 0, of `total` planes and `available` pages.
+    pub(super) fn pages(&self, file: &TiffFile, planes: &[u64], total: u64, available: u64) -> Result<Vec<u64>> {
+        let pages: Vec<Option<u64>> = match &self.runs {
+            None => planes.iter().copied().map(Some).collect(),
+            Some(runs) => pages_of_runs(runs, planes),
         };
-        if let Some(beyond) = pages.iter().find(|&&page| page >= available) {
-            return Err(file.error(format!(
-                "the description places a plane on page {} but the file holds {available} pages: it is truncated or \
-                 was edited; give --axes zyx to read the pages that are there as slices",
-                beyond.saturating_add(1)
-            )));
-        }
-        Ok(pages)
+        let found = pages.iter().map(|page| page.filter(|&page| page < available)).collect::<Option<Vec<u64>>>();
+        found.ok_or_else(|| {
+            let lost = planes.iter().zip(&pages).find(|(_, page)| page.is_none_or(|page| page >= available));
+            let (plane, page) = lost.map_or((0, None), |(&plane, &page)| (plane, page));
+            let place = match page {
+                Some(page) => format!("places plane {} on page {}", plane + 1, page.saturating_add(1)),
+                None => format!("names no page for plane {}", plane + 1),
+            };
+            let promise = if total > available { format!("promises {total} planes but the file holds {available} pages, and ") } else { String::new() };
+            file.error(format!(
+                "the description {promise}{place}: the file is truncated or was edited; give --axes zyx to read the pages that \
+                 are there as slices"
+            ))
+        })
     }
 }
 
-/// The pages that hold `planes`; where runs overlap the later one counts.
-fn pages_of_runs(file: &TiffFile, runs: &[Run], planes: &[u64]) -> Result<Vec<u64>> {
+/// The pages that hold `planes`, none where no run does; where runs overlap the later one counts.
+fn pages_of_runs(runs: &[Run], planes: &[u64]) -> Vec<Option<u64>> {
     let mut sorted: Vec<(usize, Run)> = runs.iter().copied().enumerate().collect();
     sorted.sort_by_key(|(place, run)| (run.plane, *place));
-    let mut pages = Vec::with_capacity(planes.len());
-    for &plane in planes {
+    let page_of = |&plane: &u64| {
         // The last run that begins at or before the plane; runs that overlap otherwise are no valid OME-TIFF.
         let after = sorted.partition_point(|(_, run)| run.plane <= plane);
         let holder = sorted[..after].last().filter(|(_, run)| plane - run.plane < run.count);
-        let Some((_, run)) = holder else {
-            return Err(file.error(format!(
-                "the OME-XML names no page for plane {}: the file is truncated or was edited; give --axes zyx to read \
-                 the pages that are there as slices",
-                plane + 1
-            )));
-        };
-        pages.push(run.page.saturating_add(plane - run.plane));
-    }
-    Ok(pages)
+        holder.map(|(_, run)| run.page.saturating_add(plane - run.plane))
+    };
+    planes.iter().map(page_of).collect()
 }

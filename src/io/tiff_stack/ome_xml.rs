@@ -73,16 +73,14 @@ pub(super) fn parse(
         let name = elsewhere.attribute("MetadataFile").unwrap_or("another file");
         return Err(format!("its OME-XML lies in {name}; save the stack as one OME-TIFF file"));
     }
-    let images: Vec<(Node, ImageSummary)> = root
-        .children()
-        .filter(|n| n.tag_name().name() == "Image")
-        .filter_map(|image| Some((child(image, "Pixels")?, summary(image)?)))
-        .collect();
+    let images: Vec<Node> = root.children().filter(|n| n.tag_name().name() == "Image").collect();
     let wanted = image.unwrap_or(0);
-    let Some(&(pixels, _)) = images.get(wanted as usize) else {
-        return Err(match images.len() {
-            0 => "the OME-XML describes no image (element Pixels)".to_string(),
-            held => format!("image {wanted} was asked for with --image-index but there are {held}, counted from 0"),
+    let Some(pixels) = images.get(wanted as usize).and_then(|image| child(*image, "Pixels")) else {
+        let held = images.len();
+        return Err(if held == 0 || held > wanted as usize {
+            "the OME-XML describes no image (element Pixels)".to_string()
+        } else {
+            format!("image {wanted} was asked for with --image-index but there are {held}, counted from 0")
         });
     };
     let begin = pixels.children().find(|n| n.tag_name().name() == "TiffData");
@@ -92,19 +90,19 @@ pub(super) fn parse(
     let runs = runs(root, pixels, &dimensions, &page, pages)?;
     let mut description = Description { dimensions: Some(dimensions), runs: Some(runs), ..Description::none() };
     add_spacing(pixels, &mut description);
-    let images: Vec<ImageSummary> = images.into_iter().map(|(_, summary)| summary).collect();
+    let images: Vec<ImageSummary> = images.into_iter().map(summary).collect();
     Ok(Parsed { description, page, images })
 }
 
 /// Name and size of an image; sizes that are none count as 0 here.
-fn summary(image: Node) -> Option<ImageSummary> {
-    let pixels = child(image, "Pixels")?;
-    let size = |name: &str| whole_number(pixels, name).ok().flatten().unwrap_or(0);
+fn summary(image: Node) -> ImageSummary {
+    let pixels = child(image, "Pixels");
+    let size = |name: &str| pixels.and_then(|pixels| whole_number(pixels, name).ok().flatten()).unwrap_or(0);
     let name = image.attribute("Name").map(str::trim).filter(|name| !name.is_empty());
-    Some(ImageSummary {
+    ImageSummary {
         name: name.map(|name| name.chars().filter(|c| !c.is_control()).take(40).collect()),
         shape: [size("SizeX"), size("SizeY"), size("SizeZ")],
-    })
+    }
 }
 
 fn refuse_long_tags(text: &str) -> Result<(), String> {

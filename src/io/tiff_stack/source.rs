@@ -132,7 +132,7 @@ pub(super) fn open_file(path: &Path, select: Select) -> Result<Opened> {
     } else {
         look_at_count(&file, &mut description, total, available, images.len())?;
         let planes: Vec<u64> = (0..dimensions.size(Axis::Z)).map(|z| order.plane(z)).collect();
-        let pages = description.pages(&file, &planes, available)?;
+        let pages = description.pages(&file, &planes, total, available)?;
         let places: Vec<PagePlace> = pages.iter().map(|&page| places[page as usize]).collect();
         refuse_odd_pages(&file, first.kind, &places, description.runs.is_none())?;
         Source::Pages {
