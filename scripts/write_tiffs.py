@@ -13,9 +13,15 @@ from pathlib import Path
 import numpy as np
 import tifffile
 
-METRES = {"um": 1e-6, "nm": 1e-9, "mm": 1e-3, "\u00b5m": 1e-6, "cm": 1e-2, "inch": 0.0254, "\\u00B5m": 1e-6, "micron": 1e-6, "A": 1e-10}
-NAMES = {"um": "micrometer", "nm": "nanometer", "mm": "millimeter", "\u00b5m": "micrometer", "cm": "centimeter", "inch": "inch",
-         "\\u00B5m": "micrometer", "micron": "micrometer"}
+METRES = {"um": 1e-6, "nm": 1e-9, "mm": 1e-3, "\u00b5m": 1e-6, "\\u00B5m": 1e-6, "micron": 1e-6}
+NAMES = {
+    "um": "micrometer",
+    "nm": "nanometer",
+    "mm": "millimeter",
+    "\u00b5m": "micrometer",
+    "\\u00B5m": "micrometer",
+    "micron": "micrometer",
+}
 
 
 def pick(rng, values):
@@ -79,8 +85,8 @@ def write(rng, path):
     types = ["u1", "u2", "f4"] if kind == "imagej" else ["u1", "u2", "u4", "i1", "i2", "f4", "f8"]
     dtype = np.dtype(pick(rng, types))
     order = "TZC" if kind == "imagej" else pick(rng, ["TZC", "TCZ", "CTZ", "CZT", "ZCT", "ZTC"])
-    size = {"T": int(rng.integers(1, 4)), "C": int(rng.integers(1, 4)), "Z": int(rng.integers(2, 6)),
-            "Y": int(rng.integers(3, 40)), "X": int(rng.integers(5, 40))}
+    limits = {"T": (1, 4), "C": (1, 4), "Z": (2, 6), "Y": (3, 40), "X": (5, 40)}
+    size = {axis: int(rng.integers(*limit)) for axis, limit in limits.items()}
     if kind == "plain":
         order, size["T"], size["C"] = "Z", 1, 1
     data = content(rng, dtype, [size[axis] for axis in order + "YX"])
@@ -95,8 +101,17 @@ def write(rng, path):
     wide = data.reshape([1] * len(full) + list(data.shape))
     wide = wide.transpose([("".join(full) + order + "YX").index(axis) for axis in "CTZYX"])
     path.with_suffix(".f64").write_bytes(np.ascontiguousarray(wide, dtype="<f8").tobytes())
-    return {"file": path.name, "channels": size["C"], "times": size["T"], "shape": [size["X"], size["Y"], size["Z"]],
-            "spacing": spacing, "unit": unit, "kind": kind, "options": str(options), "order": order, "keys": str(keys)}
+    shape = [size[axis] for axis in "XYZ"]
+    told = {"kind": kind, "order": order, "keys": str(keys), "options": str(options)}
+    return {
+        "file": path.name,
+        "channels": size["C"],
+        "times": size["T"],
+        "shape": shape,
+        "spacing": spacing,
+        "unit": unit,
+        **told,
+    }
 
 
 def main():
