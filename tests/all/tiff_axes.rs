@@ -137,6 +137,11 @@ fn pages_of_several_sizes_are_images() {
     fs::write(&path, tiff_file(&[series(0, 2), page(1), series(2, 3), page(3), page(4)], false)).unwrap();
     assert_eq!(planes(&path, Select::default()).1, [0, 1]);
     assert_eq!(planes(&path, Select { image: Some(1), ..Select::default() }).1, [2, 3, 4]);
+    // Pages that were added one by one are slices.
+    let alone = |n: u8| page(n).with(270, Value::Text("{\"shape\": [3, 4]}".into()));
+    fs::write(&path, tiff_file(&[alone(0), alone(1), alone(2)], false)).unwrap();
+    let (info, found) = planes(&path, Select::default());
+    assert!(found == [0, 1, 2] && info.notes[0].contains("each of the 3 pages"), "{found:?} {:?}", info.notes);
 }
 
 #[test]

@@ -86,6 +86,9 @@ fn of_pages(file: &TiffFile, shaped: bool, all: &[PagePlace], image: Option<u32>
         }
     }
     let mut groups = if shaped { series(file, all)? } else { kinds(file, all)? };
+    if image.is_none() && groups.len() == all.len() && kinds(file, all)?.len() == 1 {
+        return pages_one_by_one(file, all);
+    }
     let mut images = Vec::with_capacity(groups.len());
     for group in &groups {
         images.push(summary(file, group)?);
@@ -104,6 +107,17 @@ fn of_pages(file: &TiffFile, shaped: bool, all: &[PagePlace], image: Option<u32>
         description.dimensions = None;
     }
     Ok(Chosen { first, description, places, images })
+}
+
+/// Pages of one kind that were added one after the other, each described as an array of its own.
+fn pages_one_by_one(file: &TiffFile, all: &[PagePlace]) -> Result<Chosen> {
+    let (first, mut description) = describe(file, all)?;
+    description.dimensions = None;
+    description.notes.push(format!(
+        "each of the {} pages is called an image of its own; they are read as slices; --image-index N picks one",
+        all.len()
+    ));
+    Ok(Chosen { first, description, places: all.to_vec(), images: Vec::new() })
 }
 
 /// The series of `tifffile`, each of which begins at a page with the shape of an array.
