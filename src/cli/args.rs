@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::distance_args::DistanceJobArgs;
 use super::middle_args::MiddleArgs;
+use super::pages_args::PagesArgs;
 use super::reconstruct_args::ReconstructArgs;
 use super::values::{
     Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
@@ -99,6 +100,8 @@ pub(super) struct ImageArgs {
     /// Resolution of an OME-Zarr image, 0 the finest
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) level: u32,
+    #[command(flatten)]
+    pub(super) pages: PagesArgs,
     /// Part of the image in voxels, ends excluded; an end left out is the image's [default: all of it]
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = parse_crop, allow_hyphen_values = true)]
     pub(super) crop: Option<Crop>,
@@ -277,6 +280,8 @@ pub(super) struct MeasureArgs {
 pub(super) struct InfoArgs {
     /// TIFF stack, folder of slices, border points (CSV, XYZ, PLY), OME-Zarr or OUT.zarr
     pub(super) file: PathBuf,
+    #[command(flatten)]
+    pub(super) pages: PagesArgs,
     /// Print JSON
     #[arg(long)]
     pub(super) json: bool,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::args::ResourceArgs;
+use super::pages_args::PagesArgs;
 use super::values::{
     Output, parse_method, parse_neighbours, parse_spacing, parse_triple, parse_whole_triple, solvers_help,
 };
@@ -70,6 +71,8 @@ pub(super) struct GridArgs {
     /// Resolution of OME-Zarr label volumes and of --like, 0 the finest
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) level: u32,
+    #[command(flatten)]
+    pub(super) pages: PagesArgs,
 }
 
 /// How distance is computed.

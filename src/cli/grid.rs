@@ -62,7 +62,7 @@ fn exact(shape: [i64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Geometr
 impl GridArgs {
     /// Which part of label volumes and of the image of --like is read.
     pub(super) fn select(&self) -> Select {
-        Select { channel: self.channel, time: self.time, level: self.level, ..Select::default() }
+        self.pages.select(self.channel, self.time, self.level)
     }
 
     /// Whether anything was said of where the grid lies.
@@ -96,6 +96,7 @@ pub(super) fn check_counts(counts: [f64; 3]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::pages_args::PagesArgs;
 
     const NOTHING: GridArgs = GridArgs {
         spacing: None,
@@ -107,6 +108,7 @@ mod tests {
         channel: 0,
         time: 0,
         level: 0,
+        pages: PagesArgs::NOTHING,
     };
 
     fn around(args: &GridArgs, low: [f64; 3], high: [f64; 3]) -> Result<Geometry> {

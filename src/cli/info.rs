@@ -24,10 +24,13 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     if !path.exists() && !is_standard_input(path) {
         return Err(Error::input("there is no such file or folder").at(path));
     }
+    if args.pages.is_given() && (is_store(path) || stacks::format_of(path).is_none()) {
+        return Err(Error::usage("is no TIFF stack; --axes and --image-index are for these").at(path));
+    }
     let (document, lines) = if is_store(path) {
         store(path)?
     } else if let Some(format) = stacks::format_of(path) {
-        stack(path, format)?
+        stack(path, format, args.pages.select(0, 0, 0))?
     } else {
         let (source, points_of, notes) = describe(path)?;
         match source {
@@ -58,8 +61,8 @@ pub(super) fn line(name: &str, value: impl Into<String>) -> (String, String) {
     (name.into(), value.into())
 }
 
-fn stack(path: &Path, format: &stacks::Format) -> Result<(Value, Lines)> {
-    let stack = (format.open)(path, Select::default())?;
+fn stack(path: &Path, format: &stacks::Format, select: Select) -> Result<(Value, Lines)> {
+    let stack = (format.open)(path, select)?;
     let info = stack.info();
     let [x, y, z] = info.shape;
     let unit = info.unit.clone().unwrap_or_default();
@@ -74,11 +77,17 @@ fn stack(path: &Path, format: &stacks::Format) -> Result<(Value, Lines)> {
         line("type", &*info.file_type),
         line("compression", &*info.compression),
     ];
+    let images = stack.images();
+    if images.len() > 1 {
+        lines.push(line("images", images.len().to_string()));
+        lines.push(line("image", select.image.unwrap_or(0).to_string()));
+    }
     lines.extend(info.notes.iter().map(|note| line("note", &**note)));
     let document = json!({
         "kind": "stack", "shape_xyz": info.shape, "spacing_xyz": info.spacing, "unit": info.unit,
         "channels": info.channels, "times": info.times, "axes": info.axes, "type": info.file_type,
-        "compression": info.compression, "notes": info.notes,
+        "compression": info.compression, "notes": info.notes, "image_index": select.image.unwrap_or(0),
+        "images": images.iter().map(|image| json!({ "name": image.name, "shape_xyz": image.shape })).collect::<Vec<_>>(),
     });
     Ok((document, lines))
 }

@@ -27,12 +27,7 @@ pub(super) fn open_stack(path: &Path, select: Select, spacing: Option<[f64; 3]>)
     let stack = stacks::open_stack(path, select)?;
     let info = stack.info();
     if let Some(axis) = (0..3).find(|&a| info.shape[a] < 2) {
-        return Err(Error::input(format!(
-            "has one voxel along {}: a surface needs a 3-D stack; name the file with all planes, or the folder that \
-             holds them",
-            AXES[axis]
-        ))
-        .at(path));
+        return Err(Error::input(flat(stack.as_ref(), select, axis)).at(path));
     }
     if spacing.is_none() {
         check_told(path, info)?;
@@ -58,6 +53,27 @@ fn check_told(path: &Path, info: &StackInfo) -> Result<()> {
         return Err(Error::input(format!("does not tell the spacing of its voxels; {give}")).at(path));
     }
     Ok(())
+}
+
+/// Why a stack that has one voxel along an axis is none, and which flag finds the others.
+fn flat(stack: &dyn Stack, select: Select, axis: usize) -> String {
+    let (info, images, axis) = (stack.info(), stack.images(), AXES[axis]);
+    let read = select.image.unwrap_or(0);
+    let other = images.iter().enumerate().find(|(_, image)| image.shape.iter().all(|&n| n > 1));
+    // One of another time or channel is no slice of a stack that there is.
+    let told = info.notes.iter().find(|note| axis == "z" && note.contains("--axes"));
+    match (other, told) {
+        (Some((n, image)), _) if n as u32 != read => format!(
+            "image {read} of {} has one voxel along {axis}: a surface needs a 3-D stack; image {n} is one ({image}), give \
+             --image-index {n}",
+            images.len()
+        ),
+        (_, Some(note)) => format!("has one voxel along z: {note}"),
+        _ => format!(
+            "has one voxel along {axis}: a surface needs a 3-D stack; name the file with all planes, or the folder that \
+             holds them"
+        ),
+    }
 }
 
 /// The file's spacing; what it does not tell is guessed, with a note.

@@ -23,6 +23,7 @@ mod middle;
 mod middle_args;
 mod neighbours_report;
 mod outputs;
+mod pages_args;
 mod picture;
 mod reconstruct;
 mod reconstruct_args;

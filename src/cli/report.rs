@@ -47,6 +47,9 @@ pub(super) struct Settings {
     pub(super) channel: u32,
     pub(super) time: u32,
     pub(super) level: u32,
+    /// What the pages were said to be; null when it is the file's word.
+    pub(super) axes: Option<String>,
+    pub(super) image_index: Option<u32>,
     /// First voxel and one past the last, x, y, z.
     pub(super) crop_xyz: [[i64; 2]; 3],
     pub(super) image_type: &'static str,

@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
-use crate::io::stacks::{Select, Stack};
+use crate::io::stacks::Stack;
 use crate::pipeline::marks::{split, split_and_seed};
 use crate::pipeline::segment::{
     Estimate, Grids, Guides, ImageModel, ObjectReport, Outcome, Refused, SegmentSettings, check_lengths, check_seed,
@@ -89,7 +89,7 @@ impl Job {
         let resources = config::resources(&args.resources, args.output.store())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
         let picture = &args.picture;
-        let select = Select { channel: picture.channel, time: picture.time, level: picture.level, ..Select::default() };
+        let select = picture.pages.select(picture.channel, picture.time, picture.level);
         let opened = open_stack(&args.image, select, spacing)?;
         opened.notes.iter().for_each(|note| console.note(note));
         let crop = crop_box(args.picture.crop, opened.geometry.shape)?;
@@ -310,6 +310,8 @@ impl Job {
             seeds: self.args.seed.iter().map(|s| [s.centre[0], s.centre[1], s.centre[2], s.radius]).collect(),
             output: output.store().map(|path| path.display().to_string()),
             channel: picture.channel,
+            axes: picture.pages.axes.map(|axes| axes.to_string()),
+            image_index: picture.pages.image_index,
             time: picture.time,
             level: picture.level,
             crop_xyz: crop_xyz(&self.crop),

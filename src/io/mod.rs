@@ -7,6 +7,7 @@ mod mesh;
 pub mod mesh_export;
 pub mod mesh_ply;
 pub mod ome_zarr;
+pub mod page_axes;
 mod ply;
 pub mod png;
 pub mod points;

@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::ome_zarr::is_store;
+use super::page_axes::PageAxes;
 use super::tiff_stack::{self, TiffStack};
 use super::zarr_image::ZarrImage;
 use crate::error::{Error, Result};
@@ -37,7 +38,7 @@ pub struct StackInfo {
     pub notes: Vec<String>,
 }
 
-/// Which part of a file with several channels or time points to read, counted from 0.
+/// Which part of a file with several channels, time points or images to read, counted from 0, and what its planes are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Select {
     /// The channel.
@@ -48,12 +49,36 @@ pub struct Select {
     pub level: u32,
     /// The image; the first where none is named.
     pub image: Option<u32>,
+    /// What the pages are, in place of what the file says.
+    pub axes: Option<PageAxes>,
+}
+
+/// One of several images in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ImageSummary {
+    /// What the file calls it.
+    pub name: Option<String>,
+    /// Voxels along x, y, z of one channel at one time.
+    pub shape: [u64; 3],
+}
+
+impl std::fmt::Display for ImageSummary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [x, y, z] = self.shape;
+        let name = self.name.as_ref().map_or(String::new(), |name| format!("\"{name}\", "));
+        write!(f, "{name}{x} x {y} x {z}")
+    }
 }
 
 /// One channel at one time of a stack that was opened.
 pub trait Stack: VolumeSource {
     /// What the stack is.
     fn info(&self) -> &StackInfo;
+
+    /// The images of the file, where it holds several.
+    fn images(&self) -> &[ImageSummary] {
+        &[]
+    }
 }
 
 /// A format of stacks.
@@ -113,6 +138,9 @@ pub fn open_stack(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
 }
 
 fn open_zarr(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
+    if let Some(axes) = select.axes {
+        return Err(Error::usage(format!("names its axes itself; --axes {axes} is for TIFF files")).at(path));
+    }
     Ok(Box::new(ZarrImage::open(path, select)?))
 }
 

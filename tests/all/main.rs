@@ -43,8 +43,11 @@ mod layering;
 mod outlines;
 #[cfg(target_os = "linux")]
 mod signals;
+mod slice_folders;
 mod terminal;
+mod tiff_axes;
 mod tiff_derived;
+mod tiff_dialects;
 mod tiff_handmade;
 mod tiff_hostile;
 mod zarr_input;

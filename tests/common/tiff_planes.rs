@@ -28,7 +28,12 @@ pub(crate) fn plane(stack: &TiffStack, z: i64) -> Result<Vec<f64>> {
 
 /// A channel at a time of a file: what it says of itself, and all voxels, x fastest.
 pub(crate) fn stack(path: &Path, channel: u32, time: u32) -> Result<(StackInfo, Vec<f64>)> {
-    let stack = TiffStack::open(path, Select { channel, time, ..Select::default() })?;
+    selected(path, Select { channel, time, ..Select::default() })
+}
+
+/// What was chosen of a file: what it says of itself, and all voxels, x fastest.
+pub(crate) fn selected(path: &Path, select: Select) -> Result<(StackInfo, Vec<f64>)> {
+    let stack = TiffStack::open(path, select)?;
     let mut voxels = Vec::new();
     for z in 0..stack.shape()[2] {
         voxels.extend(plane(&stack, z)?);

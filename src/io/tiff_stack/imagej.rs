@@ -1,6 +1,6 @@
 //! The `ImageDescription` that ImageJ writes: lines of `key=value` after `ImageJ=version`.
 //!
-//! Keys as in ImageJ's `TiffDecoder`/`FileOpener`: `images, channels, slices, frames, spacing, unit`. Planes run
+//! Keys as in ImageJ's `TiffDecoder`/`FileOpener`: `images, channels, slices, frames, spacing, unit, yunit, zunit`. Planes run
 //! channel first, then slice, then frame. The xy spacing lies in the resolution tags, in pixels per unit.
 
 use super::layout::{Axis, Description, Dimensions};
@@ -11,30 +11,30 @@ pub(super) fn is_imagej(text: &str) -> bool {
     text.starts_with("ImageJ=")
 }
 
-/// Reads the description; `pages` is the number of pages in the file, `xy` the pixel size from the resolution tags.
-pub(super) fn parse(text: &str, pages: u64, xy: [Option<f64>; 2]) -> Description {
+/// Whether it names the unit of its lengths.
+pub(super) fn names_unit(text: &str) -> bool {
+    text.lines().any(|line| {
+        line.strip_prefix("unit").is_some_and(|rest| rest.trim_start().trim_start_matches('=').trim() != "")
+    })
+}
+
+/// Reads the description; `pages` is the number of pages in the file, `xy` the pixel size from the resolution tags and
+/// `tagged` the unit that these name, in which everything is where the description names none.
+pub(super) fn parse(text: &str, pages: u64, xy: [Option<f64>; 2], tagged: Option<&str>) -> Description {
     let value =
         |key: &str| text.lines().find_map(|line| line.strip_prefix(key)?.trim_start().strip_prefix('=')).map(str::trim);
     let number = |key: &str| value(key).and_then(|v| v.parse::<u64>().ok()).filter(|&n| n > 0);
-    let mut notes = Vec::new();
-    let unit = units::parse(value("unit").unwrap_or_default());
-    // Without a unit the tags hold 1 pixel per pixel, or a print resolution: nothing that was measured.
-    let physical = |size: f64| unit != Unit::Pixel || size != 1.0;
-    let xy = xy.map(|size| size.filter(|&s| physical(s)));
-    // ImageJ writes negative spacings for stacks that were acquired downwards.
-    let z = value("spacing").and_then(|v| v.parse::<f64>().ok()).map(f64::abs);
-    let z = z.filter(|&s| s.is_finite() && s > 0.0 && physical(s));
-    let name = match unit {
-        Unit::Length(name, _) => Some(name.to_string()),
-        Unit::Pixel => None,
-        Unit::Unknown => {
-            notes.push(format!(
-                "the unit \"{}\" is not known; lengths keep their numbers",
-                value("unit").unwrap_or_default()
-            ));
-            None
-        }
-    };
+    let unit = value("unit").filter(|unit| !unit.is_empty()).or(tagged).unwrap_or_default();
+    // ImageJ names the units of y and z only where they are others.
+    let own = |key: &str| value(key).filter(|own| !own.is_empty()).unwrap_or(unit);
+    let units = [unit, own("yunit"), own("zunit")];
+    let z = value("spacing").and_then(units::size);
+    let sizes = [xy[0], xy[1], z];
+    // Without a unit the tags hold 1 pixel per pixel: nothing that was measured. ImageJ writes a spacing of 0 for one slice.
+    let measured = |size: f64, unit: &str| size != 0.0 && (size != 1.0 || units::parse(unit) != Unit::Pixel);
+    let written = std::array::from_fn(|a| sizes[a].filter(|&s| measured(s, units[a])).map(|s| (s, units[a])));
+    let spacing = units::spacing(written);
+    let mut notes = spacing.notes;
     let images = number("images").unwrap_or(pages);
     let dimensions = dimensions(images, [number("channels"), number("slices"), number("frames")]);
     let apart = number("channels").is_some_and(|c| c > 1) || number("frames").is_some_and(|t| t > 1);
@@ -44,11 +44,11 @@ pub(super) fn parse(text: &str, pages: u64, xy: [Option<f64>; 2]) -> Description
     }
     Description {
         dimensions: Some(dimensions),
-        runs: None,
-        spacing: [xy[0], xy[1], z],
-        unit: name,
+        spacing: spacing.sizes,
+        unit: spacing.unit,
         single_page: true,
         notes,
+        ..Description::none()
     }
 }
 
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn hyperstack_with_escaped_unit() {
         let text = "ImageJ=1.53f\nimages=84\nchannels=2\nslices=14\nframes=3\nunit=\\u00B5m\nspacing=-0.4\nmin=2.0\n";
-        let d = parse(text, 84, [Some(0.1), Some(0.2)]);
+        let d = parse(text, 84, [Some(0.1), Some(0.2)], None);
         assert_eq!(d.dimensions, Some(Dimensions([(Axis::Channel, 2), (Axis::Z, 14), (Axis::Time, 3)])));
         assert_eq!(d.spacing, [Some(0.1), Some(0.2), Some(0.4)]);
         assert_eq!(d.unit.as_deref(), Some("micrometer"));
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn missing_and_contradictory_numbers() {
-        let dims = |text: &str, pages| parse(text, pages, [None; 2]).dimensions;
+        let dims = |text: &str, pages| parse(text, pages, [None; 2], None).dimensions;
         assert_eq!(dims("ImageJ=1\n", 7), Some(Dimensions::only_z(7)));
         assert_eq!(dims("ImageJ=1\nimages=7\nchannels=2\n", 7), Some(Dimensions::only_z(7)));
         let two = Dimensions([(Axis::Channel, 2), (Axis::Z, 3), (Axis::Time, 1)]);
@@ -89,9 +89,26 @@ mod tests {
 
     #[test]
     fn pixels_are_no_spacing() {
-        let d = parse("ImageJ=1\nimages=3\nspacing=1.0\n", 3, [Some(1.0), Some(1.0)]);
+        let d = parse("ImageJ=1\nimages=3\nspacing=1.0\n", 3, [Some(1.0), Some(1.0)], None);
         assert_eq!((d.spacing, d.unit), ([None; 3], None));
-        let d = parse("ImageJ=1\nimages=3\nunit=um\nspacing=1.0\n", 3, [Some(1.0), None]);
+        let d = parse("ImageJ=1\nimages=3\nunit=um\nspacing=1.0\n", 3, [Some(1.0), None], None);
         assert_eq!(d.spacing, [Some(1.0), None, Some(1.0)]);
+    }
+
+    #[test]
+    fn units_of_y_and_z_of_their_own() {
+        let of = |text: &str, tagged| {
+            let d = parse(&format!("ImageJ=1\nimages=3\n{text}"), 3, [Some(0.5), Some(500.0)], tagged);
+            (d.spacing.map(|s| s.map(|s| (s * 1e9).round() / 1e9)), d.unit)
+        };
+        let um = Some("micrometer".to_string());
+        assert_eq!(
+            of("unit=um\nyunit=nm\nzunit=mm\nspacing=0.002\n", None),
+            ([Some(0.5), Some(0.5), Some(2.0)], um.clone())
+        );
+        assert_eq!(of("unit=um\nyunit=nm\nspacing=2\n", None), ([Some(0.5), Some(0.5), Some(2.0)], um.clone()));
+        assert_eq!(of("unit=um\nyunit=nm\nzunit=blob\nspacing=2\n", None), ([Some(0.5), Some(0.5), None], um));
+        let cm = Some("centimeter".to_string());
+        assert_eq!(of("spacing=2,5\n", Some("cm")), ([Some(0.5), Some(500.0), Some(2.5)], cm));
     }
 }

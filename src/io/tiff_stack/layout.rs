@@ -4,34 +4,7 @@ use crate::error::Result;
 
 use super::ifd::TiffFile;
 use super::page::Page;
-
-/// An axis along which planes follow each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Axis {
-    Channel,
-    Z,
-    Time,
-}
-
-impl Axis {
-    /// The axis of an OME or ImageJ letter.
-    pub(super) fn from_letter(letter: char) -> Option<Self> {
-        match letter {
-            'C' => Some(Self::Channel),
-            'Z' => Some(Self::Z),
-            'T' => Some(Self::Time),
-            _ => None,
-        }
-    }
-
-    fn letter(self) -> char {
-        match self {
-            Self::Channel => 'C',
-            Self::Z => 'Z',
-            Self::Time => 'T',
-        }
-    }
-}
+pub(super) use crate::io::page_axes::Axis;
 
 /// The number of planes along each axis, fastest axis first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +24,11 @@ impl Dimensions {
     /// Planes in all; `None` past 64 bits.
     pub(super) fn count(&self) -> Option<u64> {
         self.0.iter().try_fold(1_u64, |product, &(_, n)| product.checked_mul(n))
+    }
+
+    /// The axes of more than one plane, slowest first.
+    pub(super) fn long(&self) -> Vec<(Axis, u64)> {
+        self.0.iter().rev().copied().filter(|&(_, n)| n > 1).collect()
     }
 
     /// The number of the plane, counted from 0, in the order of the file.
@@ -99,6 +77,8 @@ pub(super) struct Description {
     pub(super) unit: Option<String>,
     /// True when the planes may follow the first one without pages of their own.
     pub(super) single_page: bool,
+    /// Why pages cannot be taken for planes of rows, unless the user says what they are.
+    pub(super) objection: Option<String>,
     /// What the user should know about the choice that was made.
     pub(super) notes: Vec<String>,
 }
@@ -106,39 +86,49 @@ pub(super) struct Description {
 impl Description {
     /// A file that says nothing about its planes.
     pub(super) fn none() -> Self {
-        Self { dimensions: None, runs: None, spacing: [None; 3], unit: None, single_page: false, notes: Vec::new() }
+        Self {
+            dimensions: None,
+            runs: None,
+            spacing: [None; 3],
+            unit: None,
+            single_page: false,
+            objection: None,
+            notes: Vec::new(),
+        }
     }
 
-    /// The page of every wanted plane, counted from 0.
-    pub(super) fn pages(&self, file: &TiffFile, planes: &[u64], available: u64) -> Result<Vec<u64>> {
-        let pages = match &self.runs {
-            None => planes.to_vec(),
-            Some(runs) => pages_of_runs(file, runs, planes)?,
+    /// The page of every wanted plane, counted from 0, of `total` planes and `available` pages.
+    pub(super) fn pages(&self, file: &TiffFile, planes: &[u64], total: u64, available: u64) -> Result<Vec<u64>> {
+        let pages: Vec<Option<u64>> = match &self.runs {
+            None => planes.iter().copied().map(Some).collect(),
+            Some(runs) => pages_of_runs(runs, planes),
         };
-        if let Some(beyond) = pages.iter().find(|&&page| page >= available) {
-            return Err(file.error(format!(
-                "the description places a plane on page {} but the file holds {available} pages: it is truncated or \
-                 was edited",
-                beyond.saturating_add(1)
-            )));
-        }
-        Ok(pages)
+        let found = pages.iter().map(|page| page.filter(|&page| page < available)).collect::<Option<Vec<u64>>>();
+        found.ok_or_else(|| {
+            let lost = planes.iter().zip(&pages).find(|(_, page)| page.is_none_or(|page| page >= available));
+            let (plane, page) = lost.map_or((0, None), |(&plane, &page)| (plane, page));
+            let place = match page {
+                Some(page) => format!("places plane {} on page {}", plane + 1, page.saturating_add(1)),
+                None => format!("names no page for plane {}", plane + 1),
+            };
+            let promise = if total > available { format!("promises {total} planes but the file holds {available} pages, and ") } else { String::new() };
+            file.error(format!(
+                "the description {promise}{place}: the file is truncated or was edited; give --axes zyx to read the pages that \
+                 are there as slices"
+            ))
+        })
     }
 }
 
-/// The pages that hold `planes`; where runs overlap the later one counts.
-fn pages_of_runs(file: &TiffFile, runs: &[Run], planes: &[u64]) -> Result<Vec<u64>> {
+/// The pages that hold `planes`, none where no run does; where runs overlap the later one counts.
+fn pages_of_runs(runs: &[Run], planes: &[u64]) -> Vec<Option<u64>> {
     let mut sorted: Vec<(usize, Run)> = runs.iter().copied().enumerate().collect();
     sorted.sort_by_key(|(place, run)| (run.plane, *place));
-    let mut pages = Vec::with_capacity(planes.len());
-    for &plane in planes {
+    let page_of = |&plane: &u64| {
         // The last run that begins at or before the plane; runs that overlap otherwise are no valid OME-TIFF.
         let after = sorted.partition_point(|(_, run)| run.plane <= plane);
         let holder = sorted[..after].last().filter(|(_, run)| plane - run.plane < run.count);
-        let Some((_, run)) = holder else {
-            return Err(file.error(format!("the OME-XML names no page for plane {}", plane + 1)));
-        };
-        pages.push(run.page.saturating_add(plane - run.plane));
-    }
-    Ok(pages)
+        holder.map(|(_, run)| run.page.saturating_add(plane - run.plane))
+    };
+    planes.iter().map(page_of).collect()
 }

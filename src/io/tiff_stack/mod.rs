@@ -8,11 +8,14 @@ mod compression;
 mod decode;
 mod ifd;
 mod imagej;
+mod images;
 mod layout;
+mod names;
 mod ome_xml;
 mod page;
 mod raw;
 mod samples;
+mod sequence;
 mod shaped;
 mod slices;
 mod source;
@@ -27,7 +30,7 @@ use crate::store::{ElementType, PlaneSource, SamplesMut};
 use decode::Scratch;
 use source::{Opened, Source};
 
-pub use super::stacks::{Select, StackInfo};
+pub use super::stacks::{ImageSummary, Select, StackInfo};
 
 /// Whether a file that starts with these bytes is TIFF: classic or big, of either byte order.
 #[must_use]
@@ -40,6 +43,7 @@ pub fn is_tiff(head: [u8; 4]) -> bool {
 pub struct TiffStack {
     path: PathBuf,
     info: StackInfo,
+    images: Vec<ImageSummary>,
     source: Source,
     /// Buffers that wait for the next plane: as many as planes were ever decoded at once.
     pool: Mutex<Vec<Scratch>>,
@@ -52,8 +56,8 @@ impl TiffStack {
     /// When the file is unreadable, damaged, of a kind that is not supported, or has no such channel or time.
     pub fn open(path: &Path, select: Select) -> Result<Self> {
         let opened = if path.is_dir() { slices::open_folder(path, select)? } else { source::open_file(path, select)? };
-        let Opened { info, source } = opened;
-        Ok(Self { path: path.to_path_buf(), info, source, pool: Mutex::new(Vec::new()) })
+        let Opened { info, images, source } = opened;
+        Ok(Self { path: path.to_path_buf(), info, images, source, pool: Mutex::new(Vec::new()) })
     }
 
     /// What the stack is.
@@ -89,6 +93,10 @@ impl TiffStack {
 impl Stack for TiffStack {
     fn info(&self) -> &StackInfo {
         &self.info
+    }
+
+    fn images(&self) -> &[ImageSummary] {
+        &self.images
     }
 }
 

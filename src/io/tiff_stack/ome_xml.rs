@@ -4,7 +4,8 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::layout::{Axis, Description, Dimensions, Run};
 use super::page::Page;
-use super::units::{self, Unit};
+use super::units;
+use crate::io::stacks::ImageSummary;
 
 /// The longest description that is read.
 pub(super) const MAX_TEXT: u64 = 32 << 20;
@@ -29,43 +30,79 @@ fn document(text: &str) -> Result<Document<'_>, String> {
     Document::parse_with_options(text, options).map_err(|e| format!("the OME-XML is malformed: {e}"))
 }
 
-/// The spacing alone, for a file that is one slice of a folder and may describe the whole set. Sets with several
-/// channels or times are refused: names do not tell which file is which.
-pub(super) fn spacing_of_slice(text: &str) -> Result<Description, String> {
+/// The spacing alone, for a file that is one slice of a folder and may describe the whole set. Sets of several channels
+/// or times are refused where the names of the files do not tell which file is which.
+pub(super) fn spacing_of_slice(text: &str, told: [bool; 2]) -> Result<Description, String> {
     let document = document(text)?;
     let mut description = Description::none();
     let pixels = child(document.root_element(), "Image").and_then(|image| child(image, "Pixels"));
     let Some(pixels) = pixels else { return Ok(description) };
     let times = whole_number(pixels, "SizeT")?.unwrap_or(1);
     let files_per_time = pixels.children().filter(|n| n.tag_name().name() == "Channel").count();
-    if times > 1 || files_per_time > 1 {
+    if (times > 1 && !told[1]) || (files_per_time > 1 && !told[0]) {
         return Err(
-            "it is part of an OME set with several channels or times; save that as one OME-TIFF file".to_string()
+            "it is part of an OME set with several channels or times, which the names of the files do not tell; \
+                    save that as one OME-TIFF file, or name the files as in z001_c0_t0.tif"
+                .to_string(),
         );
     }
     add_spacing(pixels, &mut description);
     Ok(description)
 }
 
-/// Reads the description of the first image; `pages` is the number of pages in the file.
-pub(super) fn parse(text: &str, page: &Page, pages: u64) -> Result<Description, String> {
+/// One image of an OME-TIFF, and what others there are.
+#[derive(Debug)]
+pub(super) struct Parsed {
+    pub(super) description: Description,
+    /// The page of its first plane.
+    pub(super) page: Page,
+    pub(super) images: Vec<ImageSummary>,
+}
+
+/// Reads the description of an image, counted from 0; `page_at` reads a page of the file, counted from 0, of which it
+/// has `pages`.
+pub(super) fn parse(
+    text: &str,
+    page_at: &dyn Fn(u64) -> Result<Page, String>,
+    pages: u64,
+    image: Option<u32>,
+) -> Result<Parsed, String> {
     let document = document(text)?;
     let root = document.root_element();
     if let Some(elsewhere) = child(root, "BinaryOnly") {
         let name = elsewhere.attribute("MetadataFile").unwrap_or("another file");
         return Err(format!("its OME-XML lies in {name}; save the stack as one OME-TIFF file"));
     }
-    let images = root.children().filter(|n| n.tag_name().name() == "Image").count();
-    let pixels = child(root, "Image").and_then(|image| child(image, "Pixels"));
-    let pixels = pixels.ok_or("the OME-XML describes no image (element Pixels)")?;
-    let dimensions = dimensions(pixels, page)?;
-    let runs = runs(root, pixels, &dimensions, page, pages)?;
+    let images: Vec<Node> = root.children().filter(|n| n.tag_name().name() == "Image").collect();
+    let wanted = image.unwrap_or(0);
+    let Some(pixels) = images.get(wanted as usize).and_then(|image| child(*image, "Pixels")) else {
+        let held = images.len();
+        return Err(if held == 0 || held > wanted as usize {
+            "the OME-XML describes no image (element Pixels)".to_string()
+        } else {
+            format!("image {wanted} was asked for with --image-index but there are {held}, counted from 0")
+        });
+    };
+    let begin = pixels.children().find(|n| n.tag_name().name() == "TiffData");
+    let begin = begin.map_or(Ok(None), |block| whole_number(block, "IFD"))?.unwrap_or(0);
+    let page = page_at(begin)?;
+    let dimensions = dimensions(pixels, &page)?;
+    let runs = runs(root, pixels, &dimensions, &page, pages)?;
     let mut description = Description { dimensions: Some(dimensions), runs: Some(runs), ..Description::none() };
     add_spacing(pixels, &mut description);
-    if images > 1 {
-        description.notes.push(format!("the file holds {images} images; the first is read"));
+    let images: Vec<ImageSummary> = images.into_iter().map(summary).collect();
+    Ok(Parsed { description, page, images })
+}
+
+/// Name and size of an image; sizes that are none count as 0 here.
+fn summary(image: Node) -> ImageSummary {
+    let pixels = child(image, "Pixels");
+    let size = |name: &str| pixels.and_then(|pixels| whole_number(pixels, name).ok().flatten()).unwrap_or(0);
+    let name = image.attribute("Name").map(str::trim).filter(|name| !name.is_empty());
+    ImageSummary {
+        name: name.map(|name| name.chars().filter(|c| !c.is_control()).take(40).collect()),
+        shape: [size("SizeX"), size("SizeY"), size("SizeZ")],
     }
-    Ok(description)
 }
 
 fn refuse_long_tags(text: &str) -> Result<(), String> {
@@ -158,28 +195,20 @@ fn other_file<'a>(block: Node<'a, '_>, own: Option<&str>) -> Option<&'a str> {
         .then(|| uuid.attribute("FileName").unwrap_or("of another name"))
 }
 
-/// Physical sizes, all in the unit of the first that has one; the unit of an attribute is the micrometre by default.
+/// Physical sizes; the unit of an attribute is the micrometre by default.
 fn add_spacing(pixels: Node, description: &mut Description) {
-    let mut named: Option<(&'static str, f64)> = None;
+    let mut written = [None; 3];
     for (axis, letter) in ["X", "Y", "Z"].into_iter().enumerate() {
-        let size =
-            pixels.attribute(format!("PhysicalSize{letter}").as_str()).and_then(|v| v.trim().parse::<f64>().ok());
-        let Some(size) = size.filter(|s| s.is_finite() && *s > 0.0) else { continue };
-        let text = pixels.attribute(format!("PhysicalSize{letter}Unit").as_str()).unwrap_or("\u{b5}m");
-        match units::parse(text) {
-            Unit::Length(name, metres) => {
-                let (_, one) = *named.get_or_insert((name, metres));
-                // A quotient of equal numbers is exactly 1, so the common case keeps the stored digits.
-                description.spacing[axis] = Some(size * (metres / one));
-            }
-            Unit::Pixel | Unit::Unknown => {
-                description
-                    .notes
-                    .push(format!("the {letter} size in \"{text}\" is no physical length and was left out"));
-            }
+        let Some(text) = pixels.attribute(format!("PhysicalSize{letter}").as_str()) else { continue };
+        let unit = pixels.attribute(format!("PhysicalSize{letter}Unit").as_str()).unwrap_or("\u{b5}m");
+        match units::size(text) {
+            Some(size) => written[axis] = Some((size, unit)),
+            None => description.notes.push(format!("the OME-XML gives PhysicalSize{letter} as \"{text}\", no number")),
         }
     }
-    description.unit = named.map(|(name, _)| name.to_string());
+    let spacing = units::spacing(written);
+    (description.spacing, description.unit) = (spacing.sizes, spacing.unit);
+    description.notes.extend(spacing.notes);
 }
 
 #[cfg(test)]
@@ -218,7 +247,7 @@ mod tests {
             "<TiffData IFD=\"7\" FirstC=\"1\" FirstZ=\"2\" FirstT=\"3\"/><TiffData PlaneCount=\"4\"/>",
         );
         assert!(is_ome(&text));
-        let d = parse(&text, &page(1), 30).unwrap();
+        let d = parse(&text, &|_| Ok(page(1)), 30, None).unwrap().description;
         assert_eq!(d.dimensions, Some(Dimensions([(Axis::Time, 5), (Axis::Z, 3), (Axis::Channel, 2)])));
         // Plane number of (c 1, z 2, t 3) with t fastest: 3 + 5 * (2 + 3 * 1).
         let runs = vec![Run { plane: 28, page: 7, count: 1 }, Run { plane: 0, page: 0, count: 4 }];
@@ -235,14 +264,14 @@ mod tests {
             "DimensionOrder=\"XYCZT\" SizeC=\"6\" SizeZ=\"2\" SizeT=\"1\"",
             "<TiffData FirstC=\"3\" IFD=\"1\"/>",
         );
-        let d = parse(&text, &page(3), 4).unwrap();
+        let d = parse(&text, &|_| Ok(page(3)), 4, None).unwrap().description;
         assert_eq!(d.dimensions.map(|d| d.size(Axis::Channel)), Some(2));
         assert_eq!(d.runs, Some(vec![Run { plane: 1, page: 1, count: 1 }]));
     }
 
     #[test]
     fn refusals_say_why() {
-        let reason = |text: &str| parse(text, &page(1), 9).unwrap_err();
+        let reason = |text: &str| parse(text, &|_| Ok(page(1)), 9, None).unwrap_err();
         let sizes = "DimensionOrder=\"XYCZT\" SizeC=\"1\" SizeZ=\"2\" SizeT=\"1\"";
         let foreign = "<TiffData><UUID FileName=\"b.ome.tif\">urn:uuid:b</UUID></TiffData>";
         assert!(reason(&document(sizes, foreign)).contains("b.ome.tif"));
@@ -251,6 +280,8 @@ mod tests {
         assert!(reason("<OME><Image>").contains("malformed"));
         let long = format!("<OME {}/>", "a=\"\" ".repeat(4000));
         assert!(reason(&long).contains("tag of"));
-        assert!(parse(&document(sizes, "<TiffData><UUID>urn:uuid:a</UUID></TiffData>"), &page(1), 9).is_ok());
+        let own = document(sizes, "<TiffData><UUID>urn:uuid:a</UUID></TiffData>");
+        assert!(parse(&own, &|_| Ok(page(1)), 9, None).is_ok());
+        assert!(parse(&own, &|_| Ok(page(1)), 9, Some(1)).unwrap_err().contains("--image-index but there are 1"));
     }
 }

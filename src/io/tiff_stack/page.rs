@@ -63,7 +63,7 @@ pub(super) fn is_side_page(tags: &Tags) -> Result<bool> {
 impl Page {
     /// Reads the tags that say how the page is stored, and refuses what cannot be read.
     pub(super) fn parse(tags: &Tags) -> Result<Self> {
-        let kind = parse_kind(tags)?;
+        let kind = kind_of(tags)?;
         let height = kind.height;
         let tiled = tags.number(322)?.is_some();
         let chunk = if tiled {
@@ -206,7 +206,8 @@ impl Page {
     }
 }
 
-fn parse_kind(tags: &Tags) -> Result<Kind> {
+/// Size and type of the pixels of a page.
+pub(super) fn kind_of(tags: &Tags) -> Result<Kind> {
     let (width, height) = (tags.require(256, "ImageWidth")?, tags.require(257, "ImageLength")?);
     let (Ok(w @ 1..), Ok(h @ 1..)) = (u32::try_from(width), u32::try_from(height)) else {
         return Err(tags.error(format!("a page of {width} x {height} pixels makes no sense")));

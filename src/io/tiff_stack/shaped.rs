@@ -3,18 +3,31 @@
 //! One page may stand for all planes, whose data then follow each other without gaps ("truncated" there).
 
 use serde::Deserialize;
+use serde_json::Value;
 
 use super::layout::{Axis, Description, Dimensions};
 use super::page::Page;
+use super::units::{self, Unit};
 
 #[derive(Deserialize)]
 struct Shaped {
     shape: Vec<u64>,
     axes: Option<String>,
+    /// What callers add for z, in the words of `ImageJ`; anything may stand here.
+    #[serde(default)]
+    spacing: Value,
+    #[serde(default)]
+    unit: Value,
 }
 
-/// Reads the description; `None` when it is no such JSON or its shape does not end in that of the page.
-pub(super) fn parse(text: &str, page: &Page) -> Option<Description> {
+/// Whether a page with this description begins an image of its own.
+pub(super) fn is_shaped(text: &str) -> bool {
+    text.trim_start().starts_with('{') && serde_json::from_str::<Shaped>(text).is_ok()
+}
+
+/// Reads the description; `None` when it is no such JSON or its shape does not end in that of the page. `xy` is the
+/// pixel size from the resolution tags, in the unit `tagged` where these name one.
+pub(super) fn parse(text: &str, page: &Page, xy: [Option<f64>; 2], tagged: Option<&str>) -> Option<Description> {
     let shaped: Shaped = serde_json::from_str(text).ok()?;
     let (w, h, s) = (u64::from(page.kind.width), u64::from(page.kind.height), u64::from(page.kind.samples));
     let tail: &[u64] = match (s > 1, page.planar) {
@@ -24,12 +37,50 @@ pub(super) fn parse(text: &str, page: &Page) -> Option<Description> {
     };
     let outer = shaped.shape.strip_suffix(tail)?;
     let letters = shaped.axes.filter(|axes| axes.chars().count() == shaped.shape.len());
-    let (dimensions, note) = dimensions(outer, letters.as_deref())?;
-    Some(Description {
+    let objection = letters.as_deref().and_then(|letters| objection(letters, outer.len(), s > 1));
+    let (dimensions, note) = match dimensions(outer, letters.as_deref()) {
+        Some(found) => found,
+        // The user has to say what they are.
+        None if objection.is_some() => (Dimensions::only_z(outer.iter().copied().fold(1, u64::saturating_mul)), None),
+        None => return None,
+    };
+    let mut description = Description {
         dimensions: Some(dimensions),
         single_page: true,
+        objection,
         notes: note.into_iter().collect(),
         ..Description::none()
+    };
+    let z = match &shaped.spacing {
+        Value::Number(number) => number.as_f64(),
+        Value::String(text) => units::size(text),
+        _ => None,
+    };
+    let unit = shaped.unit.as_str().unwrap_or_default();
+    let named = tagged.unwrap_or(unit);
+    // Without a z the tags are judged as those of a plain file.
+    if z.is_some() || (tagged.is_none() && units::parse(unit) != Unit::Pixel) {
+        // One pixel per nothing is what stands there when nobody said anything.
+        let [x, y] = xy.map(|size| size.filter(|&s| s != 1.0 || tagged.is_some()));
+        let written =
+            [x.map(|s| (s, named)), y.map(|s| (s, named)), z.map(|s| (s, if unit.is_empty() { named } else { unit }))];
+        let spacing = units::spacing(written);
+        (description.spacing, description.unit) = (spacing.sizes, spacing.unit);
+        description.notes.extend(spacing.notes);
+    }
+    Some(description)
+}
+
+/// Why pages are no planes of rows: the names of the array's axes end in others than y and x.
+fn objection(letters: &str, outer: usize, samples: bool) -> Option<String> {
+    let inner: String = letters.chars().skip(outer).filter(|&l| !(samples && l == 'S')).collect();
+    let before = letters.chars().take(outer).any(|l| matches!(l, 'X' | 'Y'));
+    let apart = inner.chars().any(|l| matches!(l, 'Z' | 'C' | 'T')) || inner == "XY";
+    (before || apart).then(|| {
+        format!(
+            "its axes are {letters}, so that its pages are no planes of rows y and columns x; write the array with y and \
+             x last, or give --axes to say what the pages are"
+        )
     })
 }
 
@@ -69,6 +120,17 @@ fn dimensions(outer: &[u64], letters: Option<&str>) -> Option<(Dimensions, Optio
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pages_are_planes_of_rows() {
+        for (letters, outer, samples) in [("ZYX", 1, false), ("QQQ", 1, false), ("ZYXS", 1, true), ("TZCYX", 3, false)]
+        {
+            assert_eq!(objection(letters, outer, samples), None, "{letters}");
+        }
+        for (letters, outer, samples) in [("YXZ", 1, false), ("XYZ", 1, false), ("ZXY", 1, false), ("YXC", 1, false)] {
+            assert!(objection(letters, outer, samples).is_some(), "{letters}");
+        }
+    }
 
     #[test]
     fn axes_by_letter_and_by_place() {

@@ -1,51 +1,81 @@
-//! A folder of slices: one TIFF file per plane, in the natural order of their names (`s2.tif` before `s10.tif`).
+//! A folder of slices: one TIFF file per plane, in the order that their names tell (`s2.tif` before `s10.tif`).
 
-use std::cmp::Ordering;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::ifd::{Tags, TiffFile};
-use super::layout::{Description, Dimensions};
+use super::images;
+use super::layout::{Axis, Description};
+use super::names::{Name, file_name};
 use super::page::Page;
 use super::source::{self, Opened, Source};
-use super::{Select, ome_xml};
+use super::{Select, ome_xml, sequence};
 use crate::error::{Error, Result};
+
+/// Endings of pictures that are no TIFF; a folder of these is no folder of slices.
+const OTHER_PICTURES: [&str; 8] = ["png", "jpg", "jpeg", "bmp", "gif", "jp2", "dcm", "webp"];
 
 /// Opens a folder of slices.
 pub(super) fn open_folder(folder: &Path, select: Select) -> Result<Opened> {
-    let files = list(folder)?;
-    let (file, offset) = open_slice(&files[0])?;
-    let tags = Tags::read(&file, offset, 1)?;
-    let first = Page::parse(&tags)?;
-    let description = describe_slice(&tags)?;
+    let refuse = |reason: String| Error::input(reason).at(folder);
+    if select.image.is_some_and(|image| image > 0) {
+        return Err(
+            Error::usage("--image-index is for one file with several images; a folder of slices is one").at(folder)
+        );
+    }
+    let found = list(folder)?;
+    let sequence = sequence::arrange(found.slices, select.axes.as_ref()).map_err(refuse)?;
+    let dimensions = sequence.dimensions;
+    // A channel need not be of the type of the first.
+    let samples = open_first(sequence.any_file().ok_or_else(|| refuse("it has no slices".into()))?)?.1.kind.samples;
+    let (channel, sample) = source::choose(folder, &dimensions, samples, select)?;
+    let files = sequence.files(channel, select.time.into()).map_err(refuse)?;
+    let (first_file, first) = open_first(&files[0])?;
+    let told = [Axis::Channel, Axis::Time].map(|axis| dimensions.size(axis) > 1);
+    let mut description = describe_slice(&first_file, told)?;
     for path in &files[1..] {
-        let (file, offset) = open_slice(path)?;
-        let page = Page::parse(&Tags::read(&file, offset, 1)?)?;
+        let (file, page) = open_first(path)?;
         if page.kind != first.kind {
             return Err(file.error(format!(
                 "this slice is {} but the first of its folder ({}) is {}; all slices must be alike",
                 page.kind,
-                files[0].file_name().unwrap_or_default().to_string_lossy(),
+                file_name(&files[0]),
                 first.kind
             )));
         }
     }
-    let dimensions = Dimensions::only_z(files.len() as u64);
-    let (_, sample) = source::choose(&file, &dimensions, first.kind.samples, select)?;
+    if sample >= first.kind.samples {
+        return Err(refuse(format!(
+            "{} has {} samples in a pixel where others have {samples}",
+            file_name(&files[0]),
+            first.kind.samples
+        )));
+    }
+    description.notes.extend(sequence.notes);
+    description.notes.extend(found.notes);
     let info = source::info(&first, &dimensions, description);
-    Ok(Opened { info, source: Source::Slices { files, kind: first.kind, sample } })
+    Ok(Opened { info, images: Vec::new(), source: Source::Slices { files, kind: first.kind, sample } })
 }
 
-/// What the first slice says of its spacing.
-fn describe_slice(tags: &Tags) -> Result<Description> {
+/// What the first slice says of its spacing; `told` says whether the names tell channels and times.
+fn describe_slice(file: &TiffFile, told: [bool; 2]) -> Result<Description> {
+    let offsets = file.pages()?;
+    let tags = Tags::read(file, offsets[0], 1)?;
     let text = tags.text(270, ome_xml::MAX_TEXT)?.unwrap_or_default();
     if ome_xml::is_ome(&text) {
-        return ome_xml::spacing_of_slice(&text).map_err(|reason| tags.file.error(reason));
+        return ome_xml::spacing_of_slice(&text, told).map_err(|reason| file.error(reason));
     }
-    let (_, description) = source::describe(tags.file, &[tags.offset])?;
+    let (_, description) = images::describe(file, &[(1, tags.offset)])?;
     if description.dimensions.and_then(|d| d.count()).is_some_and(|planes| planes > 1) {
-        return Err(tags.file.error("it is a stack itself, but in a folder of slices every file is one plane"));
+        return Err(file.error("it is a stack itself, but in a folder of slices every file is one plane"));
     }
     Ok(description)
+}
+
+/// Opens a file that must hold one page, and reads what it is.
+fn open_first(path: &Path) -> Result<(TiffFile, Page)> {
+    let (file, offset) = open_slice(path)?;
+    let page = Page::parse(&Tags::read(&file, offset, 1)?)?;
+    Ok((file, page))
 }
 
 /// Opens a file that must hold one page.
@@ -61,76 +91,47 @@ pub(super) fn open_slice(path: &Path) -> Result<(TiffFile, u64)> {
     }
 }
 
-/// The slices in a folder, in order.
-fn list(folder: &Path) -> Result<Vec<PathBuf>> {
+/// What a folder holds.
+struct Listed {
+    slices: Vec<Name>,
+    notes: Vec<String>,
+}
+
+/// The slices in a folder.
+fn list(folder: &Path) -> Result<Listed> {
     let unreadable = |e: std::io::Error| Error::input(format!("the folder cannot be read: {e}")).at(folder);
-    let mut files = Vec::new();
+    let (mut slices, mut pictures, mut folders) = (Vec::new(), 0, Vec::new());
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
         if is_slice(&path) {
-            files.push(path);
+            slices.push(Name::of(&path));
+        } else if ends_in(&path, &OTHER_PICTURES) && !file_name(&path).starts_with('.') {
+            pictures += 1;
+        } else if path.is_dir() {
+            folders.push(path);
         }
     }
-    if files.is_empty() {
-        return Err(Error::input("the folder holds no slices (files named *.tif or *.tiff)").at(folder));
+    if slices.is_empty() {
+        folders.sort();
+        let below = folders.iter().find(|below| holds_slices(below));
+        let hint =
+            below.map_or(String::new(), |below| format!("; the folder {} in it does: name that", file_name(below)));
+        return Err(Error::input(format!("the folder holds no slices (files named *.tif or *.tiff){hint}")).at(folder));
     }
-    files.sort_by(|a, b| natural(&name(a), &name(b)));
-    Ok(files)
+    let verb = if pictures == 1 { "picture is" } else { "pictures are" };
+    let notes = if pictures > 0 { vec![format!("{pictures} {verb} no TIFF and left out")] } else { Vec::new() };
+    Ok(Listed { slices, notes })
+}
+
+fn holds_slices(folder: &Path) -> bool {
+    std::fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(|entry| is_slice(&entry.path())))
 }
 
 /// A file with the right ending that is not hidden (file managers and macOS leave `._name.tif` behind).
 fn is_slice(path: &Path) -> bool {
-    let tiff = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tif") || e.eq_ignore_ascii_case("tiff"));
-    tiff && !name(path).starts_with('.') && path.is_file()
+    ends_in(path, &["tif", "tiff"]) && !file_name(path).starts_with('.') && path.is_file()
 }
 
-fn name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// Compares names with runs of digits taken as numbers of any length; names that differ only in leading zeros are
-/// compared as text, so that the order is total.
-fn natural(a: &str, b: &str) -> Ordering {
-    let (mut left, mut right) = (a, b);
-    loop {
-        let ((p, rest_left), (q, rest_right)) = (split_token(left), split_token(right));
-        if p.is_empty() || q.is_empty() {
-            return p.len().cmp(&q.len()).then_with(|| a.cmp(b));
-        }
-        let digits = |s: &str| s.starts_with(|c: char| c.is_ascii_digit());
-        let order = if digits(p) && digits(q) {
-            let (p, q) = (p.trim_start_matches('0'), q.trim_start_matches('0'));
-            p.len().cmp(&q.len()).then_with(|| p.cmp(q))
-        } else {
-            p.cmp(q)
-        };
-        if order != Ordering::Equal {
-            return order;
-        }
-        (left, right) = (rest_left, rest_right);
-    }
-}
-
-/// The leading run of digits, or else one character, and the rest.
-fn split_token(text: &str) -> (&str, &str) {
-    let Some(first) = text.chars().next() else { return ("", "") };
-    if !first.is_ascii_digit() {
-        return text.split_at(first.len_utf8());
-    }
-    text.split_at(text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_in_names_count_as_numbers() {
-        let mut names = ["s10.tif", "s9.tif", "s009a.tif", "a.tif", "s.tif", "s99999999999999999999999.tif", "s09.tif"];
-        names.sort_by(|a, b| natural(a, b));
-        assert_eq!(
-            names,
-            ["a.tif", "s.tif", "s09.tif", "s9.tif", "s009a.tif", "s10.tif", "s99999999999999999999999.tif"]
-        );
-    }
+fn ends_in(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|ending| endings.iter().any(|wanted| ending.eq_ignore_ascii_case(wanted)))
 }

@@ -4,25 +4,33 @@ use std::path::{Path, PathBuf};
 
 use super::decode::{Plane, Scratch};
 use super::ifd::{Tags, TiffFile};
+use super::images::{self, Chosen, PagePlace};
 use super::layout::{Axis, Description, Dimensions};
-use super::page::{Kind, Page, is_side_page};
+use super::page::{Kind, Page};
 use super::raw::Contiguous;
-use super::{Select, StackInfo, imagej, ome_xml, shaped, slices};
+use super::{ImageSummary, Select, StackInfo, slices};
 use crate::error::{Error, Result};
+use crate::io::page_axes::PageAxes;
 use crate::store::SamplesMut;
-
-/// The pixel size above which resolution tags of plain files are a print resolution (1270 dots per inch), in metres.
-const PRINT_SIZE: f64 = 20e-6;
 
 /// Where the planes of the wanted channel and time lie.
 #[derive(Debug)]
 pub(super) enum Source {
-    /// One page for each plane: its number, from 1, and offset.
-    Pages { file: TiffFile, kind: Kind, sample: u16, places: Vec<(usize, u64)> },
+    /// One page for each plane.
+    Pages { file: TiffFile, kind: Kind, places: Vec<Place> },
     /// One page, planes one after the other.
     Contiguous { file: TiffFile, stack: Contiguous, sample: u16, order: PlaneOrder },
     /// One file for each plane.
     Slices { files: Vec<PathBuf>, kind: Kind, sample: u16 },
+}
+
+/// Where one plane lies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Number, from 1, and offset.
+    page: PagePlace,
+    /// The sample of the pixel.
+    sample: u16,
 }
 
 /// The planes of the wanted channel and time.
@@ -43,6 +51,7 @@ impl PlaneOrder {
 #[derive(Debug)]
 pub(super) struct Opened {
     pub(super) info: StackInfo,
+    pub(super) images: Vec<ImageSummary>,
     pub(super) source: Source,
 }
 
@@ -51,9 +60,9 @@ impl Source {
     pub(super) fn read_plane(&self, z: u64, scratch: &mut Scratch, out: &mut SamplesMut<'_>) -> Result<()> {
         let z = z as usize;
         match self {
-            Self::Pages { file, kind, sample, places } => {
-                let (number, offset) = places[z];
-                read_page(file, *kind, *sample, number, offset, scratch, out)
+            Self::Pages { file, kind, places } => {
+                let Place { page: (number, offset), sample } = places[z];
+                read_page(file, *kind, sample, number, offset, scratch, out)
             }
             Self::Contiguous { file, stack, sample, order } => {
                 let chunks = vec![stack.chunk(order.plane(z as u64))];
@@ -95,120 +104,136 @@ fn require_kind(tags: &Tags, page: &Page, kind: Kind) -> Result<()> {
 pub(super) fn open_file(path: &Path, select: Select) -> Result<Opened> {
     let file = TiffFile::open(path)?;
     let offsets = file.pages()?;
-    let (first, mut description) = describe(&file, &offsets)?;
-    let mut places: Vec<(usize, u64)> = offsets.iter().enumerate().map(|(n, &offset)| (n + 1, offset)).collect();
-    if description.runs.is_none() {
-        drop_side_pages(&file, &mut places, &mut description)?;
-    }
+    let Chosen { first, mut description, places, images } = images::choose(&file, &offsets, select.image)?;
     let available = places.len() as u64;
-    let dimensions = description.dimensions.unwrap_or(Dimensions::only_z(available));
-    let (channel, sample) = choose(&file, &dimensions, first.kind.samples, select)?;
+    if let Some(reason) = description.objection.take().filter(|_| select.axes.is_none()) {
+        return Err(file.error(reason));
+    }
+    let mut order = Order { dimensions: description.dimensions.unwrap_or(Dimensions::only_z(available)), pixel: first };
+    if let Some(axes) = select.axes {
+        order =
+            named(&axes, order, &mut description, available, images.len() > 1).map_err(|r| Error::usage(r).at(path))?;
+    }
+    let Order { dimensions, pixel } = order;
+    let (channel, sample) = choose(path, &dimensions, pixel.kind.samples, select)?;
     // A plane takes a directory of its own or at least one byte.
     let Some(total) = dimensions.count().filter(|&n| n <= file.len) else {
         return Err(file.error("the description promises more planes than the file can hold: it is damaged"));
     };
     let order = PlaneOrder { dimensions, channel, time: select.time.into() };
-    let info = info(&first, &dimensions, description.clone());
-    let source = if description.single_page && available == 1 && total > 1 {
+    let source = if pixel.kind != first.kind {
+        // Samples were said to be planes.
+        let planes = (0..dimensions.size(Axis::Z)).map(|z| order.plane(z) as u16);
+        let places = planes.map(|sample| Place { page: places[0], sample }).collect();
+        Source::Pages { file, kind: first.kind, places }
+    } else if description.single_page && available == 1 && total > 1 {
         let tags = Tags::read(&file, places[0].1, places[0].0)?;
         Source::Contiguous { stack: Contiguous::new(&tags, first, total)?, file, sample, order }
     } else {
-        refuse_wrong_count(&file, &description, total, available)?;
+        look_at_count(&file, &mut description, total, available, images.len())?;
         let planes: Vec<u64> = (0..dimensions.size(Axis::Z)).map(|z| order.plane(z)).collect();
-        let pages = description.pages(&file, &planes, available)?;
-        let places: Vec<(usize, u64)> = pages.iter().map(|&page| places[page as usize]).collect();
-        refuse_odd_pages(&file, first.kind, &places)?;
-        Source::Pages { file, kind: first.kind, sample, places }
-    };
-    Ok(Opened { info, source })
-}
-
-/// Reads the first full page and what the file says about its planes.
-pub(super) fn describe(file: &TiffFile, offsets: &[u64]) -> Result<(Page, Description)> {
-    let tags = Tags::read(file, offsets[0], 1)?;
-    let text = tags.text(270, ome_xml::MAX_TEXT)?.unwrap_or_default();
-    let pages = offsets.len() as u64;
-    if ome_xml::is_ome(&text) {
-        let page = Page::parse(&tags)?;
-        let description = ome_xml::parse(&text, &page, pages).map_err(|reason| file.error(reason))?;
-        return Ok((page, description));
-    }
-    // A preview may come first; the stack then begins with the first page that is none.
-    let mut full = Tags::read(file, offsets[0], 1)?;
-    for (n, &offset) in offsets.iter().enumerate() {
-        full = Tags::read(file, offset, n + 1)?;
-        if !is_side_page(&full)? {
-            break;
+        let pages = description.pages(&file, &planes, total, available)?;
+        let places: Vec<PagePlace> = pages.iter().map(|&page| places[page as usize]).collect();
+        refuse_odd_pages(&file, first.kind, &places, description.runs.is_none())?;
+        Source::Pages {
+            file,
+            kind: first.kind,
+            places: places.into_iter().map(|page| Place { page, sample }).collect(),
         }
-    }
-    let page = Page::parse(&full)?;
-    if imagej::is_imagej(&text) {
-        let xy = resolution(&tags)?.map(|r| r.map(f64::recip));
-        return Ok((page, imagej::parse(&text, pages, xy)));
-    }
-    let mut description = shaped::parse(&text, &page).unwrap_or_else(Description::none);
-    add_plain_spacing(&full, &mut description)?;
-    Ok((page, description))
-}
-
-fn resolution(tags: &Tags) -> Result<[Option<f64>; 2]> {
-    Ok([tags.positive_rational(282)?, tags.positive_rational(283)?])
-}
-
-/// Spacing from the resolution tags of a file without description: only where the unit is a real one and the pixels
-/// are finer than any print, since most writers put 72 or 300 dots per inch there without having measured anything.
-fn add_plain_spacing(tags: &Tags, description: &mut Description) -> Result<()> {
-    let metres = match tags.number(296)? {
-        Some(2) => 0.0254,
-        Some(3) => 0.01,
-        _ => return Ok(()),
     };
-    let [Some(x), Some(y)] = resolution(tags)?.map(|r| r.map(|r| metres / r)) else { return Ok(()) };
-    if x < PRINT_SIZE && y < PRINT_SIZE {
-        description.spacing = [Some(x * 1e6), Some(y * 1e6), None];
-        description.unit = Some("micrometer".to_string());
-    }
-    Ok(())
+    Ok(Opened { info: info(&pixel, &dimensions, description), images, source })
 }
 
-/// Leaves out previews and masks; a file of nothing else is read as it is.
-fn drop_side_pages(file: &TiffFile, places: &mut Vec<(usize, u64)>, description: &mut Description) -> Result<()> {
-    let mut full = Vec::with_capacity(places.len());
-    for &(number, offset) in places.iter() {
-        if !is_side_page(&Tags::read(file, offset, number)?)? {
-            full.push((number, offset));
+/// The axes of the planes, and a page with the samples that are channels.
+#[derive(Clone, Copy)]
+struct Order {
+    dimensions: Dimensions,
+    pixel: Page,
+}
+
+/// The order that the user names in place of the file's.
+fn named(
+    axes: &PageAxes,
+    stored: Order,
+    description: &mut Description,
+    available: u64,
+    several: bool,
+) -> std::result::Result<Order, String> {
+    let Order { mut dimensions, mut pixel } = stored;
+    let before = dimensions.letters(&pixel);
+    let contiguous = description.single_page && available == 1;
+    if !contiguous && !several && dimensions.count() != Some(available) {
+        // Pages that are there count, not those that the file promises.
+        dimensions = Dimensions::only_z(available);
+        description.runs = None;
+    }
+    let mut stored = dimensions.long();
+    if stored.is_empty() && pixel.kind.samples > 1 && !axes.is_empty() {
+        stored = vec![(Axis::Channel, pixel.kind.samples.into())];
+        (pixel.kind.samples, pixel.planar) = (1, false);
+    }
+    let planes = stored.iter().map(|&(_, n)| n).fold(1, u64::saturating_mul);
+    let named = Dimensions(axes.sizes(&stored, planes)?);
+    let after = named.letters(&pixel);
+    if before != after || dimensions != named {
+        description.notes.retain(|note| !note.contains("have no names"));
+        description.notes.push(format!("the file's axes are {before}; they are read as {after}, as --axes says"));
+    }
+    Ok(Order { dimensions: named, pixel })
+}
+
+/// Compares the planes that the description promises with the pages that are there.
+fn look_at_count(
+    file: &TiffFile,
+    description: &mut Description,
+    total: u64,
+    available: u64,
+    images: usize,
+) -> Result<()> {
+    if total == available {
+        return Ok(());
+    }
+    if description.runs.is_some() {
+        // Whether the planes that are wanted have pages shows when these are looked up.
+        if total > available || images == 0 {
+            let tail = if total < available { ", and the others are left out" } else { "" };
+            description.notes.push(format!(
+                "the OME-XML names {total} planes but the file holds {available} pages{tail}; --axes says what the pages are"
+            ));
         }
-    }
-    let dropped = places.len() - full.len();
-    if dropped > 0 && !full.is_empty() {
-        description.notes.push(format!("{dropped} pages are previews or masks and were left out"));
-        *places = full;
-    }
-    Ok(())
-}
-
-fn refuse_wrong_count(file: &TiffFile, description: &Description, total: u64, available: u64) -> Result<()> {
-    // Pages that OME-XML does not name are no part of the image.
-    if total == available || (description.runs.is_some() && total < available) {
         return Ok(());
     }
     let verdict = if total > available { "it is truncated" } else { "it was edited without its description" };
-    Err(file.error(format!("the description promises {total} planes but the file holds {available} pages: {verdict}")))
+    Err(file.error(format!(
+        "the description promises {total} planes but the file holds {available} pages: {verdict}; give --axes zyx to \
+         read the pages that are there as slices"
+    )))
 }
 
-fn refuse_odd_pages(file: &TiffFile, kind: Kind, places: &[(usize, u64)]) -> Result<()> {
-    places.iter().try_for_each(|&(number, offset)| {
+/// Refuses planes of another size or type; `apart` says whether `--image-index` takes pages by these.
+fn refuse_odd_pages(file: &TiffFile, kind: Kind, places: &[PagePlace], apart: bool) -> Result<()> {
+    for &(number, offset) in places {
         let tags = Tags::read(file, offset, number)?;
-        require_kind(&tags, &Page::parse(&tags)?, kind)
-    })
+        let page = Page::parse(&tags)?;
+        if page.kind != kind {
+            let last = images::kinds(file, places)?.len() - 1;
+            let advice = format!("; give --image-index 0, or up to {last}, to read the pages of one size and type");
+            return Err(tags.error(format!(
+                "it is {} where the stack is {kind}; all planes of a stack must be alike{}",
+                page.kind,
+                if apart { advice.as_str() } else { "" }
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// The channel among the planes, and the sample in the pixel, that hold the wanted channel.
-pub(super) fn choose(file: &TiffFile, dimensions: &Dimensions, samples: u16, select: Select) -> Result<(u64, u16)> {
+pub(super) fn choose(path: &Path, dimensions: &Dimensions, samples: u16, select: Select) -> Result<(u64, u16)> {
     let channels = dimensions.size(Axis::Channel).saturating_mul(u64::from(samples));
     let times = dimensions.size(Axis::Time);
     let refuse = |what: &str, wanted: u32, held: u64| {
-        Err(Error::usage(format!("{what} {wanted} was asked for but there are {held}, counted from 0")).at(&file.path))
+        Err(Error::usage(format!("{what} {wanted} was asked for but there are {held}, counted from 0")).at(path))
     };
     if u64::from(select.channel) >= channels {
         return refuse("channel", select.channel, channels);
@@ -222,10 +247,20 @@ pub(super) fn choose(file: &TiffFile, dimensions: &Dimensions, samples: u16, sel
 pub(super) fn info(page: &Page, dimensions: &Dimensions, description: Description) -> StackInfo {
     let mut notes = description.notes;
     let (depth, planes) = (dimensions.size(Axis::Z), dimensions.count().unwrap_or(u64::MAX));
+    let mut sample_planes = u64::from(page.kind.samples);
     if depth == 1 && planes > 1 {
+        sample_planes = 1;
+    }
+    if depth == 1 && planes.saturating_mul(sample_planes) > 1 {
         // Many writers put the slices of a stack down as channels or frames when they are not told the axes.
+        let stored = match [Axis::Channel, Axis::Time].map(|axis| dimensions.size(axis) > 1) {
+            [true, true] => "channels and times",
+            [false, true] => "times",
+            [_, false] => "channels",
+        };
         notes.push(format!(
-            "there is 1 plane along z but {planes} planes of other channels or times; is one of them z?"
+            "{} planes are stored as {stored}; if they are slices, give --axes zyx",
+            planes.saturating_mul(sample_planes)
         ));
     }
     let sample = page.kind.sample;
