@@ -206,7 +206,7 @@ fn unusable_text_is_refused_with_line_and_reason() {
         ("v 0 0 0\nf 1 99999999999 1\n", &["line 2", "'99999999999'"]),
         ("v 0 0 0\n7 8 9\n", &["line 2", "'7 8 9'"]),
         ("v 0 0 0\nf 1 1 1 \\", &["line 2", "cut off"]),
-        ("v 0 0 0\rv 1 0 0\r", &["line 1", "carriage return"]),
+        ("v 0 0 0\nv 1 0 0\rv 2 0 0\n", &["line 2", "carriage return"]),
         ("OFF\n", &["without counts"]),
         ("OFF BINARY\n\0\0\0\u{8}", &["binary OFF"]),
         ("4OFF\n1 0 0\n1 2 3 4\n", &["'4OFF'"]),
@@ -302,7 +302,7 @@ fn binary_stl_that_lies_is_refused() {
     assert!(refusal(&[5; 5000]).contains("binary data"));
     assert!(refusal(&vec![0; 100_000]).contains("binary data"));
     assert!(refusal(b"II*\0\x08\0\0\0").contains("binary data"));
-    assert!(refusal(b"\xff\xfev\0 \0").contains("UTF-16"));
+    assert!(refusal(b"\xff\xfev\0 \0").contains("line 1"));
 }
 
 /// Flat and repeated triangles are sources like any other.
