@@ -18,7 +18,8 @@ pub fn free_space(folder: &Path) -> Option<u64> {
     // The types differ between systems.
     #[allow(clippy::unnecessary_cast)]
     let room = (status.f_bavail as u64).saturating_mul(status.f_frsize as u64);
-    (code == 0).then_some(room)
+    // File systems that count no blocks tell nothing of their room.
+    (code == 0 && status.f_blocks > 0).then_some(room)
 }
 
 #[cfg(test)]
@@ -34,5 +35,7 @@ mod tests {
         // Others write to the disk meanwhile.
         assert!(told.abs_diff(available << 10) < 4 << 30, "{told} and {available} KiB");
         assert_eq!(free_space(Path::new("/no/such/folder")), None);
+        #[cfg(target_os = "linux")]
+        assert_eq!(free_space(Path::new("/proc")), None);
     }
 }
