@@ -138,7 +138,7 @@ fn what_is_wrong_with_a_reader_is_told() {
     let reader = |read| Reader { name: "bad", endings: &[], seeds_of: Vec::new, read, blames_input: true };
     let said = |read: fn(&Path) -> strandline::error::Result<()>| fault(&reader(read), Path::new("nowhere"));
     assert!(said(|_| panic!("a panic that is meant")).is_some_and(|fault| fault.starts_with("panicked")));
-    assert!(said(|_| Err(Error::input("two\nlines"))).is_some_and(|fault| fault.contains("one line")));
+    assert!(said(|_| Err(Error::partly("two\nlines"))).is_some_and(|fault| fault.contains("one line")));
     assert!(said(|_| Err(Error::failed("no fault of the input"))).is_some_and(|fault| fault.contains("exit code 1")));
     assert_eq!(said(|_| Err(Error::input("is no mesh"))), None);
     assert_eq!(said(|_| Ok(())), None);
