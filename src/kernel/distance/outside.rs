@@ -1,4 +1,5 @@
-//! Sources that reach out of a grid, and the voxels that they fix through its faces.
+//! Sources that reach out of a grid, and the voxels that they fix through its faces (docs/algorithms.md, "Outside of the
+//! grid").
 //!
 //! On the straight way from a voxel to the nearest place of all sources that place stays the nearest. Where it lies in the
 //! grid, its source fixes voxels around it, and what is carried from there reaches the voxel. Where it lies outside, the
