@@ -21,10 +21,16 @@ pub(super) fn store(path: &Path) -> Result<(Value, Lines)> {
             Ok(image) => {
                 lines.extend(image_lines(name, &image));
                 let mut levels: Vec<Value> = image.levels.iter().map(level_json).collect();
-                if let Some((level, [low, high])) = range(&path.join(&group))? {
-                    let of = if level == 0 { String::new() } else { format!(" on level {}", image.levels[level].path) };
-                    lines.push(line(&format!("{name}, values"), format!("{} to {}{of}", number(low), number(high))));
-                    levels[level]["range"] = json!([low, high]);
+                match range(&path.join(&group), &image.levels) {
+                    Ok(Some((level, [low, high]))) => {
+                        let of =
+                            if level == 0 { String::new() } else { format!(" on level {}", image.levels[level].path) };
+                        lines
+                            .push(line(&format!("{name}, values"), format!("{} to {}{of}", number(low), number(high))));
+                        levels[level]["range"] = json!([low, high]);
+                    }
+                    Ok(None) => {}
+                    Err(error) => lines.push(line(&format!("{name}, values"), format!("cannot be read: {error}"))),
                 }
                 images.insert(name.into(), levels.into());
                 let (version, axes, notes) = (&image.version, &image.axes, &image.notes);

@@ -1,5 +1,6 @@
 //! What lies in a store: its groups, the range of an image's values, its meshes and tables.
 
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -7,14 +8,15 @@ use std::path::{Path, PathBuf};
 use super::text::{bytes, grouped};
 use crate::error::Result;
 use crate::grid::Box3;
-use crate::io::ome_zarr::{ImageReader, is_store};
+use crate::io::ome_zarr::is_store;
+use crate::io::stacks::Select;
+use crate::io::zarr_image::{LevelDescription, ZarrImage};
+use crate::store::{ElementType, Sample, VolumeSource};
 
 /// Groups lie no deeper than this: `labels/segmentation`, `levelset/object-1`.
 const DEEPEST: usize = 3;
 /// Voxels of a level that are read to tell the range of its values; the finest level that has no more is taken.
-const MOST_READ: u64 = 1 << 26;
-/// Planes that are read at a time.
-const SLAB: i64 = 64;
+const MOST_READ: u128 = 1 << 26;
 /// A header of a mesh or a table is not longer than this.
 const HEADER_LINES: usize = 64;
 
@@ -52,22 +54,34 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect()
 }
 
-/// The smallest and largest value of an image of ours, and the level that was read for them; none where no level is small
-/// enough, and of images by other programs.
-pub(super) fn range(path: &Path) -> Result<Option<(usize, [f64; 2])>> {
-    let Ok(image) = ImageReader::open(path) else { return Ok(None) };
-    let small = |n: &usize| image.levels()[*n].geometry.domain().volume() <= MOST_READ;
-    let Some(level) = (0..image.levels().len()).find(small) else { return Ok(None) };
-    let [width, height, depth] = image.levels()[level].geometry.shape;
+/// The smallest and largest value of an image, and the level that was read for them; none where no level is small enough.
+pub(super) fn range(path: &Path, levels: &[LevelDescription]) -> Result<Option<(usize, [f64; 2])>> {
+    let voxels = |level: &LevelDescription| level.shape.iter().map(|&n| u128::from(n.unsigned_abs())).product::<u128>();
+    let Some(level) = levels.iter().position(|level| voxels(level) <= MOST_READ) else { return Ok(None) };
+    let image = ZarrImage::open(path, Select { level: level as u32, ..Select::default() })?;
+    let found = match image.element() {
+        ElementType::U8 => extremes::<u8>(&image)?,
+        ElementType::U16 => extremes::<u16>(&image)?,
+        ElementType::U32 => extremes::<u32>(&image)?,
+        ElementType::F16 | ElementType::F32 => extremes::<f32>(&image)?,
+        ElementType::F64 => extremes::<f64>(&image)?,
+    };
+    Ok((found[0] <= found[1]).then_some((level, found)))
+}
+
+fn extremes<T: Sample + Into<f64>>(image: &ZarrImage) -> Result<[f64; 2]> {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for z in (0..depth).step_by(SLAB as usize) {
-        let part = Box3::new([0, 0, z], [width, height, (z + SLAB).min(depth)]);
+    let mut values = Vec::new();
+    for part in image.natural_boxes(&Box3::from_shape(image.shape())) {
+        values.resize(part.len(), T::default());
+        image.read_box(&part, T::buffer(&mut values))?;
         // Voxels without a closest point hold no number, and take no part.
-        for value in image.read_box(level, &part)? {
+        for &value in &values {
+            let value: f64 = value.into();
             range = [range[0].min(value), range[1].max(value)];
         }
     }
-    Ok((range[0] <= range[1]).then_some((level, range)))
+    Ok(range)
 }
 
 /// The files beside the images, and what each holds.
@@ -77,7 +91,9 @@ pub(super) fn contents(store: &Path) -> Vec<(String, String)> {
 
 /// The files of the root and its folders without arrays, by name.
 fn files(store: &Path) -> Vec<PathBuf> {
-    let is_plain = |path: &PathBuf| path.is_file() && path.file_name().is_none_or(|name| name != "zarr.json");
+    // Metadata of Zarr itself are told with the images.
+    let is_metadata = |name: &OsStr| name == "zarr.json" || name.to_string_lossy().starts_with(".z");
+    let is_plain = |path: &PathBuf| path.is_file() && !path.file_name().is_some_and(is_metadata);
     let mut found: Vec<PathBuf> = entries(store).into_iter().filter(is_plain).collect();
     found.extend(entries(&store.join("meshes")).into_iter().filter(is_plain));
     found.sort();
