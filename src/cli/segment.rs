@@ -175,7 +175,7 @@ impl Job {
             self.resources.scratch.display()
         ));
         if self.console.is_verbose() {
-            self.console.say(&self.describe());
+            self.describe().lines().for_each(|line| self.console.say(line));
         }
         let engine = self.resources.engine(window, &self.cancel, &self.console)?;
         engine.reserve(estimate.held)?;
