@@ -1,6 +1,7 @@
 //! Which bytes mean what: one file format a file.
 
 mod decoding;
+mod foreign;
 mod input;
 pub mod label_volume;
 mod mesh;

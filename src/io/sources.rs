@@ -10,7 +10,7 @@ pub use super::input::{Input, is_standard_input};
 use super::mesh::{obj, off, stl};
 use super::points::PointFile;
 use super::text::{first_binary_byte, quoted};
-use super::{ply, points, roi};
+use super::{foreign, ply, points, roi};
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
 
@@ -136,6 +136,9 @@ fn read(input: &mut Input) -> Result<Source> {
     // What the length says counts for more than any looks.
     if stl::has_binary_length(head, length) {
         return stl::read(input);
+    }
+    if let Some(error) = foreign::no_source(head, &names()) {
+        return Err(error);
     }
     if let Some(format) = FORMATS.iter().find(|format| (format.sniff)(head)) {
         return (format.read)(input);

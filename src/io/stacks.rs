@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use super::foreign;
 use super::ome_zarr::is_store;
 use super::page_axes::PageAxes;
 use super::tiff_stack::{self, TiffStack};
@@ -116,6 +117,10 @@ pub const FORMATS: &[Format] = &[
 /// The format of what lies at a path; none when it is no stack, or nothing lies there.
 #[must_use]
 pub fn format_of(path: &Path) -> Option<&'static Format> {
+    // What is read from a pipe to tell what it holds is gone for who reads it then; a volume is read in no order either.
+    if !(path.is_file() || path.is_dir()) {
+        return None;
+    }
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let by_content = FORMATS.iter().find(|format| (format.sniff)(path));
     by_content.or_else(|| FORMATS.iter().find(|format| format.extensions.contains(&extension.as_str())))
@@ -130,7 +135,14 @@ pub fn open_stack(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
     if !path.exists() {
         return Err(Error::input("there is no such file or folder").at(path));
     }
+    if !(path.is_file() || path.is_dir()) {
+        let what = "is a pipe or a device, where an image has to be a file or a folder; write it to a file first";
+        return Err(Error::input(what).at(path));
+    }
     let Some(format) = format_of(path) else {
+        if let Some(error) = first_bytes(path).as_deref().and_then(foreign::no_stack) {
+            return Err(error.at(path));
+        }
         let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
         return Err(Error::input(format!("is no stack of images that can be read ({})", names.join(", "))).at(path));
     };
@@ -150,6 +162,12 @@ fn open_tiff(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
         return Err(Error::usage(error).at(path));
     }
     Ok(Box::new(TiffStack::open(path, select)?))
+}
+
+/// The first bytes of a file, enough to tell formats that are not read.
+fn first_bytes(path: &Path) -> Option<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path).and_then(|file| file.take(512).read_to_end(&mut bytes)).ok().map(|_| bytes)
 }
 
 /// The first bytes of a file, where there are so many.
