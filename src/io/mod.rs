@@ -13,6 +13,7 @@ mod ply;
 pub mod png;
 pub mod points;
 mod roi;
+mod single;
 pub mod sources;
 pub mod stacks;
 mod text;

@@ -9,6 +9,7 @@ pub use super::input::{Input, is_standard_input};
 
 use super::mesh::{obj, off, stl};
 use super::points::PointFile;
+use super::single::rounded_note;
 use super::text::{first_binary_byte, quoted};
 use super::{foreign, ply, points, roi};
 use crate::error::{Error, Result};
@@ -124,6 +125,11 @@ pub fn describe(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>)>
     let describe = || {
         let mut input = Input::open(path, &format!("points or a mesh ({})", names()))?;
         let source = read(&mut input)?;
+        let positions = match &source {
+            Source::Cloud(cloud) => &cloud.positions,
+            Source::Mesh(mesh) => &mesh.vertices,
+        };
+        input.notes.extend(rounded_note(positions));
         let note = |note: String| format!("{}: {note}", path.display());
         Ok((source, input.points, input.notes.into_iter().map(note).collect()))
     };

@@ -130,3 +130,44 @@ fn distances_far_from_zero_are_those_at_zero() {
         }
     }
 }
+
+/// What was rounded before it came cannot be measured any more, which is told.
+#[test]
+fn shapes_that_single_precision_has_rounded_are_told() {
+    let bench = Bench::bare();
+    let corner = |n: usize| [0, 1, 2].map(|a| [0.3, 1.6][n >> a & 1]);
+    let quads = "4 0 4 6 2\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n";
+    let mesh = |kind: &str| {
+        let mut text = format!(
+            "ply\nformat ascii 1.0\nelement vertex 8\nproperty {kind} x\nproperty {kind} y\nproperty {kind} z\n\
+             element face 6\nproperty list uchar int vertex_indices\nend_header\n"
+        );
+        for n in 0..8 {
+            let place: [f64; 3] = std::array::from_fn(|a| corner(n)[a] + FAR[0][a]);
+            let [x, y, z] = if kind == "float" { place.map(|x| f64::from(x as f32)) } else { place };
+            text += &format!("{x} {y} {z}\n");
+        }
+        text + quads
+    };
+    for (kind, is_told) in [("float", true), ("double", false)] {
+        bench.write("box.ply", &mesh(kind));
+        for command in ["measure", "info"] {
+            let output = bench.run(&format!("{command} box.ply"));
+            let said = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
+            assert_eq!(said.contains("single precision numbers, which lie 0.25 apart near 4000002"), is_told, "{said}");
+        }
+    }
+}
+
+/// A prism over an L, whose corner is a millionth of its height: measured in f64, whatever its sides are.
+#[test]
+fn narrow_bodies_are_measured_in_full() {
+    let bench = Bench::bare();
+    let corners = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 4], [0, 4]];
+    let vertices =
+        |z: f64| corners.map(|[x, y]| format!("v {} {} {z}\n", 1e-9 * f64::from(x), 1e-9 * f64::from(y))).concat();
+    let sides: String = (1..7).map(|n| format!("f {n} {} {} {}\n", n % 6 + 1, n % 6 + 7, n + 6)).collect();
+    bench.write("l.obj", &format!("{}{}f 6 5 4 3 2 1\nf 7 8 9 10 11 12\n{sides}", vertices(0.0), vertices(2.0)));
+    // Area 7 and circumference 16 of the L, times its height.
+    assert!(alike(measured(&bench, "l.obj"), [14e-18, 32e-9 + 14e-18], 1e-9), "{:?}", measured(&bench, "l.obj"));
+}
