@@ -128,6 +128,58 @@ fn tifffile_shape_with_one_page_and_with_many() {
     assert_eq!(tiff_planes::stack(&many, 0, 0).unwrap().1, voxels(&[0, 1, 2, 3]));
 }
 
+/// Sizes along x, y, z and the unit that a description gives; pixels are 0.5 micrometres wide, in centimetres.
+fn sizes(description: &str) -> ([Option<f64>; 3], Option<String>, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut pages: Vec<PageBytes> = (0..4).map(|n| page(n, false)).collect();
+    let resolution = || Value::Rational(20_000, 1);
+    pages[0] = page(0, false)
+        .with(270, Value::Text(description.to_string()))
+        .with(282, resolution())
+        .with(283, resolution())
+        .with(296, Value::Short(vec![3]));
+    let info = tiff_planes::stack(&write(&folder, "a.tif", &tiff_file(&pages, false)), 0, 0).unwrap().0;
+    // In micrometres, to a billionth: quotients of decimal numbers.
+    let factor = if info.unit.as_deref() == Some("centimeter") { 1e4 } else { 1.0 };
+    (info.spacing.map(|size| size.map(|size| (size * factor * 1e9).round() / 1e9)), info.unit, info.notes)
+}
+
+/// What callers of `tifffile` hand over as metadata, and it writes down as it is.
+#[test]
+fn sizes_in_the_words_of_ome_are_read_from_tifffile_json() {
+    let json = |more: &str| format!("{{\"shape\": [4, 3, 5], \"axes\": \"ZYX\", {more}}}");
+    let (spacing, unit, notes) = sizes(&json(
+        "\"PhysicalSizeX\": 0.25, \"PhysicalSizeY\": 0.25, \"PhysicalSizeZ\": 2, \"Channel\": {\"Name\": [\"a\"]}",
+    ));
+    assert_eq!((spacing, unit.as_deref()), ([Some(0.25), Some(0.25), Some(2.0)], Some("micrometer")));
+    assert!(notes.is_empty(), "{notes:?}");
+    let (spacing, unit, _) = sizes(&json(
+        "\"PhysicalSizeX\": 0.25, \"PhysicalSizeY\": \"0.25\", \"PhysicalSizeZ\": 2000, \"PhysicalSizeZUnit\": \"nm\"",
+    ));
+    assert_eq!((spacing, unit.as_deref()), ([Some(0.25), Some(0.25), Some(2.0)], Some("micrometer")));
+}
+
+#[test]
+fn a_size_along_z_without_a_unit_does_not_make_needles_of_voxels() {
+    for description in [
+        "{\"shape\": [4, 3, 5], \"axes\": \"ZYX\", \"spacing\": 1.5}",
+        "ImageJ=1.53t\nimages=4\nslices=4\nspacing=1.5\n",
+    ] {
+        let (spacing, _, notes) = sizes(description);
+        assert_eq!(spacing, [Some(0.5), Some(0.5), Some(1.5)], "{description}");
+        assert!(notes.iter().any(|note| note.contains("1.5 names no unit")), "{notes:?}");
+    }
+    for description in [
+        "{\"shape\": [4, 3, 5], \"axes\": \"ZYX\", \"spacing\": 0.00015}",
+        "{\"shape\": [4, 3, 5], \"axes\": \"ZYX\", \"spacing\": 1.5, \"unit\": \"um\"}",
+        "ImageJ=1.53t\nimages=4\nslices=4\nspacing=0.00015\n",
+    ] {
+        let (spacing, _, notes) = sizes(description);
+        assert_eq!(spacing, [Some(0.5), Some(0.5), Some(1.5)], "{description}");
+        assert!(notes.is_empty(), "{notes:?}");
+    }
+}
+
 #[test]
 fn imagej_hyperstack_with_pages_selects_channel_and_time() {
     let folder = tempfile::tempdir().unwrap();

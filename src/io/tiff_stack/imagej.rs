@@ -27,14 +27,18 @@ pub(super) fn parse(text: &str, pages: u64, xy: [Option<f64>; 2], tagged: Option
     let unit = value("unit").filter(|unit| !unit.is_empty()).or(tagged).unwrap_or_default();
     // ImageJ names the units of y and z only where they are others.
     let own = |key: &str| value(key).filter(|own| !own.is_empty()).unwrap_or(unit);
-    let units = [unit, own("yunit"), own("zunit")];
     let z = value("spacing").and_then(units::size);
+    let mut units = [unit, own("yunit"), own("zunit")];
+    if let (Some(z), false, None) = (z, names_unit(text), value("zunit")) {
+        units[2] = units::of_bare_size(z, xy, unit);
+    }
     let sizes = [xy[0], xy[1], z];
     // Without a unit the tags hold 1 pixel per pixel: nothing that was measured. ImageJ writes a spacing of 0 for one slice.
     let measured = |size: f64, unit: &str| size != 0.0 && (size != 1.0 || units::parse(unit) != Unit::Pixel);
     let written = std::array::from_fn(|a| sizes[a].filter(|&s| measured(s, units[a])).map(|s| (s, units[a])));
     let spacing = units::spacing(written);
     let mut notes = spacing.notes;
+    notes.extend(z.and_then(|z| units::bare_note(z, unit, units[2])).filter(|_| !names_unit(text)));
     let images = number("images").unwrap_or(pages);
     let dimensions = dimensions(images, [number("channels"), number("slices"), number("frames")]);
     let apart = number("channels").is_some_and(|c| c > 1) || number("frames").is_some_and(|t| t > 1);
@@ -42,6 +46,7 @@ pub(super) fn parse(text: &str, pages: u64, xy: [Option<f64>; 2], tagged: Option
         notes
             .push(format!("channels, slices and frames do not multiply to {images} images: all were taken for slices"));
     }
+    notes.extend(origin_note([value("xorigin"), value("yorigin"), value("zorigin")]));
     Description {
         dimensions: Some(dimensions),
         spacing: spacing.sizes,
@@ -50,6 +55,18 @@ pub(super) fn parse(text: &str, pages: u64, xy: [Option<f64>; 2], tagged: Option
         notes,
         ..Description::none()
     }
+}
+
+/// What is to be known of a place that `ImageJ` counts lengths from, in voxels; other programs count from the first one.
+fn origin_note(written: [Option<&str>; 3]) -> Option<String> {
+    let origin = written.map(|text| text.and_then(units::size).unwrap_or(0.0));
+    let [x, y, z] = origin;
+    (origin != [0.0; 3]).then(|| {
+        format!(
+            "ImageJ counts lengths in it from voxel {x}, {y}, {z}; here they count from the centre of the first voxel, so \
+             points in lengths that ImageJ wrote have to be moved by that"
+        )
+    })
 }
 
 /// Channels, slices and frames; as in ImageJ a stack whose numbers do not multiply to `images` is one of slices alone.
@@ -93,6 +110,13 @@ mod tests {
         assert_eq!((d.spacing, d.unit), ([None; 3], None));
         let d = parse("ImageJ=1\nimages=3\nunit=um\nspacing=1.0\n", 3, [Some(1.0), None], None);
         assert_eq!(d.spacing, [Some(1.0), None, Some(1.0)]);
+    }
+
+    #[test]
+    fn an_origin_is_told() {
+        let notes = |text: &str| parse(&format!("ImageJ=1\nimages=3\n{text}"), 3, [None; 2], None).notes;
+        assert!(notes("xorigin=10\nyorigin=-2.5\n")[0].contains("from voxel 10, -2.5, 0;"));
+        assert!(notes("xorigin=0\nyorigin=0.0\nzorigin=0\n").is_empty());
     }
 
     #[test]

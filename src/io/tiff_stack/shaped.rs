@@ -3,7 +3,7 @@
 //! One page may stand for all planes, whose data then follow each other without gaps ("truncated" there).
 
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::layout::{Axis, Description, Dimensions};
 use super::page::Page;
@@ -18,6 +18,29 @@ struct Shaped {
     spacing: Value,
     #[serde(default)]
     unit: Value,
+    /// The words of OME-XML, and units to them, for whoever does not write that.
+    #[serde(flatten)]
+    others: Map<String, Value>,
+}
+
+impl Shaped {
+    /// Sizes in the words of OME-XML, each with its unit, which is the micrometre where none is named.
+    fn physical_sizes(&self) -> [Option<(f64, &str)>; 3] {
+        ["X", "Y", "Z"].map(|axis| {
+            let size = number(self.others.get(&format!("PhysicalSize{axis}"))?)?;
+            let unit = self.others.get(&format!("PhysicalSize{axis}Unit")).and_then(Value::as_str);
+            Some((size, unit.unwrap_or("um")))
+        })
+    }
+}
+
+/// A number, or text that is one.
+fn number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Number(number) => number.as_f64(),
+        Value::String(text) => units::size(text),
+        _ => None,
+    }
 }
 
 /// Whether a page with this description begins an image of its own.
@@ -36,7 +59,7 @@ pub(super) fn parse(text: &str, page: &Page, xy: [Option<f64>; 2], tagged: Optio
         (false, _) => &[h, w],
     };
     let outer = shaped.shape.strip_suffix(tail)?;
-    let letters = shaped.axes.filter(|axes| axes.chars().count() == shaped.shape.len());
+    let letters = shaped.axes.clone().filter(|axes| axes.chars().count() == shaped.shape.len());
     let objection = letters.as_deref().and_then(|letters| objection(letters, outer.len(), s > 1));
     let (dimensions, note) = match dimensions(outer, letters.as_deref()) {
         Some(found) => found,
@@ -51,24 +74,34 @@ pub(super) fn parse(text: &str, page: &Page, xy: [Option<f64>; 2], tagged: Optio
         notes: note.into_iter().collect(),
         ..Description::none()
     };
-    let z = match &shaped.spacing {
-        Value::Number(number) => number.as_f64(),
-        Value::String(text) => units::size(text),
-        _ => None,
-    };
+    add_spacing(&shaped, xy, tagged, &mut description);
+    Some(description)
+}
+
+/// What the description and the tags say of sizes.
+fn add_spacing(shaped: &Shaped, xy: [Option<f64>; 2], tagged: Option<&str>, description: &mut Description) {
+    let physical = shaped.physical_sizes();
+    let z = number(&shaped.spacing);
     let unit = shaped.unit.as_str().unwrap_or_default();
     let named = tagged.unwrap_or(unit);
-    // Without a z the tags are judged as those of a plain file.
-    if z.is_some() || (tagged.is_none() && units::parse(unit) != Unit::Pixel) {
+    let found = if physical != [None; 3] {
+        Some(units::spacing(physical))
+    } else if z.is_some() || (tagged.is_none() && units::parse(unit) != Unit::Pixel) {
         // One pixel per nothing is what stands there when nobody said anything.
         let [x, y] = xy.map(|size| size.filter(|&s| s != 1.0 || tagged.is_some()));
-        let written =
-            [x.map(|s| (s, named)), y.map(|s| (s, named)), z.map(|s| (s, if unit.is_empty() { named } else { unit }))];
-        let spacing = units::spacing(written);
+        let z = z.map(|z| (z, if unit.is_empty() { units::of_bare_size(z, [x, y], named) } else { unit }));
+        let mut spacing = units::spacing([x.map(|s| (s, named)), y.map(|s| (s, named)), z]);
+        let note = z.and_then(|(z, taken)| units::bare_note(z, named, taken));
+        spacing.notes.extend(note.filter(|_| unit.is_empty()));
+        Some(spacing)
+    } else {
+        // The tags are judged as those of a plain file.
+        None
+    };
+    if let Some(spacing) = found {
         (description.spacing, description.unit) = (spacing.sizes, spacing.unit);
         description.notes.extend(spacing.notes);
     }
-    Some(description)
 }
 
 /// Why pages are no planes of rows: the names of the array's axes end in others than y and x.

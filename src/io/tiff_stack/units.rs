@@ -133,6 +133,29 @@ pub(super) struct Spacing {
     pub(super) notes: Vec<String>,
 }
 
+/// Voxels are not so many times as long as wide, or the other way round.
+const LONGEST: f64 = 100.0;
+
+/// The unit of a size along z that names none, beside those of x and y in a unit that the tags of a file name: the same,
+/// but for a size that only micrometres, in which microscopes count, bring anywhere near them.
+pub(super) fn of_bare_size<'a>(z: f64, xy: [Option<f64>; 2], unit: &'a str) -> &'a str {
+    let (Unit::Length(_, metres), Some(across)) = (parse(unit), xy[0].or(xy[1])) else { return unit };
+    let is_near = |one: f64| {
+        let ratio = (z * one / (across * metres)).abs();
+        (1.0 / LONGEST..=LONGEST).contains(&ratio)
+    };
+    if !is_near(metres) && is_near(MICROMETRE) { "micrometer" } else { unit }
+}
+
+/// What is to be told where [`of_bare_size`] took another unit.
+pub(super) fn bare_note(z: f64, unit: &str, taken: &str) -> Option<String> {
+    (taken != unit).then(|| {
+        format!(
+            "the z size of {z} names no unit, and in {unit} would be nothing like those of x and y: {taken} is taken"
+        )
+    })
+}
+
 /// Sizes along x, y, z with the unit of each, all in the unit of the first that has a physical one. What is in no
 /// physical unit, all axes alike, keeps its numbers: their ratios hold.
 pub(super) fn spacing(written: [Option<(f64, &str)>; 3]) -> Spacing {
@@ -215,6 +238,17 @@ mod tests {
         assert_eq!(parse("\u{c3}\u{2026}"), Unit::Length("angstrom", 1e-10));
         assert_eq!(parse("furlong"), Unit::Unknown);
         assert_eq!(parse("\\u12"), Unit::Unknown);
+    }
+
+    #[test]
+    fn a_size_without_a_unit_is_in_that_of_the_others_or_in_micrometres() {
+        let half = [Some(0.5e-4), None];
+        assert_eq!(of_bare_size(1.5, half, "cm"), "micrometer");
+        assert_eq!(of_bare_size(1.5e-4, half, "cm"), "cm");
+        // Neither is anything like it.
+        assert_eq!(of_bare_size(1e9, half, "cm"), "cm");
+        assert_eq!(of_bare_size(1.5, [Some(0.5), None], "cm"), "cm");
+        assert_eq!(of_bare_size(1.5, [None, None], "cm"), "cm");
     }
 
     #[test]
