@@ -146,6 +146,11 @@ fn files_that_do_not_belong_are_left_out_and_told() {
     let (info, found) = read(&path, Select::default());
     assert_eq!(found, [1, 0]);
     assert!(info.notes[0].contains("no number in common"), "{:?}", info.notes);
+    // A slice that is elsewhere, on a disk that is not mounted, is not left out: the stack would end without it.
+    let (_held, path) = folder(&["s1.tif", "s2.tif"]);
+    std::os::unix::fs::symlink("nowhere/s3.tif", path.join("s3.tif")).unwrap();
+    let text = tiff_planes::stack(&path, 0, 0).unwrap_err().to_string();
+    assert!(text.contains("s3.tif: is a link to a file that is not there"), "{text}");
     let below = tempfile::tempdir().unwrap();
     fs::create_dir(below.path().join("ch0")).unwrap();
     slice(&below.path().join("ch0/1.tif"), 0);

@@ -105,6 +105,8 @@ fn list(folder: &Path) -> Result<Listed> {
         let path = entry.map_err(unreadable)?.path();
         if is_slice(&path) {
             slices.push(Name::of(&path));
+        } else if is_named_as_slice(&path) && path.is_symlink() && !path.exists() {
+            return Err(Error::input("is a link to a file that is not there; put it back or remove the link").at(&path));
         } else if ends_in(&path, &OTHER_PICTURES) && !file_name(&path).starts_with('.') {
             pictures += 1;
         } else if path.is_dir() {
@@ -129,7 +131,11 @@ fn holds_slices(folder: &Path) -> bool {
 
 /// A file with the right ending that is not hidden (file managers and macOS leave `._name.tif` behind).
 fn is_slice(path: &Path) -> bool {
-    ends_in(path, &["tif", "tiff"]) && !file_name(path).starts_with('.') && path.is_file()
+    is_named_as_slice(path) && path.is_file()
+}
+
+fn is_named_as_slice(path: &Path) -> bool {
+    ends_in(path, &["tif", "tiff"]) && !file_name(path).starts_with('.')
 }
 
 fn ends_in(path: &Path, endings: &[&str]) -> bool {
