@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 
 use super::args::{Cli, Command, DemoArgs};
-use super::print;
 use super::segment::{Job, Names};
 use super::values::Output;
+use super::{print, signals};
 use crate::error::{Error, Result};
 use crate::store::Unfinished;
 
@@ -23,6 +23,8 @@ pub(super) fn run(args: &DemoArgs, typed: &[String]) -> Result<()> {
         let what = "exists already and was not made by the demo; name another output with -o";
         return Err(Error::usage(what).at(&args.output));
     }
+    // Before there is anything that a signal must not leave behind.
+    let cancel = signals::cancel_on_signals()?;
     let folder = tempfile::tempdir().map_err(|e| Error::from_io("cannot make a temporary folder", &e))?;
     let _passes = Unfinished::new(folder.path());
     let unpack = |name: &str, bytes: &[u8]| -> Result<PathBuf> {
@@ -39,13 +41,14 @@ pub(super) fn run(args: &DemoArgs, typed: &[String]) -> Result<()> {
     segment.output.overwrite = overwrite;
     segment.output.quiet = args.quiet;
     let names = Names {
+        command: "demo",
         image: "the built-in arabidopsis-embryo.tif".into(),
         points: vec!["the built-in arabidopsis-marks.csv".into()],
     };
-    let job = Job::new("demo", names, *segment, typed)?;
+    let job = Job::new(names, *segment, typed, cancel)?;
     job.run(&job.estimate())?;
     if !args.quiet {
-        print(&farewell(&args.output));
+        print(&farewell(&args.output))?;
     }
     Ok(())
 }

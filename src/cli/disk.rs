@@ -43,7 +43,8 @@ impl Disk<'_> {
     fn check_room(&self, output: &Path, shared: bool, [free, out_free]: [u64; 2], console: &Console) -> Result<()> {
         let (least, most) = (self.written / LEAST_WRITTEN, self.written);
         let on_scratch = self.needed.saturating_add(if shared { least } else { 0 });
-        if on_scratch > free {
+        // Where all of it is for the output, another disk for temporary fields is no help.
+        if on_scratch > free && self.needed > 0 {
             let and = match (shared, least) {
                 (true, 1..) => format!(" and at least {} for the output", bytes(least)),
                 _ => String::new(),
@@ -58,7 +59,7 @@ impl Disk<'_> {
             ))
             .at(self.scratch));
         }
-        if !shared && least > out_free {
+        if least > out_free {
             return Err(Error::failed(format!(
                 "the output of {} needs {} to {} of disk, but {} are free there; name an output on another disk, or give \
                  {}",
@@ -107,6 +108,8 @@ mod tests {
         }
         // Each alone would fit.
         assert!(check(60 << 30, 100 << 30, true, [68 << 30; 2]).is_err());
+        let (_, text) = check(0, 1000 << 30, true, [68 << 30; 2]).unwrap_err();
+        assert!(text.contains("name an output on another disk") && !text.contains("--scratch"), "{text}");
         let (_, text) = check(60 << 30, 1000 << 30, false, [68 << 30; 2]).unwrap_err();
         assert!(text.starts_with("out: ") && text.contains("another disk"), "{text}");
         assert!(console.notes().is_empty());

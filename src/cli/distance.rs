@@ -112,7 +112,7 @@ impl Job {
         };
         let plan = self.plan(&needs);
         if self.args.job.output.dry_run {
-            print(&format!("{plan}\n"));
+            print(&format!("{plan}\n"))?;
         }
         let window = self.fits(&needs)?;
         if self.args.job.output.dry_run {
@@ -129,7 +129,7 @@ impl Job {
             let [labels_in, pairs_in] = ["", "meshes/pairs.csv"]
                 .map(|table| table::whole_in(output.output.path().is_some(), output.report.is_some(), table));
             let told = describe_found(&found, &labels_in, &pairs_in);
-            print(&format!("{}\n{told}", table::stages(&engine.reports())));
+            print(&format!("{}\n{told}", table::stages(&engine.reports())))?;
         }
         Ok(())
     }

@@ -37,7 +37,7 @@ pub(super) fn read_sets(args: &DistanceJobArgs, memory: u64, console: &Console, 
             if volume.reading_bytes() > memory {
                 let needed = bytes(volume.reading_bytes());
                 let error = format!("needs {needed} to be read, for its chunks or planes; give more with --memory");
-                return Err(Error::failed(error).at(path));
+                return Err(Error::usage(error).at(path));
             }
             add_labels(&mut read.sets, path, &volume, console, cancel)?;
             read.volume.get_or_insert_with(|| volume.geometry().clone());

@@ -42,8 +42,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
         }
     };
     let text = if args.json { format!("{document:#}\n") } else { table(&lines) };
-    print(&text);
-    Ok(())
+    print(&text)
 }
 
 /// Names and what is told of them.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::args::PointsIn;
 use super::console::Console;
 use super::text::{number, triple};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Progress;
 use crate::grid::{Geometry, PointCloud};
 use crate::io::points::{LengthUnit, PointFile, Scale, read_points};
@@ -143,6 +143,15 @@ fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
 }
 
 impl Marks {
+    /// The error with the file of the marks: an input that cannot be used and is not the image, which its errors name.
+    pub(super) fn named_in(&self, error: Error) -> Error {
+        let first = self.files.values().next();
+        match first.filter(|first| self.files.values().all(|file| file == *first)) {
+            Some(only) if error.kind() == ErrorKind::Input => error.at(only),
+            _ => error,
+        }
+    }
+
     /// Adds a file's marks; returns its objects that have another number now, with that.
     fn add(&mut self, cloud: PointCloud, path: &Path, is_sure: bool) -> Vec<(u32, u32)> {
         let before = self.files.keys().last().copied().unwrap_or(0);

@@ -33,8 +33,7 @@ pub(super) fn run(args: &MeasureArgs) -> Result<()> {
     let local = Local::new(&solid.mesh).map_err(|error| error.at(&args.mesh))?;
     let measures = local.measures(&solid);
     let hausdorff = points.and_then(|points| local.distances(&solid.mesh, &measures, &points));
-    print(&if args.json { as_json(&measures, &solid, hausdorff) } else { as_lines(&measures, &solid, hausdorff) });
-    Ok(())
+    print(&if args.json { as_json(&measures, &solid, hausdorff) } else { as_lines(&measures, &solid, hausdorff) })
 }
 
 fn read_points(path: &Path) -> Result<Vec<[f64; 3]>> {

@@ -37,13 +37,13 @@ mod text;
 mod values;
 
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
 use clap::Parser;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use args::{Cli, Command};
 
 /// Runs the program with its arguments, the first of which is its own name.
@@ -97,7 +97,15 @@ fn complain(message: &str) {
 }
 
 /// Prints a result; a reader that went away is no failure of the run.
-fn print(text: &str) {
+///
+/// # Errors
+/// When there is no room for it where it goes, such as a file on a full disk.
+fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::from_io("the result cannot be printed", &error))
+        }
+        _ => Ok(()),
+    }
 }

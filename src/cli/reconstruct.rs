@@ -53,7 +53,7 @@ pub(super) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
     let estimate = estimate(&job.grid, &job.cloud, &job.settings, threads, job.needs_store());
     let plan = job.plan(&estimate);
     if args.output.dry_run {
-        print(&format!("{plan}\n"));
+        print(&format!("{plan}\n"))?;
     }
     let window = job.fits(&estimate)?;
     if args.output.dry_run {
@@ -190,7 +190,7 @@ impl Job {
         self.console.clear();
         let found = result?;
         if !self.args.output.quiet {
-            print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)));
+            print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)))?;
         }
         Ok(())
     }

@@ -29,7 +29,6 @@ use crate::store::Unfinished;
 
 /// A segmentation that is ready to start: all inputs are open and checked.
 pub(super) struct Job {
-    pub(super) command: &'static str,
     /// How the image and its marks are called in messages and in the report.
     names: Names,
     typed: Vec<String>,
@@ -46,8 +45,9 @@ pub(super) struct Job {
     started: Instant,
 }
 
-/// How the inputs are called.
+/// How the command and its inputs are called.
 pub(super) struct Names {
+    pub(super) command: &'static str,
     pub(super) image: String,
     pub(super) points: Vec<String>,
 }
@@ -55,11 +55,11 @@ pub(super) struct Names {
 /// Runs the command.
 pub(super) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     let points = args.points.iter().map(|path| path.display().to_string()).collect();
-    let names = Names { image: args.image.display().to_string(), points };
-    let job = Job::new("segment", names, args.clone(), typed)?;
+    let names = Names { command: "segment", image: args.image.display().to_string(), points };
+    let job = Job::new(names, args.clone(), typed, signals::cancel_on_signals()?)?;
     let estimate = job.estimate();
     if args.output.dry_run {
-        job.print_plan(&estimate);
+        job.print_plan(&estimate)?;
         return job.fits(&estimate).map(|_| ());
     }
     job.run(&estimate).map(|_| ())
@@ -67,9 +67,8 @@ pub(super) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
 
 impl Job {
     /// Understands what was typed and opens the inputs.
-    pub(super) fn new(command: &'static str, names: Names, args: SegmentArgs, typed: &[String]) -> Result<Self> {
+    pub(super) fn new(names: Names, args: SegmentArgs, typed: &[String], cancel: Cancel) -> Result<Self> {
         let started = Instant::now();
-        let cancel = signals::cancel_on_signals()?;
         let settings = config::settings(&args)?;
         let spacing = config::spacing("--image-spacing", args.picture.image_spacing)?;
         let output = &args.output;
@@ -110,21 +109,7 @@ impl Job {
         args.seed.iter().try_for_each(|seed| check_seed(seed, &geometry))?;
         let typed = typed.to_vec();
         let stack = opened.stack;
-        Ok(Self {
-            command,
-            names,
-            typed,
-            args,
-            settings,
-            resources,
-            stack,
-            geometry,
-            crop,
-            marks,
-            console,
-            cancel,
-            started,
-        })
+        Ok(Self { names, typed, args, settings, resources, stack, geometry, crop, marks, console, cancel, started })
     }
 
     fn guides(&self) -> Guides<'_> {
@@ -183,7 +168,7 @@ impl Job {
         self.console.clear();
         let outcome = result?;
         if !self.args.output.quiet {
-            print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())));
+            print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())))?;
         }
         match outcome.refused.as_slice() {
             [] => Ok(outcome),
@@ -207,11 +192,12 @@ impl Job {
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
             None => None,
         };
-        let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())?;
+        let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())
+            .map_err(|error| self.marks.named_in(error))?;
         self.tell(&outcome);
         tell_of_anchor(output.mesh.as_deref(), &self.geometry, &self.console);
         if let Some(store) = &store {
-            if self.command == "demo" {
+            if self.names.command == "demo" {
                 picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;
             }
             self.report(engine, &outcome).write(&store.file("report.json")?)?;
@@ -320,7 +306,7 @@ impl Job {
             scratch: self.resources.scratch.display().to_string(),
         };
         let ran = Ran {
-            command: self.command,
+            command: self.names.command,
             typed: &self.typed,
             resources: &self.resources,
             console: &self.console,
@@ -356,7 +342,7 @@ impl Job {
         )
     }
 
-    fn print_plan(&self, estimate: &Estimate) {
+    fn print_plan(&self, estimate: &Estimate) -> Result<()> {
         let (mut lines, mut objects) = (vec![self.describe()], Vec::new());
         for object in split(&self.marks.cloud) {
             let points: usize = object.contours.iter().map(Vec::len).sum();
@@ -378,7 +364,7 @@ impl Job {
             lines.push(format!("output: up to {} before compression", bytes(estimate.output)));
         }
         lines.push(format!("time: very roughly {}\n", duration(estimate.seconds)));
-        print(&lines.join("\n"));
+        print(&lines.join("\n"))
     }
 }
 

@@ -24,8 +24,12 @@ impl Budget {
         if self.total < need + SMALLEST_WINDOW {
             let smallest = (need + SMALLEST_WINDOW).div_ceil(1 << 20);
             return Err(Error::usage(format!(
-                "a memory budget of {} MiB is too small for this run: give at least --memory {smallest}MiB",
-                self.total >> 20
+                "a memory budget of {} is too small for this run: give at least --memory {smallest}MiB",
+                if self.total < 1 << 20 {
+                    format!("{} bytes", self.total)
+                } else {
+                    format!("{} MiB", self.total >> 20)
+                }
             )));
         }
         Ok(self.total - need)

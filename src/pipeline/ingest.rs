@@ -45,7 +45,7 @@ pub fn ingest<T: Sample>(
         let idle = histograms.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut histogram = idle.unwrap_or_default();
         if let Err(place) = histogram.add(voxels) {
-            return Err(no_number(part, place));
+            return Err(no_number(volume, part, place));
         }
         histograms.lock().unwrap_or_else(PoisonError::into_inner).push(histogram);
         Ok(())
@@ -57,14 +57,17 @@ pub fn ingest<T: Sample>(
 }
 
 /// Refuses the value at a place of a dense box that was read.
-fn no_number(part: &Box3, place: usize) -> Error {
+fn no_number(volume: &dyn VolumeSource, part: &Box3, place: usize) -> Error {
     let [width, height, _] = part.shape();
     let place = place as i64;
     let (x, y, z) = (place % width + part.lo[0], place / width % height + part.lo[1], place / (width * height));
-    Error::input(format!(
-        "plane {} holds a value that is no number (NaN or infinite) at voxel {x}, {y}, {} (x, y, z); crop it away or repair \
-         the image",
-        z + part.lo[2],
-        z + part.lo[2]
-    ))
+    let z = z + part.lo[2];
+    let error = Error::input(format!(
+        "plane {z} holds a value that is no number (NaN or infinite) at voxel {x}, {y}, {z} (x, y, z); crop it away or repair \
+         the image"
+    ));
+    match volume.path_of(Some(z)) {
+        Some(path) => error.at(path),
+        None => error,
+    }
 }

@@ -1,5 +1,7 @@
 //! The traits that join files, bricks and pipelines: read or write any box of voxels, a volume as it is stored, or a mesh.
 
+use std::path::Path;
+
 use super::{Element, ElementType, Sample, SamplesMut};
 use crate::error::Result;
 use crate::grid::Box3;
@@ -46,6 +48,11 @@ pub trait PlaneSource: Sync {
     /// # Errors
     /// When the plane cannot be read or decoded: names file, page and reason.
     fn read_plane(&self, z: i64, out: SamplesMut<'_>) -> Result<()>;
+
+    /// The file or folder that plane `z` is stored in, or all of it where none is named; for messages.
+    fn path_of(&self, _z: Option<i64>) -> Option<&Path> {
+        None
+    }
 }
 
 /// A volume in a file, of which any box can be read from any thread, and which is stored in boxes of its own: the planes of
@@ -70,6 +77,11 @@ pub trait VolumeSource: Sync {
     /// # Errors
     /// When a part of the file cannot be read or decoded: names file, place and reason.
     fn read_box(&self, part: &Box3, out: SamplesMut<'_>) -> Result<()>;
+
+    /// The file or folder that plane `z` is stored in, or all of it where none is named; for messages.
+    fn path_of(&self, _z: Option<i64>) -> Option<&Path> {
+        None
+    }
 
     /// The natural boxes that hold voxels of `part`, cut to it, x fastest.
     fn natural_boxes(&self, part: &Box3) -> Vec<Box3> {
@@ -105,6 +117,10 @@ impl<S: PlaneSource> VolumeSource for S {
             SamplesMut::F32(out) => read_planes(self, part, out),
             SamplesMut::F64(out) => read_planes(self, part, out),
         }
+    }
+
+    fn path_of(&self, z: Option<i64>) -> Option<&Path> {
+        PlaneSource::path_of(self, z)
     }
 }
 

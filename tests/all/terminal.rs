@@ -76,3 +76,53 @@ fn info_tells_every_field_of_a_store() {
     assert_eq!(json["images"]["labels/nearest"][0]["range"], serde_json::json!([1.0, 4.0]));
     assert!(json["files"]["meshes/surface.ply"].as_str().unwrap().contains("triangles"), "{json}");
 }
+
+/// A device that has no room for anything.
+#[cfg(target_os = "linux")]
+#[test]
+fn results_that_find_no_room_are_a_failure() {
+    let bench = Bench::bare();
+    bench.write("a.xyz", "0 0 0\n1 1 1\n0 1 0\n");
+    for run in ["info a.xyz", "distance a.xyz --spacing 0.5 -o none", "distance a.xyz --spacing 0.5 -o none --dry-run"]
+    {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = bench.command(run).stdout(full).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{run}: {said}");
+        assert!(said.contains("the result cannot be printed"), "{run}: {said}");
+    }
+}
+
+/// What a shell makes of `<(command)`.
+#[test]
+fn pipes_are_read_once() {
+    let bench = Bench::bare();
+    bench.write("a.xyz", &"0 0 0\n1 1 1\n0 1 0\n".repeat(9));
+    let expected = bench.succeed("info a.xyz");
+    let piped = |run: &str| {
+        let script = format!("exec {} {run}", env!("CARGO_BIN_EXE_strandline"));
+        let output =
+            std::process::Command::new("bash").args(["-c", &script]).current_dir(bench.path("")).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    assert_eq!(piped("info <(cat a.xyz)"), (Some(0), expected, String::new()));
+    let (code, _, said) = piped("distance <(cat a.xyz) --spacing 0.5 -o none -q");
+    assert_eq!(code, Some(0), "{said}");
+    stack(&bench, "cells.tif", cubes);
+    let (code, _, said) = piped("segment <(cat cells.tif) --points a.xyz -o none");
+    assert!(code == Some(2) && said.contains("is a pipe or a device"), "{said}");
+}
+
+#[test]
+fn standard_input_is_an_input_like_others() {
+    let bench = Bench::bare();
+    let text = "0 0 0\n1 1 1\n0 1 0\n";
+    bench.write("a.xyz", text);
+    let input = || fs::File::open(bench.path("a.xyz")).unwrap();
+    let run = "distance - --spacing 0.5 -o none -q --overwrite --report";
+    let output = bench.command(&format!("{run} a.xyz")).stdin(input()).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && said.contains("a.xyz: is an input of this run"), "{said}");
+    assert_eq!(fs::read_to_string(bench.path("a.xyz")).unwrap(), text);
+    assert!(bench.command(&format!("{run} b.json")).stdin(input()).status().unwrap().success());
+}

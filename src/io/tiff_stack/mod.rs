@@ -117,4 +117,8 @@ impl PlaneSource for TiffStack {
         self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
         outcome
     }
+
+    fn path_of(&self, z: Option<i64>) -> Option<&Path> {
+        Some(z.and_then(|z| self.source.slice(z)).unwrap_or(&self.path))
+    }
 }

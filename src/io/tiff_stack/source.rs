@@ -24,6 +24,16 @@ pub(super) enum Source {
     Slices { files: Vec<PathBuf>, kind: Kind, sample: u16 },
 }
 
+impl Source {
+    /// The file of a slice, where slices have files of their own.
+    pub(super) fn slice(&self, z: i64) -> Option<&Path> {
+        match self {
+            Self::Slices { files, .. } => files.get(usize::try_from(z).ok()?).map(PathBuf::as_path),
+            _ => None,
+        }
+    }
+}
+
 /// Where one plane lies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {

@@ -136,6 +136,10 @@ impl VolumeSource for ZarrImage {
         self.info.element
     }
 
+    fn path_of(&self, _z: Option<i64>) -> Option<&Path> {
+        Some(&self.folder)
+    }
+
     fn natural_shape(&self) -> [i64; 3] {
         let shape = self.info.shape;
         let chunk = self.space.map(|axis| self.array.chunk[axis].get() as i64);

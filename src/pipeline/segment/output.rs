@@ -74,11 +74,15 @@ fn run<T: Sample>(
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();
     if settings.uses_image() && image.extremes[0] == image.extremes[1] {
-        return Err(Error::input(format!(
+        let error = Error::input(format!(
             "the image holds only the value {}; check --channel, --time and --crop, or give --image none to use the marks \
              alone",
             image.extremes[0]
-        )));
+        ));
+        return Err(match stack.path_of(None) {
+            Some(path) => error.at(path),
+            None => error,
+        });
     }
     let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry };
     let origin = guides.geometry.position(crop.lo.map(|v| -v));
