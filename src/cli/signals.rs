@@ -1,13 +1,13 @@
-//! SIGINT and SIGTERM: the first asks the run to end in order, the second ends it at once. A run that has not ended a
-//! while after the first, since it reads a slow disk or is in a long computation, is ended from here, and what it had begun
-//! to write is removed.
+//! SIGINT and SIGTERM: the first asks the run to end in order. A run that has not ended a while after it, since it reads a
+//! slow disk or is in a long computation, or is sent a second one, is ended from here, and what it had begun to write is
+//! removed. A signal in the midst of that ends the process at once.
 
 use std::process::exit;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
@@ -30,10 +30,9 @@ static ASKED: AtomicUsize = AtomicUsize::new(0);
 /// A flag that the first signal sets.
 pub(super) fn cancel_on_signals() -> Result<Cancel> {
     let cancel = Cancel::default();
-    let again = Arc::new(AtomicBool::new(false));
+    let (again, removing) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
     for signal in [SIGINT, SIGTERM] {
-        // In this order: the first signal finds `again` unset, sets it, and the second one ends the process.
-        flag::register_conditional_shutdown(signal, 128 + signal, again.clone())
+        flag::register_conditional_shutdown(signal, 128 + signal, removing.clone())
             .and_then(|_| flag::register(signal, again.clone()))
             .and_then(|_| flag::register_usize(signal, cancel.flag(), signal as usize))
             .map_err(|error| Error::from_io("cannot listen to signals", &error))?;
@@ -47,8 +46,14 @@ pub(super) fn cancel_on_signals() -> Result<Cancel> {
             thread::sleep(LOOK);
         }
         ASKED.store(asked.load(Relaxed), Relaxed);
-        thread::sleep(PATIENCE);
+        // Of two signals that come before this one is seen.
+        again.store(false, Relaxed);
+        let seen = Instant::now();
+        while seen.elapsed() < PATIENCE && !again.load(Relaxed) {
+            thread::sleep(LOOK);
+        }
         if speak_last() {
+            removing.store(true, Relaxed);
             end(asked.load(Relaxed));
         }
     };

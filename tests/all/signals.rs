@@ -74,6 +74,22 @@ fn a_stage_under_way_is_left() {
     assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty());
 }
 
+/// Whoever is in a hurry asks twice.
+#[test]
+fn a_second_signal_leaves_nothing_either() {
+    let bench = Bench::new(&Ball::small());
+    for (first, second) in [("INT", "INT"), ("TERM", "INT")] {
+        let mut run = Held::start(bench.command(&format!("{RUN} --tol 1e-30 --max-steps 1000000000")));
+        run.hear("speed 1  done");
+        run.signal(first);
+        run.signal(second);
+        let Ended { status, said, .. } = run.finish();
+        assert!(matches!(status.code(), Some(130 | 143)), "{said}");
+        assert_eq!(said.lines().last(), Some(SENTENCE), "{said}");
+        assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty(), "{first}, {second}");
+    }
+}
+
 /// Nothing can be done in order when a process is killed; the next one cleans up after it.
 #[test]
 fn what_a_killed_run_leaves_goes_with_the_next_one() {
