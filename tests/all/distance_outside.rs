@@ -57,7 +57,7 @@ fn to_segment(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// The distance to a triangle: to its plane where the foot lies inside, else to the nearest side.
-fn to_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
+pub(crate) fn to_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
     let sub = |p: [f64; 3], q: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| p[i] - q[i]) };
     let cross = |u: [f64; 3], v: [f64; 3]| -> [f64; 3] {
         [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
@@ -72,19 +72,19 @@ fn to_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
 }
 
 /// For each voxel the distance to each label's sources, by a plain search.
-fn plainly(sets: &DataSets) -> Vec<Vec<f64>> {
+pub(crate) fn plainly(grid: &Geometry, sets: &DataSets) -> Vec<Vec<f64>> {
     let near = |v| {
-        let here = position(&grid(), v);
+        let here = position(grid, v);
         let of = |[cloud, mesh]: [std::ops::Range<u32>; 2]| {
             let points = cloud.map(|n| squared(here, sets.positions[n as usize]).sqrt());
             points.chain(mesh.map(|n| to_triangle(here, sets.mesh.corners(n as usize)))).fold(f64::INFINITY, f64::min)
         };
         sets.places().map(of).collect()
     };
-    PlainGrid { shape: grid().shape }.voxels().map(near).collect()
+    PlainGrid { shape: grid.shape }.voxels().map(near).collect()
 }
 
-fn settings(method: Method, schedule: Schedule, brick: i64) -> DistanceSettings {
+pub(crate) fn settings(method: Method, schedule: Schedule, brick: i64) -> DistanceSettings {
     DistanceSettings {
         method,
         schedule,
@@ -98,26 +98,37 @@ fn settings(method: Method, schedule: Schedule, brick: i64) -> DistanceSettings 
     }
 }
 
-/// Distances, and the label of the nearest source.
-fn solved(sets: &DataSets, settings: &DistanceSettings, ranks: usize) -> (Vec<f32>, Vec<u32>) {
-    let lab = Lab::new(2);
+/// Distances and nearest sources on a grid, by so many threads and ranks.
+pub(crate) fn solved_on(
+    grid: &Geometry,
+    sets: &DataSets,
+    settings: &DistanceSettings,
+    [threads, ranks]: [usize; 2],
+) -> (Vec<f32>, Vec<u32>) {
+    let lab = Lab::new(threads);
     let engine = lab.engine.with_ranks(ranks);
     let trees = SourceTrees::new(sets);
-    solve_sets::<f32, _>(&engine, &grid(), sets, Some(&trees), settings, |solved, _| {
-        let part = grid().domain();
+    solve_sets::<f32, _>(&engine, grid, sets, Some(&trees), settings, |solved, _| {
+        let part = grid.domain();
         let (mut values, mut sources) = (vec![0.0; part.len()], vec![0; part.len()]);
         solved.values.read_box(&part, &mut values)?;
         solved.sources.read_box(&part, &mut sources)?;
-        Ok((values, sources.into_iter().map(|source| sets.label(source)).collect()))
+        Ok((values, sources))
     })
     .unwrap()
+}
+
+/// Distances, and the label of the nearest source.
+fn solved(sets: &DataSets, settings: &DistanceSettings, ranks: usize) -> (Vec<f32>, Vec<u32>) {
+    let (values, sources) = solved_on(&grid(), sets, settings, [2, ranks]);
+    (values, sources.into_iter().map(|source| sets.label(source)).collect())
 }
 
 /// How far distances and labels are from those of a plain search: the largest error, the share of voxels with any, and
 /// whether each label is right where another is farther by more than `unsure`.
 fn errors(sets: &DataSets, (values, labels): &(Vec<f32>, Vec<u32>), unsure: f64) -> (f64, f64, bool) {
     let (mut most, mut wrong, mut all_right) = (0.0_f64, 0, true);
-    for ((value, &label), each) in values.iter().zip(labels).zip(plainly(sets)) {
+    for ((value, &label), each) in values.iter().zip(labels).zip(plainly(&grid(), sets)) {
         let exact = each.iter().copied().fold(f64::INFINITY, f64::min);
         let error = f64::from(*value) - exact;
         assert!(error > -1e-5 * exact.max(1.0) || unsure > 1e-3, "{value} is below {exact}");

@@ -10,6 +10,7 @@ mod distance_front;
 mod distance_hostile;
 mod distance_meshes;
 mod distance_outside;
+mod distance_outside_dense;
 mod distance_papers;
 mod far_coordinates;
 mod flood;

@@ -272,6 +272,10 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
         self.sources.distance(state, voxel)
     }
 
+    fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
+        self.sources.distance_squared(state, voxel)
+    }
+
     fn source(state: u32) -> Option<u32> {
         S::source(state)
     }

@@ -49,6 +49,12 @@ pub trait DistanceMethod: Send + Sync {
     /// The distance of a voxel, physical units; infinite where nothing is known.
     fn distance(&self, state: Self::State, voxel: [i64; 3]) -> f64;
 
+    /// The squared distance of a voxel, physical units; where the method keeps sources [`DistanceMethod::distance`] is its
+    /// root.
+    fn distance_squared(&self, state: Self::State, voxel: [i64; 3]) -> f64 {
+        self.distance(state, voxel).powi(2)
+    }
+
     /// The voxel's source, where the method keeps it and one is known.
     fn source(state: Self::State) -> Option<u32>;
 }

@@ -21,6 +21,7 @@ pub mod leaving;
 pub mod marching_heap;
 pub mod method;
 pub mod outside;
+mod outside_block;
 pub mod parents;
 pub mod precision;
 pub mod second_look;

@@ -7,11 +7,16 @@
 //! its exact distance, and distance is carried inwards from them. A voxel near a face that a source in the grid fixes may
 //! have a nearer one outside too, and gets it. The nearest of all sources is found by R-trees, in f64; of equally near ones
 //! the lower label counts, then the lower index. What a voxel gets depends on nothing but the sources and the grid.
+//!
+//! Sources that lie denser than voxels are not all nearest to a voxel of the outermost layer, but may be to one deeper in
+//! the grid. So where methods keep sources, all voxels are looked up once more when distance has been carried
+//! ([`OutsideSources::lower`]): what they have been handed bounds the search, block by block (`outside_block`).
 
 use rstar::primitives::GeomWithData;
 use rstar::{PointDistance, RTree};
 
 use super::initialise::{NO_SOURCE, squared_distance};
+use super::outside_block::{Block, blocks};
 use super::seeds::{Seeds, counts_before};
 use super::source_trees::Placed;
 use crate::grid::{Box3, DataSets, Geometry};
@@ -25,8 +30,48 @@ const ROUNDING: f64 = 1e-6;
 pub struct OutsideSources<'a> {
     geometry: &'a Geometry,
     sets: &'a DataSets,
+    /// Those that reach out of the grid.
+    outside: Trees,
+    /// All others.
+    inside: Trees,
+}
+
+/// Sources, sorted.
+#[derive(Debug)]
+struct Trees {
     points: RTree<GeomWithData<[f64; 3], u32>>,
     triangles: RTree<GeomWithData<Placed, u32>>,
+}
+
+impl Trees {
+    /// Of the sources for which `reach_out` is that.
+    fn new(geometry: &Geometry, sets: &DataSets, reach_out: bool) -> Self {
+        let first = sets.positions.len() as u32;
+        let points = (0..).zip(&sets.positions).filter(|(_, point)| is_outside(geometry, **point) == reach_out);
+        let points = points.map(|(n, &point)| GeomWithData::new(point, n)).collect();
+        let triangles = (0..sets.mesh.len()).filter(|&n| reaches_out(geometry, sets, n) == reach_out);
+        let placed = |n| GeomWithData::new(Placed::new(sets.mesh.corners(n)), first + n as u32);
+        Self { points: RTree::bulk_load(points), triangles: RTree::bulk_load(triangles.map(placed).collect()) }
+    }
+
+    /// The squared distance of the nearest.
+    fn nearest(&self, here: [f64; 3]) -> Option<f64> {
+        let point = self.points.nearest_neighbor(here).map(|point| point.distance_2(&here));
+        let triangle = self.triangles.nearest_neighbor(here).map(|triangle| triangle.distance_2(&here));
+        point.into_iter().chain(triangle).reduce(f64::min)
+    }
+
+    /// Those within a squared distance, each with its own and its nearest place.
+    fn within(&self, here: [f64; 3], limit: f64) -> impl Iterator<Item = ((f64, u32), [f64; 3])> {
+        let points = self.points.locate_within_distance(here, limit).map(move |point| {
+            let place = *point.geom();
+            ((squared_distance(here, place), point.data), place)
+        });
+        points.chain(self.triangles.locate_within_distance(here, limit).map(move |placed| {
+            let triangle = &placed.geom().triangle;
+            ((triangle.distance_squared(here), placed.data), triangle.closest_point(here))
+        }))
+    }
 }
 
 impl<'a> OutsideSources<'a> {
@@ -36,11 +81,8 @@ impl<'a> OutsideSources<'a> {
         if count_outside(geometry, sets) == 0 {
             return None;
         }
-        let first = sets.positions.len() as u32;
-        let points = (0..).zip(&sets.positions).map(|(n, &point)| GeomWithData::new(point, n)).collect();
-        let placed = |n: u32| GeomWithData::new(Placed::new(sets.mesh.corners(n as usize)), first + n);
-        let triangles = (0..sets.mesh.len() as u32).map(placed).collect();
-        Some(Self { geometry, sets, points: RTree::bulk_load(points), triangles: RTree::bulk_load(triangles) })
+        let [outside, inside] = [true, false].map(|reach_out| Trees::new(geometry, sets, reach_out));
+        Some(Self { geometry, sets, outside, inside })
     }
 
     /// Fixes voxels of `part` at sources outside, none that is farther than `farthest`, where these are nearer than what
@@ -73,22 +115,41 @@ impl<'a> OutsideSources<'a> {
     /// The source that is nearest to a voxel, with its squared distance, if its nearest place lies outside.
     fn nearest_outside(&self, voxel: [i64; 3]) -> Option<(f64, u32)> {
         let here = self.geometry.position(voxel);
-        let point = self.points.nearest_neighbor(here).map(|point| point.distance_2(&here));
-        let triangle = self.triangles.nearest_neighbor(here).map(|triangle| triangle.distance_2(&here));
-        let least = point.into_iter().chain(triangle).reduce(f64::min)?;
+        let each = [&self.outside, &self.inside];
+        let least = each.into_iter().filter_map(|trees| trees.nearest(here)).reduce(f64::min)?;
         // Those that are as near, and what rounding hides.
         let limit = least * (1.0 + 1e-12);
-        let points = self.points.locate_within_distance(here, limit).map(|point| {
-            let place = *point.geom();
-            ((squared_distance(here, place), point.data), place)
-        });
-        let triangles = self.triangles.locate_within_distance(here, limit).map(|placed| {
-            let triangle = &placed.geom().triangle;
-            ((triangle.distance_squared(here), placed.data), triangle.closest_point(here))
-        });
         let label = |source| self.sets.label(source);
-        let nearest = points.chain(triangles).reduce(|a, b| if counts_before(b.0, a.0, label) { b } else { a });
+        let all = each.into_iter().flat_map(|trees| trees.within(here, limit));
+        let nearest = all.reduce(|a, b| if counts_before(b.0, a.0, label) { b } else { a });
         nearest.filter(|(_, place)| is_outside(self.geometry, *place)).map(|(found, _)| found)
+    }
+
+    /// Looks voxels of `part` up among the sources that reach out of the grid, none that is farther than `farthest`, where
+    /// one of these may be nearer than what they hold; of equally near ones the lower label counts, then the lower
+    /// index. Dense `[z][y][x]` with room for `edge`^3 voxels from `part.lo` on. Returns whether any voxel changed.
+    pub fn lower(&self, part: &Box3, edge: usize, farthest: f64, held: &mut Seeds) -> bool {
+        let label = |source| self.sets.label(source);
+        let mut changed = false;
+        for voxels in blocks(part) {
+            let place = |v: [i64; 3]| {
+                let [x, y, z] = std::array::from_fn(|a| (v[a] - part.lo[a]) as usize);
+                (z * edge + y) * edge + x
+            };
+            let mut block = Block::new(self.geometry, &voxels, |voxel| {
+                let (at, depth) = (place(voxel), self.depth(voxel));
+                // All of them are farther than the grid's face.
+                (held.squared[at] >= depth * depth).then_some((held.squared[at], held.source[at]))
+            });
+            block.look(&self.outside.points, farthest, label);
+            block.look(&self.outside.triangles, farthest, label);
+            block.each_nearer(|voxel, nearer| {
+                let at = place(voxel);
+                (held.squared[at], held.source[at]) = nearer;
+                changed = true;
+            });
+        }
+        changed
     }
 }
 
@@ -96,8 +157,12 @@ impl<'a> OutsideSources<'a> {
 #[must_use]
 pub fn count_outside(geometry: &Geometry, sets: &DataSets) -> u64 {
     let points = sets.positions.iter().filter(|&&point| is_outside(geometry, point)).count();
-    let reaches_out = |&n: &usize| sets.mesh.corners(n).into_iter().any(|corner| is_outside(geometry, corner));
-    (points + (0..sets.mesh.len()).filter(reaches_out).count()) as u64
+    (points + (0..sets.mesh.len()).filter(|&n| reaches_out(geometry, sets, n)).count()) as u64
+}
+
+/// Whether a triangle reaches out of a grid.
+fn reaches_out(geometry: &Geometry, sets: &DataSets, triangle: usize) -> bool {
+    sets.mesh.corners(triangle).into_iter().any(|corner| is_outside(geometry, corner))
 }
 
 /// Whether a place lies outside of the box of voxel centres.

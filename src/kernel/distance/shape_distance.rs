@@ -214,6 +214,10 @@ impl DistanceMethod for ShapeDistance<'_> {
         self.distance_squared(state, voxel).sqrt()
     }
 
+    fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
+        self.distance_squared(state, voxel)
+    }
+
     fn source(state: u32) -> Option<u32> {
         Some(state & !FIXED).filter(|&s| s != NO_SOURCE)
     }

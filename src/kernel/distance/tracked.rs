@@ -25,10 +25,6 @@ pub trait TrackedSource: DistanceMethod<State = u32> {
         squared < than.0
     }
 
-    /// The squared distance of a voxel to a source, physical units, in f64: of which [`DistanceMethod::distance`] is
-    /// the root.
-    fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64;
-
     /// Those of a row of voxels along x, the first at `start`, each to its own source.
     fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
         for ((x, out), &source) in (start[0]..).zip(out).zip(sources) {
@@ -61,10 +57,6 @@ impl<A: Real> TrackedSource for VectorDistance<'_, A> {
         squared(here, self.point(state))
     }
 
-    fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(source, voxel)
-    }
-
     fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
         self.squared_row(sources, start, out);
     }
@@ -84,9 +76,5 @@ impl TrackedSource for ShapeDistance<'_> {
     #[inline]
     fn is_nearer(&self, a: (f64, u32), b: (f64, u32)) -> bool {
         a.0 < b.0 || (a.0 == b.0 && self.has_lower_label(a.1, b.1))
-    }
-
-    fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(source, voxel)
     }
 }

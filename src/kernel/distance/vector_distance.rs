@@ -364,6 +364,10 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
         self.distance_squared(state, voxel).sqrt()
     }
 
+    fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
+        self.distance_squared(state, voxel)
+    }
+
     fn source(state: u32) -> Option<u32> {
         Some(state & !FIXED).filter(|&s| s != NO_SOURCE)
     }

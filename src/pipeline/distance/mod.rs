@@ -9,6 +9,7 @@ mod field;
 mod front;
 mod initialise;
 mod job;
+mod look_outside;
 mod needs;
 mod output;
 mod ranks;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::field::{Solved, Values};
 use super::front::advance_front;
 use super::initialise::{Seeded, Start, initialise};
+use super::look_outside::look_outside;
 use super::sweep::{Alone, sweep_all};
 use super::sweep_sources::TrackedSweeps;
 use super::textbook::{Wanted, heap_dijkstra, heap_marching};
@@ -288,12 +289,14 @@ impl<'a> Job<'_, 'a> {
         let beyond = if M::told(0).is_some() { geometry.length([REACH; 3]) } else { 0.0 };
         let farthest = self.options.farthest + beyond;
         advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, farthest)?;
+        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
         Ok(self.solved(method, state, &seeded))
     }
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<M>(Start::Fixed)?;
         sweep_all(self.stage, &method, &state, &mut Alone(self.set), &seeded.bricks, iterations)?;
+        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
         Ok(self.solved(method, state, &seeded))
     }
 
@@ -363,6 +366,7 @@ impl<'a> Job<'_, 'a> {
     fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<S>(Start::Fixed)?;
         heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
+        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
         Ok(self.solved(method, state, &seeded))
     }
 
