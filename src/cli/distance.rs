@@ -13,11 +13,10 @@ use super::distance_args::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
 use super::distance_report::{Found, Settings, describe_found};
 use super::distance_sources::{Read, read_sets};
 use super::files::{export_mesh, mesh_format, tell_of_anchor};
-use super::grid::grid;
 use super::outputs::Outputs;
 use super::report::{Ran, Report};
 use super::text::{bytes, duration, grouped, number, place, triple};
-use super::{print, signals, table};
+use super::{grid, print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
@@ -77,17 +76,17 @@ impl Job {
         outputs.check()?;
         let resources = config::resources(&args.job.resources, args.job.output.output.path())?;
         let console = Arc::new(Console::new(Voice::of(args.job.output.quiet, args.job.output.verbose)));
-        let Read { sets, volume } = read_sets(&args, resources.memory, &console, &cancel)?;
-        let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
         let mut notes = Vec::new();
-        let geometry = match volume {
-            Some(geometry) if !args.job.grid.is_asked_for() => geometry,
-            _ => grid(&args.job.grid, bounds, &mut notes)?,
+        let given = grid::given(&args.job.grid, &mut notes)?;
+        notes.iter().for_each(|note| console.note(note));
+        let Read { sets, volume } = read_sets(&args, given.as_ref(), resources.memory, &console, &cancel)?;
+        let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
+        let geometry = match (given, volume) {
+            (Some(geometry), _) => geometry,
+            (None, Some(geometry)) if !args.job.grid.is_asked_for() => geometry,
+            _ => grid::around(&args.job.grid, bounds)?,
         };
-        notes.extend(outside_note(&geometry, &sets));
-        for note in &notes {
-            console.note(note);
-        }
+        outside_note(&geometry, &sets).iter().for_each(|note| console.note(note));
         if args.job.resources.brick.is_none() {
             settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
         }

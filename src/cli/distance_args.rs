@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::args::ResourceArgs;
+use super::args::{PointsIn, ResourceArgs};
 use super::pages_args::PagesArgs;
 use super::values::{
     Output, parse_method, parse_neighbours, parse_spacing, parse_triple, parse_whole_triple, solvers_help,
@@ -73,6 +73,10 @@ pub(super) struct GridArgs {
     pub(super) level: u32,
     #[command(flatten)]
     pub(super) pages: PagesArgs,
+    /// What the numbers of points are: voxel indices of the grid of --like (or of --origin, --shape and --spacing), the
+    /// first one 0, or lengths [default: with --like as the file's form says: voxels of napari and of ROIs, else lengths]
+    #[arg(long, value_enum)]
+    pub(super) points_in: Option<PointsIn>,
 }
 
 /// How distance is computed.

@@ -2,17 +2,20 @@
 
 use std::path::Path;
 
+use super::args::PointsIn;
 use super::console::Console;
 use super::distance_args::{DistanceJobArgs, GridArgs};
 use super::grid::check_spacing;
 use super::input::open_stack;
+use super::marks::{Reading, placed};
 use super::sources::read_told;
 use super::text::{bytes, grouped};
 use crate::error::{Error, Result};
 use crate::exec::{Cancel, Progress};
-use crate::grid::{DataSets, Geometry, TriangleMesh, refuse_too_many};
+use crate::grid::{DataSets, Geometry, PointCloud, TriangleMesh, refuse_too_many};
 use crate::io::label_volume::{LabelVolume, is_label_volume, labels_of};
-use crate::io::sources::Source;
+use crate::io::points::PointFile;
+use crate::io::sources::{Source, read_parts};
 use crate::kernel::solid::Solid;
 use crate::pipeline::label_borders::label_borders;
 
@@ -26,9 +29,21 @@ pub(super) struct Read {
     pub(super) volume: Option<Geometry>,
 }
 
-/// Reads all sources; a cloud or mesh is one data set with the next label, a label volume as many as it has labels.
-pub(super) fn read_sets(args: &DistanceJobArgs, memory: u64, console: &Console, cancel: &Cancel) -> Result<Read> {
+/// Reads all sources; a cloud or mesh is one data set with the next label, a label volume as many as it has labels. `grid`
+/// is the one that was asked for, where no source is needed to tell it.
+pub(super) fn read_sets(
+    args: &DistanceJobArgs,
+    grid: Option<&Geometry>,
+    memory: u64,
+    console: &Console,
+    cancel: &Cancel,
+) -> Result<Read> {
     check_spacing("--image-spacing", args.job.grid.image_spacing)?;
+    if args.job.grid.points_in == Some(PointsIn::Voxels) && grid.is_none() {
+        return Err(Error::usage(
+            "--points-in voxels counts voxels of a grid; give --like IMAGE, or --origin, --shape and --spacing",
+        ));
+    }
     let mut read = Read { sets: DataSets::default(), volume: None };
     for path in &args.sources {
         let is_volume = is_label_volume(path);
@@ -44,7 +59,7 @@ pub(super) fn read_sets(args: &DistanceJobArgs, memory: u64, console: &Console, 
         } else if is_volume {
             return Err(without_inside("label volumes").at(path));
         } else {
-            match read_told(path, &|text| console.note(text))? {
+            match read_placed(path, &args.job.grid, grid, &|text| console.note(text))? {
                 Source::Cloud(_) if args.choice.signed => return Err(without_inside("points").at(path)),
                 Source::Cloud(cloud) => read.sets.add_cloud(&cloud.positions),
                 Source::Mesh(mesh) if args.choice.signed => {
@@ -56,6 +71,31 @@ pub(super) fn read_sets(args: &DistanceJobArgs, memory: u64, console: &Console, 
         refuse_too_many("sources", read.sets.len() as u64).map_err(|error| error.at(path))?;
     }
     Ok(read)
+}
+
+/// Reads points or a mesh. Points that count voxels are placed where the grid has them: of a file whose form says so where the
+/// grid is that of an image, of any where that was asked for.
+fn read_placed(path: &Path, args: &GridArgs, grid: Option<&Geometry>, note: &dyn Fn(&str)) -> Result<Source> {
+    let image = grid.filter(|_| args.like.is_some() || args.points_in.is_some());
+    let Some(image) = image else { return read_told(path, note) };
+    let (source, form, notes) = read_parts(path)?;
+    notes.iter().for_each(|text| note(text));
+    let noted = |text: &str| note(&format!("{}: {text}", path.display()));
+    match (source, form) {
+        (Source::Cloud(cloud), form) => {
+            let file = form.unwrap_or_else(|| PointFile::physical("points", PointCloud::default()));
+            file.notes.iter().for_each(|text| noted(text));
+            let reading = Reading { image, points_in: args.points_in, time: args.time };
+            let cloud = placed(PointFile { cloud, ..file }, &reading, noted).map_err(|error| error.at(path))?;
+            Ok(Source::Cloud(cloud))
+        }
+        (mesh, _) => {
+            if args.points_in == Some(PointsIn::Voxels) {
+                noted("is a mesh, whose vertices are lengths; --points-in says what the numbers of points are");
+            }
+            Ok(mesh)
+        }
+    }
 }
 
 fn without_inside(what: &str) -> Error {

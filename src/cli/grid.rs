@@ -12,17 +12,28 @@ const DEFAULT_VOXELS: f64 = 256.0;
 /// The room around sources where none is given, in parts of their largest extent (Kósa & Mikula 2023).
 const DEFAULT_PADDING: f64 = 1.0 / 6.0;
 
-/// The grid that was asked for; `bounds` is the box of all sources. Adds what the user should know to `notes`.
-pub(super) fn grid(args: &GridArgs, (low, high): ([f64; 3], [f64; 3]), notes: &mut Vec<String>) -> Result<Geometry> {
+/// The grid that was asked for where no source is needed to tell it: that of an image, or one typed in full. Adds what the
+/// user should know to `notes`.
+pub(super) fn given(args: &GridArgs, notes: &mut Vec<String>) -> Result<Option<Geometry>> {
     if let Some(image) = &args.like {
         let stack = open_stack(image, args.select(), args.image_spacing)?;
         notes.extend(stack.notes);
-        return Ok(stack.geometry);
+        return Ok(Some(stack.geometry));
     }
     check_spacing("--spacing", args.spacing)?;
-    if let (Some(shape), Some(origin), Some(spacing)) = (args.shape, args.origin, args.spacing) {
-        return exact(shape, origin, spacing);
+    match (args.shape, args.origin, args.spacing) {
+        (Some(shape), Some(origin), Some(spacing)) => exact(shape, origin, spacing).map(Some),
+        _ => Ok(None),
     }
+}
+
+/// The grid that was asked for; `bounds` is the box of all sources. Adds what the user should know to `notes`.
+pub(super) fn asked_grid(args: &GridArgs, bounds: ([f64; 3], [f64; 3]), notes: &mut Vec<String>) -> Result<Geometry> {
+    given(args, notes)?.map_or_else(|| around(args, bounds), Ok)
+}
+
+/// The grid around sources, of which `bounds` is the box.
+pub(super) fn around(args: &GridArgs, (low, high): ([f64; 3], [f64; 3])) -> Result<Geometry> {
     if let Some(padding) = args.padding.filter(|p| !(p.is_finite() && *p >= 0.0)) {
         return Err(Error::usage(format!("--padding is {padding}; give a length, 0 or more")));
     }
@@ -109,32 +120,33 @@ mod tests {
         time: 0,
         level: 0,
         pages: PagesArgs::NOTHING,
+        points_in: None,
     };
 
-    fn around(args: &GridArgs, low: [f64; 3], high: [f64; 3]) -> Result<Geometry> {
-        grid(args, (low, high), &mut Vec::new())
+    fn laid(args: &GridArgs, low: [f64; 3], high: [f64; 3]) -> Result<Geometry> {
+        asked_grid(args, (low, high), &mut Vec::new())
     }
 
     #[test]
     fn the_papers_grid_around_sources() {
         let args = GridArgs { spacing: Some([0.1; 3]), ..NOTHING };
-        let found = around(&args, [0.0; 3], [3.0, 1.0, 0.0]).unwrap();
+        let found = laid(&args, [0.0; 3], [3.0, 1.0, 0.0]).unwrap();
         assert_eq!(found.shape, [42, 22, 12]);
         assert_eq!(found.origin, [-0.5; 3]);
-        assert_eq!(around(&NOTHING, [0.0; 3], [1.0; 3]).unwrap().shape, [258; 3]);
+        assert_eq!(laid(&NOTHING, [0.0; 3], [1.0; 3]).unwrap().shape, [258; 3]);
     }
 
     #[test]
     fn senseless_grids_are_refused() {
         let with = |spacing| GridArgs { spacing: Some(spacing), ..NOTHING };
         for spacing in [[0.0; 3], [-1.0; 3], [f64::NAN, 1.0, 1.0], [f64::INFINITY; 3], [1e-12; 3]] {
-            assert_eq!(around(&with(spacing), [0.0; 3], [1.0; 3]).unwrap_err().exit_code(), 2, "{spacing:?}");
+            assert_eq!(laid(&with(spacing), [0.0; 3], [1.0; 3]).unwrap_err().exit_code(), 2, "{spacing:?}");
         }
-        assert!(around(&NOTHING, [1.0; 3], [1.0; 3]).unwrap_err().to_string().contains("one point"));
-        assert!(around(&NOTHING, [-1e308; 3], [1e308; 3]).is_err());
+        assert!(laid(&NOTHING, [1.0; 3], [1.0; 3]).unwrap_err().to_string().contains("one point"));
+        assert!(laid(&NOTHING, [-1e308; 3], [1e308; 3]).is_err());
         let shape = GridArgs { shape: Some([5, 0, 5]), origin: Some([0.0; 3]), ..with([1.0; 3]) };
-        assert!(around(&shape, [0.0; 3], [1.0; 3]).unwrap_err().to_string().contains("--shape"));
+        assert!(laid(&shape, [0.0; 3], [1.0; 3]).unwrap_err().to_string().contains("--shape"));
         let padding = GridArgs { padding: Some(-1.0), ..NOTHING };
-        assert!(around(&padding, [0.0; 3], [1.0; 3]).unwrap_err().to_string().contains("--padding"));
+        assert!(laid(&padding, [0.0; 3], [1.0; 3]).unwrap_err().to_string().contains("--padding"));
     }
 }

@@ -61,7 +61,7 @@ pub(super) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Con
 }
 
 /// The points of a file in the world of the image.
-fn placed(file: PointFile, reading: &Reading<'_>, note: impl Fn(&str)) -> Result<PointCloud> {
+pub(super) fn placed(file: PointFile, reading: &Reading<'_>, note: impl Fn(&str)) -> Result<PointCloud> {
     let image = reading.image;
     let (form, scales, units) = (file.form.clone(), file.scales, file.units);
     let mut cloud = of_time(file, reading.time, &note)?;

@@ -12,7 +12,7 @@ use super::console::{Console, Voice};
 use super::disk::Disk;
 use super::distance_args::GridArgs;
 use super::files::{export_mesh, mesh_format, tell_of_anchor};
-use super::grid::{check_counts, grid};
+use super::grid::{asked_grid, check_counts};
 use super::outputs::Outputs;
 use super::reconstruct_args::{CloudGridArgs, ReconstructArgs};
 use super::report::{Hausdorff, Hole, Moves, Ran, Report};
@@ -91,7 +91,7 @@ fn laid_grid(
     let spacing = Some(around.spacing);
     let asked = GridArgs { spacing, padding, origin, shape, ..GridArgs::default() };
     let high = |a: usize| cloud.iter().map(|p| p[a]).fold(f64::NEG_INFINITY, f64::max);
-    let laid = grid(&asked, (around.origin, [high(0), high(1), high(2)]), &mut Vec::new())?;
+    let laid = asked_grid(&asked, (around.origin, [high(0), high(1), high(2)]), &mut Vec::new())?;
     let outside =
         cloud.iter().filter(|&&p| !laid.domain().contains(laid.to_voxels(p).map(|v| v.floor() as i64))).count();
     if outside > 0 {

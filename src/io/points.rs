@@ -67,7 +67,8 @@ pub struct PointFile {
 
 impl PointFile {
     /// Points whose numbers are lengths.
-    pub(super) fn physical(form: &str, cloud: PointCloud) -> Self {
+    #[must_use]
+    pub fn physical(form: &str, cloud: PointCloud) -> Self {
         Self {
             cloud,
             form: form.into(),

@@ -122,7 +122,19 @@ pub fn read_noted(path: &Path) -> Result<(Source, Vec<String>)> {
 /// # Errors
 /// As [`read_source`].
 pub fn describe(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>)> {
-    let describe = || {
+    let (source, points, mut notes) = read_parts(path)?;
+    let told = points.iter().flat_map(PointFile::notes_without_image);
+    notes.extend(told.map(|note| format!("{}: {note}", path.display())));
+    Ok((source, points, notes))
+}
+
+/// As [`describe`], for whoever knows the image that points lie in: of tables and ROIs nothing is told here, what is to be
+/// told of their numbers depends on the image.
+///
+/// # Errors
+/// As [`read_source`].
+pub fn read_parts(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>)> {
+    let read_parts = || {
         let mut input = Input::open(path, &format!("points or a mesh ({})", names()))?;
         let source = read(&mut input)?;
         let positions = match &source {
@@ -133,7 +145,7 @@ pub fn describe(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>)>
         let note = |note: String| format!("{}: {note}", path.display());
         Ok((source, input.points, input.notes.into_iter().map(note).collect()))
     };
-    describe().map_err(|error: Error| error.at(path))
+    read_parts().map_err(|error: Error| error.at(path))
 }
 
 fn read(input: &mut Input) -> Result<Source> {
@@ -171,12 +183,10 @@ fn read_table(input: &mut Input) -> Result<Source> {
     points::read_table(input).and_then(|file| cloud_of(file, input))
 }
 
-/// The points of a file, with what is to be told of it.
+/// The points of a file, with how they are to be understood.
 fn cloud_of(file: PointFile, input: &mut Input) -> Result<Source> {
     let cloud = points::refuse_empty(file.cloud)?;
-    let file = PointFile { cloud: PointCloud::default(), ..file };
-    input.notes.extend(file.notes_without_image());
-    input.points = Some(file);
+    input.points = Some(PointFile { cloud: PointCloud::default(), ..file });
     Ok(Source::Cloud(cloud))
 }
 

@@ -99,6 +99,47 @@ fn marks_of_napari_are_voxels_times_the_spacing() {
     assert!(lost.contains("--points-in voxels"), "{lost}");
 }
 
+/// The grid of an image gives voxel indices their place, in `distance` and `middle` as in `segment`.
+#[test]
+fn points_of_a_distance_count_voxels_of_the_grid() {
+    let ball = Ball::small();
+    let bench = Bench::new(&ball);
+    bench.write("lengths.csv", "x,y,z\n5,6,7\n12.25,3,11\n");
+    bench.write("indices.csv", "x,y,z\n10,12,7\n24.5,6,11\n");
+    bench.write("napari.csv", "axis-0,axis-1,axis-2\n7,12,10\n11,6,24.5\n");
+    bench.write("slices.csv", " ,X,Y,Slice\n1,10,12,8\n2,24.5,6,12\n");
+    let distance = |arguments: &str| {
+        let said = told(&bench, &format!("distance {arguments} --overwrite -o out/x.zarr"));
+        (volume(&bench.path("out/x.zarr")), said)
+    };
+    let (expected, _) = distance("lengths.csv --like image.tif");
+    let typed = "--origin 0,0,0 --shape 40,36,20 --spacing 0.5,0.5,1";
+    for arguments in [
+        "indices.csv --like image.tif --points-in voxels",
+        "napari.csv --like image.tif",
+        "lengths.csv --like image.tif --points-in physical",
+        "slices.csv --like image.tif --points-in voxels",
+        &format!("indices.csv {typed} --points-in voxels"),
+        &format!("napari.csv {typed} --points-in voxels"),
+    ] {
+        assert!(distance(arguments).0 == expected, "{arguments}");
+    }
+    let (_, said) = distance("napari.csv --like image.tif");
+    assert!(said.contains("napari.csv") && said.contains("times the spacing (0.5, 0.5, 1)"), "{said}");
+    // Where nobody names an image they are numbers.
+    let (taken, said) = distance(&format!("napari.csv {typed}"));
+    assert!(taken != expected && said.contains("they are taken as they are"), "{said}");
+    let (taken, _) = distance("napari.csv --like image.tif --points-in physical");
+    assert!(taken != expected);
+    let said = bench.fail("distance indices.csv --points-in voxels -o none", 2);
+    assert!(said.contains("--points-in voxels") && said.contains("--like"), "{said}");
+    bench.write("more.csv", "x,y,z\n30,30,4\n");
+    bench.succeed("middle indices.csv more.csv --like image.tif --points-in voxels -q -o none");
+    bench.write("mesh.obj", "v 1 1 1\nv 9 1 1\nv 1 9 1\nf 1 2 3\n");
+    let (_, said) = distance("mesh.obj --like image.tif --points-in voxels");
+    assert!(said.contains("mesh.obj: is a mesh, whose vertices are lengths"), "{said}");
+}
+
 #[test]
 fn the_time_of_the_image_chooses_among_points() {
     let ball = Ball::small();
