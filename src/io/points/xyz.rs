@@ -21,6 +21,7 @@ pub(super) fn read(
     mut counted: Option<u64>,
 ) -> Result<PointFile> {
     let mut rows = Rows::new(columns);
+    let mut counts = None;
     let mut bytes = Vec::new();
     let mut number = 1;
     while next_line(text, &mut bytes, number)? {
@@ -32,6 +33,9 @@ pub(super) fn read(
                 let Ok(more) = line.parse::<u64>() else { break };
                 counted = counted.map(|before| before.saturating_add(more));
             } else {
+                if rows.len() == 0 && counted.is_none() {
+                    counts = off_counts(line);
+                }
                 rows.push(number, &separator.split(line))?;
             }
         }
@@ -42,6 +46,30 @@ pub(super) fn read(
             "says that it has {counted} points and ends after {}: is it cut off?",
             rows.len()
         ))),
-        None => Ok(rows.finish()),
+        None => {
+            let lines = rows.len() as u64;
+            let mut file = rows.finish();
+            let all_counted = |[vertices, faces]: &[u64; 2]| vertices.saturating_add(*faces).saturating_add(1) == lines;
+            if let Some([vertices, faces]) = counts.filter(all_counted) {
+                file.notes.push(format!(
+                    "all of its {lines} lines are taken as points, the first one too, though it counts the others as OFF \
+                     does, {vertices} vertices and {faces} faces; if it is such a file, write OFF above it"
+                ));
+            }
+            Ok(file)
+        }
+    }
+}
+
+/// The fewest vertices that are taken for a count of lines: of fewer points the first one may happen to tell how many
+/// follow.
+const FEWEST_VERTICES: u64 = 4;
+
+/// The numbers of vertices and faces where a line may be the first of an OFF file without its keyword.
+fn off_counts(line: &str) -> Option<[u64; 2]> {
+    let counts: Option<Vec<u64>> = line.split_whitespace().map(|word| word.parse().ok()).collect();
+    match counts.as_deref() {
+        Some(&[vertices, faces, _]) if vertices >= FEWEST_VERTICES => Some([vertices, faces]),
+        _ => None,
     }
 }
