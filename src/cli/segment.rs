@@ -22,8 +22,8 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::io::stacks::Stack;
 use crate::pipeline::marks::{split, split_and_seed};
 use crate::pipeline::segment::{
-    Estimate, Grids, Guides, ImageModel, ObjectReport, Outcome, Refused, SegmentSettings, check_lengths, check_seed,
-    check_smoothing, estimate, segment,
+    Estimate, Grids, Guides, ImageModel, LARGEST_WHOLE, ObjectReport, Outcome, Refused, SegmentSettings, check_lengths,
+    check_seed, check_smoothing, estimate, segment,
 };
 use crate::store::Unfinished;
 
@@ -221,6 +221,7 @@ impl Job {
 
     /// Says what deserves a second look.
     fn tell(&self, outcome: &Outcome) {
+        self.tell_rounded(outcome.extremes);
         for object in outcome.objects.iter().filter(|object| object.marks_off > 0) {
             let verb = if object.marks_off == 1 { "mark lies" } else { "marks lie" };
             let (label, off) = (object.label, object.marks_off);
@@ -240,6 +241,20 @@ impl Job {
             self.console.say(&format!(
                 "object {label}: marks of an outline that is left out lie {mean} off in the mean, nine of ten within \
                  {p90}{next}"
+            ));
+        }
+    }
+
+    /// Says that grey values are not those of the file: 64-bit integers are read as doubles, which do not hold all of them.
+    fn tell_rounded(&self, extremes: [f64; 2]) {
+        let file_type = &self.stack.info().file_type;
+        if ["int64", "uint64"].contains(&file_type.as_str()) && extremes.iter().any(|v| v.abs() >= LARGEST_WHOLE) {
+            self.console.note(&format!(
+                "{}: grey values of type {file_type} reach from {:.0} to {:.0}; those beyond 2^53 are rounded to doubles, which \
+                 have 53 bits, in the output too",
+                self.args.image.display(),
+                extremes[0],
+                extremes[1]
             ));
         }
     }

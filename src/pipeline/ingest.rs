@@ -60,14 +60,18 @@ pub fn ingest<T: Sample>(
 fn no_number(volume: &dyn VolumeSource, part: &Box3, place: usize) -> Error {
     let [width, height, _] = part.shape();
     let place = place as i64;
-    let (x, y, z) = (place % width + part.lo[0], place / width % height + part.lo[1], place / (width * height));
-    let z = z + part.lo[2];
+    let within = [place % width, place / width % height, place / (width * height)];
+    let voxel: [i64; 3] = std::array::from_fn(|a| within[a] + part.lo[a]);
+    let stored = volume.whereabouts(voxel);
+    let of_file = stored.as_ref().map(|stored| &stored.part).filter(|part| !part.is_empty());
+    let of_file = of_file.map_or(String::new(), |part| format!(" ({part})"));
+    let [x, y, z] = voxel;
     let error = Error::input(format!(
-        "plane {z} holds a value that is no number (NaN or infinite) at voxel {x}, {y}, {z} (x, y, z); crop it away or repair \
-         the image"
+        "plane {z}{of_file} holds a value that is no number (NaN or infinite) at voxel {x}, {y}, {z} (x, y, z, counted from \
+         0); crop it away or repair the image"
     ));
-    match volume.path_of(Some(z)) {
-        Some(path) => error.at(path),
+    match stored {
+        Some(stored) => error.at(&stored.file),
         None => error,
     }
 }

@@ -1,6 +1,6 @@
 //! The traits that join files, bricks and pipelines: read or write any box of voxels, a volume as it is stored, or a mesh.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{Element, ElementType, Sample, SamplesMut};
 use crate::error::Result;
@@ -49,10 +49,24 @@ pub trait PlaneSource: Sync {
     /// When the plane cannot be read or decoded: names file, page and reason.
     fn read_plane(&self, z: i64, out: SamplesMut<'_>) -> Result<()>;
 
-    /// The file or folder that plane `z` is stored in, or all of it where none is named; for messages.
-    fn path_of(&self, _z: Option<i64>) -> Option<&Path> {
+    /// The file or folder of the stack, for messages; none where that is no file.
+    fn path(&self) -> Option<&Path> {
         None
     }
+
+    /// Where plane `z` is stored, for messages; none where that is no file.
+    fn whereabouts(&self, _z: i64) -> Option<Whereabouts> {
+        None
+    }
+}
+
+/// Where something is stored, for messages.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Whereabouts {
+    /// The file.
+    pub file: PathBuf,
+    /// What of it, such as `page 3`; empty where the file holds nothing else.
+    pub part: String,
 }
 
 /// A volume in a file, of which any box can be read from any thread, and which is stored in boxes of its own: the planes of
@@ -78,8 +92,13 @@ pub trait VolumeSource: Sync {
     /// When a part of the file cannot be read or decoded: names file, place and reason.
     fn read_box(&self, part: &Box3, out: SamplesMut<'_>) -> Result<()>;
 
-    /// The file or folder that plane `z` is stored in, or all of it where none is named; for messages.
-    fn path_of(&self, _z: Option<i64>) -> Option<&Path> {
+    /// The file or folder of the volume, for messages; none where that is no file.
+    fn path(&self) -> Option<&Path> {
+        None
+    }
+
+    /// Where a voxel is stored, for messages; none where that is no file.
+    fn whereabouts(&self, _voxel: [i64; 3]) -> Option<Whereabouts> {
         None
     }
 
@@ -119,8 +138,12 @@ impl<S: PlaneSource> VolumeSource for S {
         }
     }
 
-    fn path_of(&self, z: Option<i64>) -> Option<&Path> {
-        PlaneSource::path_of(self, z)
+    fn path(&self) -> Option<&Path> {
+        PlaneSource::path(self)
+    }
+
+    fn whereabouts(&self, [_, _, z]: [i64; 3]) -> Option<Whereabouts> {
+        PlaneSource::whereabouts(self, z)
     }
 }
 

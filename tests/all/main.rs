@@ -51,5 +51,6 @@ mod tiff_derived;
 mod tiff_dialects;
 mod tiff_handmade;
 mod tiff_hostile;
+mod told;
 mod zarr_input;
 mod zarr_readers;

@@ -26,7 +26,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::stacks::Stack;
 use crate::error::{Error, Result};
-use crate::store::{ElementType, PlaneSource, SamplesMut};
+use crate::store::{ElementType, PlaneSource, SamplesMut, Whereabouts};
 use decode::Scratch;
 use source::{Opened, Source};
 
@@ -118,7 +118,12 @@ impl PlaneSource for TiffStack {
         outcome
     }
 
-    fn path_of(&self, z: Option<i64>) -> Option<&Path> {
-        Some(z.and_then(|z| self.source.slice(z)).unwrap_or(&self.path))
+    fn path(&self) -> Option<&Path> {
+        Some(&self.path)
+    }
+
+    fn whereabouts(&self, z: i64) -> Option<Whereabouts> {
+        let (file, part) = self.source.whereabouts(z as u64);
+        Some(Whereabouts { file: file.unwrap_or(&self.path).to_path_buf(), part })
     }
 }

@@ -24,16 +24,6 @@ pub(super) enum Source {
     Slices { files: Vec<PathBuf>, kind: Kind, sample: u16 },
 }
 
-impl Source {
-    /// The file of a slice, where slices have files of their own.
-    pub(super) fn slice(&self, z: i64) -> Option<&Path> {
-        match self {
-            Self::Slices { files, .. } => files.get(usize::try_from(z).ok()?).map(PathBuf::as_path),
-            _ => None,
-        }
-    }
-}
-
 /// Where one plane lies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
@@ -82,6 +72,17 @@ impl Source {
                 let (file, offset) = slices::open_slice(&files[z])?;
                 read_page(&file, *kind, *sample, 1, offset, scratch, out)
             }
+        }
+    }
+}
+
+impl Source {
+    /// The file of plane `z`, where each has its own, and which part of a file it is.
+    pub(super) fn whereabouts(&self, z: u64) -> (Option<&Path>, String) {
+        match self {
+            Self::Pages { places, .. } => (None, format!("page {}", places[z as usize].page.0)),
+            Self::Contiguous { order, .. } => (None, format!("plane {} of its one page", order.plane(z) + 1)),
+            Self::Slices { files, .. } => (Some(&files[z as usize]), String::new()),
         }
     }
 }

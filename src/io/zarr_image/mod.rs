@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use super::stacks::{Select, Stack, StackInfo};
 use crate::error::{Error, Result};
 use crate::grid::Box3;
-use crate::store::{ElementType, SamplesMut, VolumeSource};
+use crate::store::{ElementType, SamplesMut, VolumeSource, Whereabouts};
 use array::ChunkedArray;
 use axes::{Axis, Role};
 use find::Found;
@@ -90,14 +90,20 @@ impl ZarrImage {
         Err(Error::failed(format!("a box of {} {due} was asked for as {len} {asked}", part.len())).at(&self.folder))
     }
 
-    /// Reads the chunk that lies at a place among the chunks along x, y, z, as far as it lies in `part`.
-    fn read_chunk(&self, place: [i64; 3], part: &Box3, out: &mut SamplesMut<'_>) -> Result<()> {
-        let chunk = |a: usize| self.array.chunk[a].get();
+    /// The place among all chunks of the one that lies at a place among the chunks along x, y, z.
+    fn chunk_at(&self, place: [i64; 3]) -> Vec<u64> {
         let mut at = vec![0; self.array.shape.len()];
         for (place, axis) in place.into_iter().zip(self.space) {
             at[axis] = place as u64;
         }
-        self.chosen.iter().for_each(|&(axis, index)| at[axis] = index / chunk(axis));
+        self.chosen.iter().for_each(|&(axis, index)| at[axis] = index / self.array.chunk[axis].get());
+        at
+    }
+
+    /// Reads the chunk that lies at a place among the chunks along x, y, z, as far as it lies in `part`.
+    fn read_chunk(&self, place: [i64; 3], part: &Box3, out: &mut SamplesMut<'_>) -> Result<()> {
+        let chunk = |a: usize| self.array.chunk[a].get();
+        let at = self.chunk_at(place);
         let lo: [i64; 3] = std::array::from_fn(|a| place[a] * chunk(self.space[a]) as i64);
         let hi: [i64; 3] = std::array::from_fn(|a| lo[a] + chunk(self.space[a]) as i64);
         let shared = Box3::new(lo, hi).intersect(part);
@@ -136,7 +142,7 @@ impl VolumeSource for ZarrImage {
         self.info.element
     }
 
-    fn path_of(&self, _z: Option<i64>) -> Option<&Path> {
+    fn path(&self) -> Option<&Path> {
         Some(&self.folder)
     }
 
@@ -169,6 +175,12 @@ impl VolumeSource for ZarrImage {
             }
         }
         Ok(())
+    }
+
+    fn whereabouts(&self, voxel: [i64; 3]) -> Option<Whereabouts> {
+        let place = std::array::from_fn(|a| voxel[a] / self.array.chunk[self.space[a]].get() as i64);
+        let at: Vec<String> = self.chunk_at(place).iter().map(u64::to_string).collect();
+        Some(Whereabouts { file: self.folder.clone(), part: format!("chunk {}", at.join(", ")) })
     }
 }
 

@@ -33,5 +33,5 @@ pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_f
 pub use object::{CrossValidation, ObjectReport};
 pub use objects::Refused;
 pub use outlines::crossed;
-pub use output::{Outcome, segment};
+pub use output::{LARGEST_WHOLE, Outcome, segment};
 pub use settings::{Guides, ImageModel, SegmentSettings, Start};

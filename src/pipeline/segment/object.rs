@@ -28,6 +28,36 @@ pub(super) struct Picture<'a, T: Element> {
     pub range: GreyRange,
     /// Where it lies.
     pub geometry: &'a Geometry,
+    /// Where it lies in truth, for messages.
+    pub world: World<'a>,
+}
+
+/// Where a picture lies that is solved as if its first voxel were the origin.
+#[derive(Clone, Copy)]
+pub(super) struct World<'a> {
+    /// The grid of the whole image.
+    pub whole: &'a Geometry,
+    /// The world position of the picture's origin.
+    pub origin: [f64; 3],
+}
+
+impl World<'_> {
+    /// A hole in an object's marks: how wide it is, and where; with the slice, where it is none beyond the image.
+    fn told(&self, hole: &Hole) -> String {
+        let whole = self.whole;
+        let place: [f64; 3] = std::array::from_fn(|a| hole.place[a] + self.origin[a]);
+        let slice = whole.to_voxels(place)[2].round();
+        let last = (whole.shape[2] - 1) as f64;
+        let on = if (0.0..=last).contains(&slice) {
+            format!("on slice {slice} (counted from 0)")
+        } else {
+            let (end, which) = if slice < 0.0 { (0.0, "first") } else { (last, "last") };
+            format!("beyond the {which} slice ({end}, counted from 0)")
+        };
+        let unit = whole.unit.as_deref().unwrap_or("(no unit)");
+        let width = digits::number(hole.width);
+        format!("a hole {width} {unit} wide at {}, {on}", digits::place(place, whole.min_spacing()))
+    }
 }
 
 /// What is reported of a solved object.
@@ -147,8 +177,8 @@ pub(super) fn solve<T: Element>(
     };
     let enclosure = match enclose(engine, &search)? {
         Found::Enclosed(enclosure) => enclosure,
-        Found::Leaks(deepest) => return Err(leak(marks, settings, &deepest, picture.geometry)),
-        Found::Nothing(deepest) => return Err(encloses_nothing(marks, picture.geometry, deepest.as_ref())),
+        Found::Leaks(deepest) => return Err(leak(marks, settings, &deepest, picture.world)),
+        Found::Nothing(deepest) => return Err(encloses_nothing(marks, picture, deepest.as_ref())),
     };
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
     let (beta, larger_beta) = (enclosure.beta, enclosure.larger_beta());
@@ -287,25 +317,21 @@ fn needs_outlines(marks: &ObjectMarks, settings: &SegmentSettings) -> Error {
     ))
 }
 
-fn leak(marks: &ObjectMarks, settings: &SegmentSettings, deepest: &Deepest, image: &Geometry) -> Error {
+fn leak(marks: &ObjectMarks, settings: &SegmentSettings, deepest: &Deepest, world: World<'_>) -> Error {
     let (object, beta) = (marks.object, settings.beta.unwrap_or_default());
     let larger = deepest.beta().map_or(String::new(), |beta| format!(", or give --beta {beta}"));
     Error::input(format!(
-        "with --beta {beta} the start of object {object} leaks through a hole {} wide; leave --beta out{larger}",
-        with_unit(deepest.hole.width, image)
+        "with --beta {beta} the start of object {object} leaks through {}; leave --beta out{larger}",
+        world.told(&deepest.hole)
     ))
 }
 
-fn with_unit(length: f64, image: &Geometry) -> String {
-    format!("{} {}", digits::number(length), image.unit.as_deref().unwrap_or("(no unit)"))
-}
-
-fn encloses_nothing(marks: &ObjectMarks, image: &Geometry, deepest: Option<&Deepest>) -> Error {
-    let object = marks.object;
+fn encloses_nothing<T: Element>(marks: &ObjectMarks, picture: &Picture<'_, T>, deepest: Option<&Deepest>) -> Error {
+    let (object, image) = (marks.object, picture.geometry);
     // A hole, and what closes it, are worth telling where the flood found any space at all.
     let told = deepest.and_then(|deepest| Some((deepest, deepest.beta()?)));
     let hole = told.map_or(String::new(), |(deepest, beta)| {
-        format!(", or give --beta {beta}: the deepest space has a hole {} wide", with_unit(deepest.hole.width, image))
+        format!(", or give --beta {beta}: the deepest space has {}", picture.world.told(&deepest.hole))
     });
     if !marks.drawn {
         return Error::input(format!(

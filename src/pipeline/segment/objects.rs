@@ -33,20 +33,20 @@ pub(super) struct Objects {
     pub refused: Vec<Refused>,
 }
 
-/// Solves all objects; `whole` is the grid of the image that the picture is a part of. They are solved on a grid whose first voxel is the origin, so that where the image lies in the
-/// world changes nothing but their place.
+/// Solves all objects. They are solved on a grid whose first voxel is the origin, so that where the image lies in the world
+/// changes nothing but their place.
 ///
 /// # Errors
 /// When none can be solved, scratch runs out, the output cannot be written or the run is interrupted.
 pub(super) fn solve_all<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
-    whole: &Geometry,
     objects: &[ObjectMarks],
     settings: &SegmentSettings,
     store: Option<&StoreWriter>,
 ) -> Result<Objects> {
     let several = objects.len() > 1;
+    let whole = picture.world.whole;
     let (objects, mut refused) = sifted(objects, &Grids { whole, part: picture.geometry, guessed: [false; 3] })?;
     let origin = picture.geometry.origin;
     let grid = Geometry { origin: [0.0; 3], ..picture.geometry.clone() };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::labels::Placed;
 use super::neighbours::{Found, Joined};
-use super::object::{ObjectReport, Picture, Solution};
+use super::object::{ObjectReport, Picture, Solution, World};
 use super::objects::{Objects, Refused, solve_all};
 use super::settings::{Guides, SegmentSettings};
 use super::tissue::{join_objects, write_faces};
@@ -27,6 +27,8 @@ pub struct Outcome {
     pub geometry: Geometry,
     /// Type of the image's voxels.
     pub element: ElementType,
+    /// The smallest and largest value of these voxels.
+    pub extremes: [f64; 2],
     /// The objects in order of their labels.
     pub objects: Vec<ObjectReport>,
     /// The objects that could not be solved.
@@ -38,6 +40,9 @@ pub struct Outcome {
     /// The common faces of labels, where any meet.
     pub contacts: Vec<Contact>,
 }
+
+/// Of whole numbers up to that, 2^53, each is held exactly in f64, the type that 64-bit ones are read in.
+pub const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
 
 /// Segments the part `crop` of a stack; `store` gets the results, none of them when it is absent.
 ///
@@ -74,20 +79,26 @@ fn run<T: Sample>(
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();
     if settings.uses_image() && image.extremes[0] == image.extremes[1] {
+        let value = image.extremes[0];
+        let rounded = if T::TYPE == ElementType::F64 && value.abs() >= LARGEST_WHOLE {
+            " (whole numbers from 2^53 on are rounded to doubles, so others near it may be among them)"
+        } else {
+            ""
+        };
         let error = Error::input(format!(
-            "the image holds only the value {}; check --channel, --time and --crop, or give --image none to use the marks \
-             alone",
-            image.extremes[0]
+            "the image holds only the value {value}{rounded}; check --channel, --time and --crop, or give --image none to \
+             use the marks alone"
         ));
-        return Err(match stack.path_of(None) {
+        return Err(match stack.path() {
             Some(path) => error.at(path),
             None => error,
         });
     }
-    let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry };
     let origin = guides.geometry.position(crop.lo.map(|v| -v));
     let whole = Geometry { shape: stack.shape(), origin, ..guides.geometry.clone() };
-    let Objects { solved, refused } = solve_all(engine, &picture, &whole, &objects, settings, store)?;
+    let world = World { whole: &whole, origin: guides.geometry.origin };
+    let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry, world };
+    let Objects { solved, refused } = solve_all(engine, &picture, &objects, settings, store)?;
     let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
     let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, store)?;
     let contacts = match solved.len() {
@@ -100,8 +111,8 @@ fn run<T: Sample>(
         write_image(engine, guides.geometry, &image, store)?;
     }
     let objects = solved.into_iter().map(|(_, report)| report).collect();
-    let geometry = guides.geometry.clone();
-    Ok(Outcome { geometry, element: T::TYPE, objects, refused, label_voxels, neighbours, contacts })
+    let (geometry, extremes) = (guides.geometry.clone(), image.extremes);
+    Ok(Outcome { geometry, element: T::TYPE, extremes, objects, refused, label_voxels, neighbours, contacts })
 }
 
 /// The objects on the image's grid.
