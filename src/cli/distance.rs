@@ -78,7 +78,9 @@ impl Job {
         let console = Arc::new(Console::new(Voice::of(args.job.output.quiet, args.job.output.verbose)));
         let mut notes = Vec::new();
         let given = grid::given(&args.job.grid, &mut notes)?;
-        notes.iter().for_each(|note| console.note(note));
+        for note in &notes {
+            console.note(note);
+        }
         let Read { sets, volume } = read_sets(&args, given.as_ref(), resources.memory, &console, &cancel)?;
         let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
         let geometry = match (given, volume) {
@@ -86,7 +88,9 @@ impl Job {
             (None, Some(geometry)) if !args.job.grid.is_asked_for() => geometry,
             _ => grid::around(&args.job.grid, bounds)?,
         };
-        outside_note(&geometry, &sets).iter().for_each(|note| console.note(note));
+        if let Some(note) = outside_note(&geometry, &sets) {
+            console.note(&note);
+        }
         if args.job.resources.brick.is_none() {
             settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
         }

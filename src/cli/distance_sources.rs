@@ -79,12 +79,16 @@ fn read_placed(path: &Path, args: &GridArgs, grid: Option<&Geometry>, note: &dyn
     let image = grid.filter(|_| args.like.is_some() || args.points_in.is_some());
     let Some(image) = image else { return read_told(path, note) };
     let (source, form, notes) = read_parts(path)?;
-    notes.iter().for_each(|text| note(text));
+    for text in &notes {
+        note(text);
+    }
     let noted = |text: &str| note(&format!("{}: {text}", path.display()));
     match (source, form) {
         (Source::Cloud(cloud), form) => {
             let file = form.unwrap_or_else(|| PointFile::physical("points", PointCloud::default()));
-            file.notes.iter().for_each(|text| noted(text));
+            for text in &file.notes {
+                noted(text);
+            }
             let reading = Reading { image, points_in: args.points_in, time: args.time };
             let cloud = placed(PointFile { cloud, ..file }, &reading, noted).map_err(|error| error.at(path))?;
             Ok(Source::Cloud(cloud))
