@@ -1,0 +1,1 @@
+"""Timing of many small objects: made stack and marks, two builds of the program in turn."""
