@@ -7,11 +7,10 @@ use std::path::{Path, PathBuf};
 
 use super::text::{bytes, grouped};
 use crate::error::Result;
-use crate::grid::Box3;
 use crate::io::ome_zarr::is_store;
 use crate::io::stacks::Select;
 use crate::io::zarr_image::{LevelDescription, ZarrImage};
-use crate::store::{ElementType, Sample, VolumeSource};
+use crate::pipeline::value_range::value_range;
 
 /// Groups lie no deeper than this: `labels/segmentation`, `levelset/object-1`.
 const DEEPEST: usize = 3;
@@ -59,29 +58,7 @@ pub(super) fn range(path: &Path, levels: &[LevelDescription]) -> Result<Option<(
     let voxels = |level: &LevelDescription| level.shape.iter().map(|&n| u128::from(n.unsigned_abs())).product::<u128>();
     let Some(level) = levels.iter().position(|level| voxels(level) <= MOST_READ) else { return Ok(None) };
     let image = ZarrImage::open(path, Select { level: level as u32, ..Select::default() })?;
-    let found = match image.element() {
-        ElementType::U8 => extremes::<u8>(&image)?,
-        ElementType::U16 => extremes::<u16>(&image)?,
-        ElementType::U32 => extremes::<u32>(&image)?,
-        ElementType::F16 | ElementType::F32 => extremes::<f32>(&image)?,
-        ElementType::F64 => extremes::<f64>(&image)?,
-    };
-    Ok((found[0] <= found[1]).then_some((level, found)))
-}
-
-fn extremes<T: Sample + Into<f64>>(image: &ZarrImage) -> Result<[f64; 2]> {
-    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    let mut values = Vec::new();
-    for part in image.natural_boxes(&Box3::from_shape(image.shape())) {
-        values.resize(part.len(), T::default());
-        image.read_box(&part, T::buffer(&mut values))?;
-        // Voxels without a closest point hold no number, and take no part.
-        for &value in &values {
-            let value: f64 = value.into();
-            range = [range[0].min(value), range[1].max(value)];
-        }
-    }
-    Ok(range)
+    Ok(value_range(&image)?.map(|range| (level, range)))
 }
 
 /// The files beside the images, and what each holds.

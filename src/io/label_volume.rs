@@ -7,7 +7,7 @@ use super::stacks::{Stack, format_of};
 use super::zarr_image::label_images;
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry};
-use crate::store::{ElementType, Sample};
+use crate::store::{Sample, SampleWork};
 
 /// The group of a store's segmentation, which is taken where the store itself is given.
 const SEGMENTATION: &str = "labels/segmentation";
@@ -83,26 +83,7 @@ impl LabelVolume {
     /// When it cannot be read, or holds a number that is no label: names file, voxel and number.
     pub fn read_box(&self, part: &Box3, out: &mut Vec<u32>) -> Result<()> {
         out.clear();
-        match self.stack.element() {
-            ElementType::U8 => self.read::<u8>(part, out),
-            ElementType::U16 => self.read::<u16>(part, out),
-            ElementType::U32 => self.read::<u32>(part, out),
-            ElementType::F16 | ElementType::F32 => self.read::<f32>(part, out),
-            ElementType::F64 => self.read::<f64>(part, out),
-        }
-    }
-
-    fn read<T: Sample + Into<f64>>(&self, part: &Box3, out: &mut Vec<u32>) -> Result<()> {
-        let mut values = vec![T::default(); part.len()];
-        self.stack.read_box(part, T::buffer(&mut values))?;
-        for value in values {
-            let value: f64 = value.into();
-            if !(value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value)) {
-                return Err(self.no_label(value, part, out.len()));
-            }
-            out.push(value as u32);
-        }
-        Ok(())
+        self.stack.element().with_samples(Reading { volume: self, part, out })
     }
 
     fn no_label(&self, value: f64, part: &Box3, place: usize) -> Error {
@@ -115,5 +96,30 @@ impl LabelVolume {
             u32::MAX
         ))
         .at(&self.path)
+    }
+}
+
+/// Labels made of the samples of a box.
+struct Reading<'a> {
+    volume: &'a LabelVolume,
+    part: &'a Box3,
+    out: &'a mut Vec<u32>,
+}
+
+impl SampleWork for Reading<'_> {
+    type Output = Result<()>;
+
+    fn on<T: Sample>(self) -> Result<()> {
+        let Self { volume, part, out } = self;
+        let mut values = vec![T::default(); part.len()];
+        volume.stack.read_box(part, T::buffer(&mut values))?;
+        for value in values {
+            let value = value.to_f64();
+            if !(value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value)) {
+                return Err(volume.no_label(value, part, out.len()));
+            }
+            out.push(value as u32);
+        }
+        Ok(())
     }
 }

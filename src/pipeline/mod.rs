@@ -23,5 +23,6 @@ mod sheets;
 pub mod smoothing;
 pub mod surface;
 pub mod tagging;
+pub mod value_range;
 pub mod vicinity;
 pub mod watershed;

@@ -83,9 +83,10 @@ macro_rules! element {
                 ($from)(value)
             }
             fn append_bytes(values: &[Self], out: &mut Vec<u8>) {
-                for value in values {
-                    out.extend_from_slice(&value.to_le_bytes());
-                }
+                let start = out.len();
+                out.resize(start + size_of_val(values), 0);
+                let words = out[start..].as_chunks_mut().0;
+                words.iter_mut().zip(values).for_each(|(word, value)| *word = value.to_le_bytes());
             }
             fn fill_from_bytes(values: &mut [Self], bytes: &[u8]) {
                 let words = bytes.as_chunks().0;
@@ -169,6 +170,28 @@ sample!(u16, U16);
 sample!(u32, U32);
 sample!(f32, F32);
 sample!(f64, F64);
+
+/// Work on samples whose type is known only when a file is opened.
+pub trait SampleWork {
+    /// What comes of it.
+    type Output;
+
+    /// Does the work on samples of a type.
+    fn on<T: Sample>(self) -> Self::Output;
+}
+
+impl ElementType {
+    /// Does work on samples of this type, as stacks hand them out: half precision as single.
+    pub fn with_samples<W: SampleWork>(self, work: W) -> W::Output {
+        match self {
+            Self::U8 => work.on::<u8>(),
+            Self::U16 => work.on::<u16>(),
+            Self::U32 => work.on::<u32>(),
+            Self::F16 | Self::F32 => work.on::<f32>(),
+            Self::F64 => work.on::<f64>(),
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {

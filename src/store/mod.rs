@@ -10,7 +10,7 @@ mod unfinished;
 mod window;
 
 pub use brick_array::{BrickArray, Scratch};
-pub use element::{Element, ElementType, Sample, SamplesMut};
+pub use element::{Element, ElementType, Sample, SampleWork, SamplesMut};
 pub use free_space::free_space;
 pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, NoMesh, PlaneSource, VolumeSource, Whereabouts};
 pub use unfinished::{Unfinished, remove_all as remove_unfinished};

@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use strandline::io::stacks::{Select, Stack};
 use strandline::io::zarr_image::ZarrImage;
-use strandline::store::{ElementType, SamplesMut, VolumeSource};
+use strandline::store::VolumeSource;
 
 use crate::common::ball::{Ball, Bench};
 use crate::common::python;
 use crate::common::random::Random;
+use crate::common::samples::numbers;
 use crate::common::stores::{contents, same};
 use crate::common::tiff_bytes::{gray_page, tiff_file};
 use crate::common::zarr_files::{axes, document, group, gzip_array, plain_array_v2, scale};
@@ -191,22 +192,7 @@ fn voxels(image: &ZarrImage) -> strandline::error::Result<Vec<f64>> {
     let domain = strandline::grid::Box3::from_shape(image.shape());
     let mut all = vec![f64::NAN; domain.len()];
     for part in image.natural_boxes(&domain) {
-        macro_rules! read {
-            ($type:ty, $variant:ident) => {{
-                // Not zero, so that a voxel that was left out shows.
-                let mut out = vec![77 as $type; part.len()];
-                image.read_box(&part, SamplesMut::$variant(&mut out))?;
-                out.into_iter().map(f64::from).collect::<Vec<f64>>()
-            }};
-        }
-        let values = match image.element() {
-            ElementType::U8 => read!(u8, U8),
-            ElementType::U16 => read!(u16, U16),
-            ElementType::U32 => read!(u32, U32),
-            ElementType::F32 => read!(f32, F32),
-            ElementType::F64 => read!(f64, F64),
-            ElementType::F16 => panic!("half precision is never handed out"),
-        };
+        let values = numbers(image, &part)?;
         let width = part.shape()[0] as usize;
         for (row, (y, z)) in values.chunks(width).zip(part.rows()) {
             all[domain.offset_of([part.lo[0], y, z])..][..width].copy_from_slice(row);

@@ -3,7 +3,6 @@
 //! A shard (Zarr v3 `sharding_indexed`) is the compressed chunks one after another, then an index: offset and length of
 //! each chunk, z slowest, `u64` little-endian, all ones for a chunk that holds only the fill value, and a CRC-32C.
 
-use std::any::Any;
 use std::borrow::Cow;
 use std::io::Write;
 use std::sync::Arc;
@@ -165,29 +164,12 @@ fn padded_bytes<T: Element>(values: &[T], valid: &Box3, chunk: &Box3, bytes: &mu
         let first = bytes.len();
         for row in plane.chunks(nx) {
             let start = bytes.len();
-            append_bytes(row, bytes);
+            T::append_bytes(row, bytes);
             bytes.resize(start + chunk_x * size, 0);
         }
         bytes.resize(first + chunk_x * chunk_y * size, 0);
     }
     bytes.resize(chunk_x * chunk_y * chunk_z * size, 0);
-}
-
-/// Appends the values as little-endian bytes.
-fn append_bytes<T: Element>(values: &[T], bytes: &mut Vec<u8>) {
-    match T::TYPE {
-        ElementType::U8 => bytes.extend(values.iter().map(|v| known::<T, u8>(v))),
-        ElementType::U16 => bytes.extend(values.iter().flat_map(|v| known::<T, u16>(v).to_le_bytes())),
-        ElementType::U32 => bytes.extend(values.iter().flat_map(|v| known::<T, u32>(v).to_le_bytes())),
-        ElementType::F16 => bytes.extend(values.iter().flat_map(|v| known::<T, half::f16>(v).to_le_bytes())),
-        ElementType::F32 => bytes.extend(values.iter().flat_map(|v| known::<T, f32>(v).to_le_bytes())),
-        ElementType::F64 => bytes.extend(values.iter().flat_map(|v| known::<T, f64>(v).to_le_bytes())),
-    }
-}
-
-/// A value of type `T` as the type that `T` is known to be.
-fn known<T: 'static, U: Copy + 'static>(value: &T) -> U {
-    (value as &dyn Any).downcast_ref::<U>().copied().expect("the element's type says what it is")
 }
 
 #[cfg(test)]

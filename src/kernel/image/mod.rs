@@ -5,6 +5,7 @@ pub mod box_gaussian;
 pub mod carried;
 pub mod downsample;
 pub mod edge_detector;
+pub mod extremes;
 pub mod gaps;
 pub mod gaussian;
 pub mod geodesic;
