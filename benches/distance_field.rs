@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use strandline::exec::{Budget, Cancel, Engine, Silent};
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
-use strandline::pipeline::distance::{Method, Options, Schedule, Sources, Textbook};
+use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources, Textbook};
 use strandline::store::Scratch;
 
 /// The grid points on the surface of the unit cube.
@@ -70,7 +70,11 @@ fn run(n: i64, points: Option<u64>, method: Method, edge: i64, threads: usize) {
             let started = Instant::now();
             let stage = engine.stage("distance", 0);
             let options = Options { sources, ..Options::up_to(f64::INFINITY) };
-            let solved = (solver.solve)(&stage, &engine, &given, &set, schedule, options).expect("room");
+            let solved = (solver.solve)(
+                &Solving { stage: &stage, engine: &engine, sources: &given, set: &set, options },
+                schedule,
+            )
+            .expect("room");
             let report = stage.finish();
             let solve = started.elapsed().as_secs_f64();
             let stage = engine.stage("measure", 0);

@@ -5,7 +5,7 @@ use strandline::grid::{Box3, DataSets, Geometry, PointBins};
 use strandline::kernel::distance::Neighbours;
 use strandline::kernel::distance::initialise::Cube;
 use strandline::pipeline::distance::{
-    DistanceFound, DistanceSettings, Init, Method, Schedule, Sources, distance as run_distance,
+    DistanceFound, DistanceSettings, Init, Method, Schedule, Solving, Sources, distance as run_distance,
 };
 
 use crate::common::clouds::{grid_around, sponge_and_sphere};
@@ -46,8 +46,11 @@ fn cube_error<P: Stored>(lab: &Lab, count: i64, method: Method, schedule: Schedu
     let sources = Sources { cubes: &cubes, ..Sources::cloud(&geometry, &cloud, &bins) };
     let stage = lab.engine.stage("distance", 0);
     let row = method.solver::<P>();
-    let solved =
-        (row.solve)(&stage, &lab.engine, &sources, &set, schedule, everywhere(false)).expect("room for a field");
+    let solved = (row.solve)(
+        &Solving { stage: &stage, engine: &lab.engine, sources: &sources, set: &set, options: everywhere(false) },
+        schedule,
+    )
+    .expect("room for a field");
     assert_eq!(solved.fixed_voxels, cloud.len() as u64);
     let part = Box3::from_shape(geometry.shape);
     let mut values = vec![P::default(); part.len()];

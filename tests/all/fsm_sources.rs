@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use rstar::RTree;
 use strandline::grid::{Box3, DataSets, Geometry, PointBins, TriangleBins};
 use strandline::kernel::distance::initialise::NO_SOURCE;
-use strandline::pipeline::distance::{Method, Options, Schedule, Sources};
+use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources};
 
 use crate::common::clouds::{grid_around, random_cloud, sponge_and_sphere};
 use crate::common::lab::{Lab, PlainGrid, dense};
@@ -42,7 +42,9 @@ fn fsm<P: Stored>(
     };
     let stage = lab.engine.stage("distance", 0);
     let solve = Method::FSM.solver::<P>().solve;
-    let solved = solve(&stage, &lab.engine, &sources, &set, schedule, options).expect("room for a distance");
+    let solved =
+        solve(&Solving { stage: &stage, engine: &lab.engine, sources: &sources, set: &set, options }, schedule)
+            .expect("room for a distance");
     let bricks = stage.finish().bricks;
     let part = Box3::from_shape(geometry.shape);
     let (mut values, mut nearest) = (vec![P::default(); part.len()], vec![0; part.len()]);

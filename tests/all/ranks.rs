@@ -14,7 +14,7 @@ use strandline::exec::{Budget, Cancel, Engine, Progress, Silent, StageReport};
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use strandline::kernel::distance::Neighbours;
 use strandline::kernel::distance::precision::Precision;
-use strandline::pipeline::distance::{Method, Options, Schedule, Sources, solve};
+use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources, solve};
 use strandline::store::{BoxSource, Element, Scratch};
 
 use crate::common::clouds::{grid_around, sponge};
@@ -271,7 +271,11 @@ fn one_rank_that_fails_ends_those_that_solve() {
         let plan = strandline::exec::HaloPlan::new(grid, strandline::exec::Reach::Faces);
         let ownership = strandline::exec::Ownership::balanced(&BrickSet::dense(grid), 3);
         let own = Arc::new(ownership.part(&BrickSet::dense(grid), engine.comm().rank(), &plan));
-        (solver.solve)(stage, engine, &sources, &own, Schedule::Front, case.options()).map(|solved| solved.fixed_voxels)
+        (solver.solve)(
+            &Solving { stage, engine, sources: &sources, set: &own, options: case.options() },
+            Schedule::Front,
+        )
+        .map(|solved| solved.fixed_voxels)
     });
     assert_eq!(failed.expect_err("rank 1 failed").to_string(), "the disk of rank 1 is full");
 }

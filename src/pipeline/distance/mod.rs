@@ -16,6 +16,7 @@ mod ranks;
 mod second_look;
 mod sign;
 mod solvers;
+mod solving;
 mod sources;
 mod sweep;
 mod sweep_sources;
@@ -31,6 +32,7 @@ pub(crate) use needs::tree_bytes;
 pub use output::{NearestLabels, write_fields, write_label_field};
 pub use ranks::solve;
 pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};
+pub use solving::Solving;
 pub use sources::Sources;
 
 use crate::error::Result;

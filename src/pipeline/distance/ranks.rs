@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::second_look::with_second_look;
+use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;
 use crate::exec::{HaloPlan, Ownership, Reach, Stage};
@@ -51,7 +52,7 @@ pub(super) fn solve_once<'a, P: Precision>(
     let plan = HaloPlan::new(*set.grid(), Reach::All);
     let parts = stage.on_ranks(|stage, engine| {
         let own = Arc::new(ownership.part(set, engine.comm().rank(), &plan));
-        (solver.solve)(stage, engine, sources, &own, schedule, options)
+        (solver.solve)(&Solving { stage, engine, sources, set: &own, options }, schedule)
     })?;
     let joined = Cut { grid: *set.grid(), ownership };
     let sum = |of: fn(&Solved<'a, P>) -> u64| parts.iter().map(of).sum();

@@ -1,0 +1,222 @@
+//! The distance methods on bricks: which kernel by which schedule, and the steps that methods share.
+
+use std::sync::Arc;
+
+use super::field::{Solved, Values};
+use super::front::advance_front;
+use super::initialise::{Seeded, Start, initialise};
+use super::look_outside::look_outside;
+use super::sweep::{Alone, sweep_all};
+use super::sweep_sources::TrackedSweeps;
+use super::textbook::{Wanted, heap_dijkstra, heap_marching};
+use super::trace::{SourceField, trace_sources};
+use super::{Options, Schedule, Sources};
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers};
+use crate::grid::{BrickSet, DataSets};
+use crate::kernel::distance::Neighbours;
+use crate::kernel::distance::all_neighbours::AllNeighbours;
+use crate::kernel::distance::dijkstra_pythagoras::DijkstraPythagoras;
+use crate::kernel::distance::fast_marching::FastMarching;
+use crate::kernel::distance::fast_sweeping::FastSweeping;
+use crate::kernel::distance::initialise::NO_SOURCE;
+use crate::kernel::distance::method::{DistanceMethod, OrderedSweeps};
+use crate::kernel::distance::parents::{Parents, ShortestWay, UpwindSum};
+use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::second_look::REACH;
+use crate::kernel::distance::shape_distance::ShapeDistance;
+use crate::kernel::distance::tracked::TrackedSource;
+use crate::kernel::distance::vector_distance::VectorDistance;
+use crate::store::BrickArray;
+
+/// What a method is given: sources, and the bricks of one rank.
+pub struct Solving<'j, 'a> {
+    /// Counts, and tells of an interruption.
+    pub stage: &'j Stage<'j>,
+    /// The rank's engine.
+    pub engine: &'j Engine,
+    /// To what the distance is.
+    pub sources: &'j Sources<'a>,
+    /// The rank's bricks.
+    pub set: &'j Arc<BrickSet>,
+    /// What is wanted beside or instead of the usual.
+    pub options: Options,
+}
+
+/// Fast sweeping.
+pub(super) fn fast_sweeping<'a, P: Precision>(job: &Solving<'_, 'a>, schedule: Schedule) -> Result<Solved<'a, P>> {
+    let spacing = job.sources.geometry.spacing;
+    match schedule {
+        Schedule::Front => job.front_then_sources::<P, _, UpwindSum>(FastSweeping::<P, P::Fast>::new(spacing)),
+        Schedule::Sweep { iterations } => job.sweeps_with_sources(FastSweeping::<P, f64>::new(spacing), iterations),
+    }
+}
+
+/// The vector distance transform.
+pub(super) fn vector_distance<'a, P: Precision>(job: &Solving<'_, 'a>, schedule: Schedule) -> Result<Solved<'a, P>> {
+    let (geometry, positions) = (job.sources.geometry, job.sources.positions);
+    if let Some(sets) = job.sources.shapes() {
+        let method = ShapeDistance::new(geometry, sets);
+        return match schedule {
+            Schedule::Front => job.front_vector(method),
+            Schedule::Sweep { iterations } => job.sweeps(method, iterations),
+        };
+    }
+    match schedule {
+        Schedule::Front => job.front_vector(VectorDistance::<P::Fast>::new(geometry, positions)),
+        Schedule::Sweep { iterations } => job.sweeps(VectorDistance::<f64>::new(geometry, positions), iterations),
+    }
+}
+
+/// Fast marching.
+pub(super) fn fast_marching<'a, P: Precision>(job: &Solving<'_, 'a>, schedule: Schedule) -> Result<Solved<'a, P>> {
+    let (geometry, positions) = (job.sources.geometry, job.sources.positions);
+    let method = FastMarching::<P, P::Fast>::new(geometry.spacing);
+    match (schedule, job.sources.shapes()) {
+        (Schedule::Front, _) => job.front_then_sources::<P, _, ShortestWay>(method),
+        (_, Some(sets)) => job.heap_marching(method, &ShapeDistance::new(geometry, sets)),
+        (_, None) => job.heap_marching(method, &VectorDistance::<f64>::new(geometry, positions)),
+    }
+}
+
+/// Dijkstra-Pythagoras.
+pub(super) fn dijkstra_pythagoras<'a, P: Precision>(
+    job: &Solving<'_, 'a>,
+    schedule: Schedule,
+) -> Result<Solved<'a, P>> {
+    let (geometry, positions) = (job.sources.geometry, job.sources.positions);
+    match (schedule, job.sources.shapes()) {
+        (Schedule::Front, Some(sets)) => job.front_dijkstra(ShapeDistance::new(geometry, sets)),
+        (Schedule::Front, None) => job.front_dijkstra(VectorDistance::<P::Fast>::new(geometry, positions)),
+        (_, Some(sets)) => job.heap_dijkstra(ShapeDistance::new(geometry, sets)),
+        (_, None) => job.heap_dijkstra(VectorDistance::<f64>::new(geometry, positions)),
+    }
+}
+
+impl<'a> Solving<'_, 'a> {
+    /// A method's start: its state with the voxels that sources fix.
+    fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
+        let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
+        let seeded = initialise::<M>(self.stage, self.sources, &state, None, (start, self.options.farthest))?;
+        Ok((state, seeded))
+    }
+
+    /// The start of a method that keeps no sources, and a field with those of its fixed voxels.
+    fn start_apart<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, BrickArray<u32>, Seeded)> {
+        let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
+        let sources = BrickArray::blank(self.engine.scratch(), self.set, NO_SOURCE)?;
+        let seeded =
+            initialise::<M>(self.stage, self.sources, &state, Some(&sources), (Start::Fixed, self.options.farthest))?;
+        Ok((state, sources, seeded))
+    }
+
+    fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+        let (state, seeded) = self.start::<M>(Start::Told)?;
+        let geometry = self.sources.geometry;
+        // Where sources are looked at again, those beyond the last voxel that counts are asked too.
+        let beyond = if M::told(0).is_some() { geometry.length([REACH; 3]) } else { 0.0 };
+        let farthest = self.options.farthest + beyond;
+        advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, farthest)?;
+        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
+        Ok(self.solved(method, state, &seeded))
+    }
+
+    fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
+        let (state, seeded) = self.start::<M>(Start::Fixed)?;
+        sweep_all(self.stage, &method, &state, &mut Alone(self.set), &seeded.bricks, iterations)?;
+        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
+        Ok(self.solved(method, state, &seeded))
+    }
+
+    /// Distances, and along with them their sources, where these are asked for.
+    fn sweeps_with_sources<P: Precision>(
+        &self,
+        method: FastSweeping<P, f64>,
+        iterations: u32,
+    ) -> Result<Solved<'a, P>> {
+        if !self.options.sources {
+            return self.sweeps(method, iterations);
+        }
+        let (state, sources, seeded) = self.start_apart::<FastSweeping<P, f64>>()?;
+        if self.labelled().is_some() {
+            // An update that lowers nothing is none, so sweeps do not see that another label is as near.
+            sweep_all(self.stage, &method, &state, &mut Alone(self.set), &seeded.bricks, iterations)?;
+            self.trace::<P, UpwindSum>(&state, &sources, &seeded)?;
+            return Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) });
+        }
+        let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &seeded.bricks)?;
+        sweep_all(self.stage, &method, &state, &mut tracked, &seeded.bricks, iterations)?;
+        drop(tracked);
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
+    }
+
+    /// Distances, and then their sources, where these are asked for.
+    fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a, R: Parents>(
+        &self,
+        method: M,
+    ) -> Result<Solved<'a, P>> {
+        if !self.options.sources {
+            return self.front(method);
+        }
+        let (state, sources, seeded) = self.start_apart::<M>()?;
+        let geometry = self.sources.geometry;
+        advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, self.options.farthest)?;
+        self.trace::<P, R>(&state, &sources, &seeded)?;
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
+    }
+
+    /// The data sets, where labels are wanted and these are several.
+    fn labelled(&self) -> Option<&'a DataSets> {
+        self.sources.labelled().filter(|_| self.options.labels)
+    }
+
+    fn trace<P: Precision, R: Parents>(
+        &self,
+        state: &BrickArray<P>,
+        sources: &BrickArray<u32>,
+        seeded: &Seeded,
+    ) -> Result<()> {
+        let (geometry, labelled) = (self.sources.geometry, self.labelled());
+        trace_sources::<P, R>(self.stage, geometry, labelled, state, sources, &seeded.bricks)
+    }
+
+    fn front_vector<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+        match self.options.neighbours {
+            Neighbours::Faces => self.front(sources),
+            Neighbours::All => self.front(AllNeighbours::new(sources)),
+        }
+    }
+
+    fn front_dijkstra<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+        self.front(DijkstraPythagoras::new(self.sources.geometry, self.options.neighbours, sources))
+    }
+
+    fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
+        let (state, seeded) = self.start::<S>(Start::Fixed)?;
+        heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
+        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
+        Ok(self.solved(method, state, &seeded))
+    }
+
+    fn heap_marching<P: Precision, M: DistanceMethod<State = P> + 'a, S: TrackedSource>(
+        &self,
+        method: M,
+        start: &S,
+    ) -> Result<Solved<'a, P>> {
+        let (sources, seeded) = self.start::<S>(Start::Fixed)?;
+        let state = BrickArray::new(self.engine.scratch(), self.set)?;
+        let wanted = Wanted { sources: self.options.sources, labelled: self.labelled() };
+        heap_marching(self.engine, self.sources.geometry, start, wanted, &state, &sources)?;
+        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
+    }
+
+    fn solved<P: Precision, M: DistanceMethod + 'a>(
+        &self,
+        method: M,
+        state: BrickArray<M::State>,
+        seeded: &Seeded,
+    ) -> Solved<'a, P> {
+        let values = Values { method, state, farthest: self.options.farthest, buffers: Workers::new(Vec::new) };
+        values.solved(seeded.fixed_voxels, seeded.triangle_distances)
+    }
+}
