@@ -5,6 +5,7 @@
 
 mod corner_cells;
 mod ears;
+mod flat_polygon;
 mod numbers;
 pub(super) mod obj;
 pub(super) mod off;
