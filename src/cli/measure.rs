@@ -17,7 +17,7 @@ use crate::exec::Progress;
 use crate::grid::TriangleMesh;
 use crate::io::sources::Source;
 use crate::kernel::solid::Solid;
-use crate::kernel::surface::{Hausdorff, Measures, PatchIndex, SurfaceMeasure};
+use crate::kernel::surface::{Hausdorff, Measures, PatchIndex};
 
 /// Runs the command.
 pub(super) fn run(args: &MeasureArgs) -> Result<()> {
@@ -62,12 +62,7 @@ impl Local {
     }
 
     fn measures(&self, solid: &Solid) -> Measures {
-        let mut measure = SurfaceMeasure::new([0.0; 3]);
-        for triangle in &solid.mesh.triangles {
-            let corners = triangle.map(|v| self.vertices[v as usize]);
-            measure.add(triangle.map(|v| solid.names[v as usize]), corners);
-        }
-        measure.measures()
+        solid.measures(|v| self.vertices[v as usize])
     }
 
     /// Distances of points from the surface.

@@ -9,7 +9,7 @@ use serde_json::Value;
 use strandline::grid::TriangleMesh;
 
 use crate::common::ball::Bench;
-use crate::common::meshes::{self, Form};
+use crate::common::meshes::{self, Form, joined};
 use crate::common::polyhedra::notched;
 use crate::common::random::Random;
 use crate::common::stores::volume;
@@ -33,16 +33,6 @@ fn assert_measures(found: &Value, volume: f64, area: f64) {
 fn turned(mut mesh: TriangleMesh) -> TriangleMesh {
     mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     mesh
-}
-
-fn joined(parts: &[TriangleMesh]) -> TriangleMesh {
-    let mut all = TriangleMesh::default();
-    for part in parts {
-        let before = all.vertices.len() as u32;
-        all.vertices.extend(&part.vertices);
-        all.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(|v| v + before)));
-    }
-    all
 }
 
 /// The signed distances of a mesh on a grid of this corner, shape and spacing, and what was said.

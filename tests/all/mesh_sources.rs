@@ -6,6 +6,7 @@ use strandline::error::{ErrorKind, Result};
 use strandline::grid::TriangleMesh;
 use strandline::io::sources::{FORMATS, Source, read_source};
 
+use crate::common::damage::damaged;
 use crate::common::meshes::{self, Form};
 use crate::common::random::Random;
 use crate::common::shared_data;
@@ -324,17 +325,7 @@ fn damaged_bytes_never_panic() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("source");
     for _ in 0..4000 {
-        let mut file = files[random.below(files.len())].clone();
-        for _ in 0..=random.below(4) {
-            let place = random.below(file.len());
-            match random.below(4) {
-                0 => file[place] = random.below(256) as u8,
-                1 => file[place] ^= 1 << random.below(8),
-                2 => drop(file.remove(place)),
-                _ => file.insert(place, b"\n\r\t /-0123456789#\\\xff\0"[random.below(20)]),
-            }
-        }
-        file.truncate(file.len() - random.below(8).saturating_sub(5));
+        let file = damaged(&mut random, &files, b"\n\r\t /-0123456789#\\\xff\0");
         fs::write(&path, &file).unwrap();
         match read_source(&path) {
             Ok(Source::Mesh(mesh)) => {

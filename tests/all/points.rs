@@ -1,11 +1,14 @@
 //! Point clouds: the same points in every dialect, real files, and files that nobody should trust.
 
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use strandline::error::{ErrorKind, Result};
 use strandline::grid::PointCloud;
 use strandline::io::points::read_cloud;
+
+use crate::common::damage::damaged;
+use crate::common::random::Random;
+use crate::common::shared_data;
 
 fn read_bytes(bytes: &[u8]) -> Result<PointCloud> {
     let folder = tempfile::tempdir().expect("a scratch folder");
@@ -274,19 +277,6 @@ fn damaged_ply_files_are_refused() {
     assert!(refusal(&file).contains("vertex 2"));
 }
 
-/// A small random generator (Steele, Lea and Flood 2014: splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % limit as u64) as usize
-    }
-}
-
 /// Damaged files give points or a refusal: no panic, no point that is not finite, no more points than bytes.
 #[test]
 fn damaged_bytes_never_panic() {
@@ -302,17 +292,7 @@ fn damaged_bytes_never_panic() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cloud");
     for _ in 0..3000 {
-        let mut file = files[random.below(files.len())].clone();
-        for _ in 0..=random.below(4) {
-            let place = random.below(file.len());
-            match random.below(4) {
-                0 => file[place] = random.below(256) as u8,
-                1 => file[place] ^= 1 << random.below(8),
-                2 => drop(file.remove(place)),
-                _ => file.insert(place, b"\n\r\t ,;0123456789#\"\xff\0"[random.below(20)]),
-            }
-        }
-        file.truncate(file.len() - random.below(8).saturating_sub(5).min(file.len()));
+        let file = damaged(&mut random, &files, b"\n\r\t ,;0123456789#\"\xff\0");
         fs::write(&path, &file).unwrap();
         match read_cloud(&path) {
             Ok(cloud) => {
@@ -325,14 +305,6 @@ fn damaged_bytes_never_panic() {
     }
 }
 
-fn shared(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-    }
-    path.exists().then_some(path)
-}
-
 #[test]
 fn real_files_have_their_points() {
     for (name, count) in [
@@ -342,10 +314,10 @@ fn real_files_have_their_points() {
         ("meshes/pilot-whale-cranium.ply", 50_000),
         ("meshes/gastruloid.ply", 3324),
     ] {
-        let Some(path) = shared(name) else { continue };
+        let Some(path) = shared_data(name) else { continue };
         assert_eq!(read_cloud(&path).unwrap().len(), count, "{name}");
     }
-    let Some(marks) = shared("embryo-like/marks.csv").map(|path| read_cloud(&path).unwrap()) else { return };
+    let Some(marks) = shared_data("embryo-like/marks.csv").map(|path| read_cloud(&path).unwrap()) else { return };
     assert_eq!((marks.positions[0], marks.objects[0], marks.contours[0]), ([159.338, 128.562, 8.0], 1, 8));
     assert_eq!((marks.objects.len(), marks.contours.len()), (3680, 3680));
     assert_eq!(marks.objects.iter().max(), Some(&2));
@@ -354,7 +326,7 @@ fn real_files_have_their_points() {
 #[test]
 fn the_whale_is_the_same_in_text_and_ply() {
     let (Some(text), Some(binary)) =
-        (shared("points/whale-cranium-vertices.xyz"), shared("meshes/pilot-whale-cranium.ply"))
+        (shared_data("points/whale-cranium-vertices.xyz"), shared_data("meshes/pilot-whale-cranium.ply"))
     else {
         return;
     };

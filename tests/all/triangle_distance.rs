@@ -9,7 +9,7 @@ use strandline::kernel::distance::initialise::NO_SOURCE;
 use strandline::kernel::distance::triangles::{cut_cells, fix_voxels};
 use strandline::kernel::distance::winding_number::{WindingTree, solid_angle};
 
-use crate::common::meshes::{cuboid, sphere};
+use crate::common::meshes::{cuboid, joined, sphere};
 use crate::common::random::Random;
 use crate::common::shared_data;
 
@@ -151,16 +151,6 @@ fn a_cube_of_triangles_fixes_distances_to_its_surface() {
 /// The winding number by the plain sum over all triangles.
 fn plain_sum(mesh: &TriangleMesh, p: [f64; 3]) -> f64 {
     (0..mesh.len()).map(|n| solid_angle(mesh.corners(n), p)).sum::<f64>() / (4.0 * PI)
-}
-
-fn joined(parts: &[TriangleMesh]) -> TriangleMesh {
-    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
-    for part in parts {
-        let first = vertices.len() as u32;
-        vertices.extend(&part.vertices);
-        triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
-    }
-    TriangleMesh::new(vertices, triangles).expect("parts that are meshes")
 }
 
 #[test]

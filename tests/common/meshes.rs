@@ -10,6 +10,17 @@ pub(crate) fn cuboid(lo: [f64; 3], hi: [f64; 3]) -> TriangleMesh {
     TriangleMesh::new((0..8).map(corner).collect(), triangles).expect("a box")
 }
 
+/// Several meshes as one, none of their vertices shared.
+pub(crate) fn joined(parts: &[TriangleMesh]) -> TriangleMesh {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for part in parts {
+        let first = vertices.len() as u32;
+        vertices.extend(&part.vertices);
+        triangles.extend(part.triangles.iter().map(|triangle| triangle.map(|v| v + first)));
+    }
+    TriangleMesh::new(vertices, triangles).expect("parts that are meshes")
+}
+
 /// An outward sphere, or the part of it from the pole of high z down to the polar angle `until` (pi for all of it).
 pub(crate) fn sphere(centre: [f64; 3], radius: f64, steps: u32, until: f64) -> TriangleMesh {
     let rows = steps;

@@ -2,6 +2,7 @@
 
 pub(crate) mod ball;
 pub(crate) mod clouds;
+pub(crate) mod damage;
 #[cfg(target_os = "linux")]
 pub(crate) mod held;
 pub(crate) mod lab;
@@ -10,7 +11,9 @@ pub(crate) mod npy;
 pub(crate) mod plain_reconstruction;
 pub(crate) mod plain_scheme;
 pub(crate) mod polyhedra;
+pub(crate) mod python;
 pub(crate) mod random;
+pub(crate) mod samples;
 pub(crate) mod solve;
 pub(crate) mod stores;
 pub(crate) mod textbook;
@@ -29,4 +32,3 @@ pub(crate) fn shared_data(part: &str) -> Option<PathBuf> {
     println!("skipped: {} is absent", folder.display());
     None
 }
-pub(crate) mod python;

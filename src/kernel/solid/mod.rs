@@ -9,6 +9,7 @@ mod nesting;
 mod patches;
 
 use crate::grid::{BoundaryEdges, TriangleMesh};
+use crate::kernel::surface::{Measures, SurfaceMeasure};
 use patches::Patches;
 
 /// A mesh as it is meant.
@@ -64,6 +65,16 @@ impl Solid {
         let edges = mesh.edges_between(&names);
         Self { mesh, names, edges, found }
     }
+
+    /// Volume and area; `place` is where each vertex lies, as seen from a place near the mesh.
+    #[must_use]
+    pub fn measures(&self, place: impl Fn(u32) -> [f64; 3]) -> Measures {
+        let mut measure = SurfaceMeasure::new([0.0; 3]);
+        for triangle in &self.mesh.triangles {
+            measure.add(triangle.map(|v| self.names[v as usize]), triangle.map(&place));
+        }
+        measure.measures()
+    }
 }
 
 impl Faults {
@@ -112,6 +123,7 @@ impl Faults {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::DataSets;
 
     /// The surface of a box as twelve triangles, outward.
     fn cuboid(lo: [f64; 3], hi: [f64; 3]) -> TriangleMesh {
@@ -130,13 +142,9 @@ mod tests {
     }
 
     fn all(parts: &[TriangleMesh]) -> TriangleMesh {
-        let mut all = TriangleMesh::default();
-        for part in parts {
-            let before = all.vertices.len() as u32;
-            all.vertices.extend(&part.vertices);
-            all.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(|v| v + before)));
-        }
-        all
+        let mut sets = DataSets::default();
+        parts.iter().for_each(|part| sets.add_mesh(part));
+        sets.mesh
     }
 
     /// Sum of a . (b x c) / 6.
