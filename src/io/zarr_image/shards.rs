@@ -14,6 +14,11 @@ use super::codecs::{Codecs, ValueType, bytes_of, one_line, options};
 /// The most chunks in a shard; an index entry takes 16 bytes.
 const MOST: u64 = 1 << 24;
 
+/// Shards in shards: each of them is held while those in it are put together.
+const DEEPEST: usize = 4;
+/// A shard may be so many times larger than what is stored in it, and as much is read of it at most: chunks do not overlap.
+const LARGER: u64 = 64;
+
 /// How shards are made.
 #[derive(Debug)]
 pub(super) struct Shards {
@@ -42,12 +47,14 @@ impl Shards {
             let list: Vec<MetadataV3> = serde_json::from_value(told[key].clone()).map_err(|error| one_line(&error))?;
             CodecChain::from_metadata(&list).map_err(|error| one_line(&error))
         };
-        Ok(Self {
+        let shards = Self {
             chunk: serde_json::from_value(told["chunk_shape"].clone()).map_err(|error| one_line(&error))?,
             codecs: Box::new(Codecs::new(&chain("codecs")?)?),
             index: chain("index_codecs")?,
             index_first: told["index_location"] == "start",
-        })
+        };
+        let depth = std::iter::successors(Some(&shards), |shards| shards.codecs.shards.as_ref()).count();
+        if depth <= DEEPEST { Ok(shards) } else { Err(format!("it has shards in shards, {depth} deep")) }
     }
 
     /// Where the index of a shard of that shape lies.
@@ -86,12 +93,17 @@ impl Shards {
         let index = length.checked_sub(bytes).ok_or("it is shorter than its index")?;
         let entries = self.read_index(&place, if place.first { &shard[..bytes] } else { &shard[index..] })?;
         let size = bytes_of(shape, value.size).ok_or("a shard is larger than any memory")?;
-        if size > 64 * slack_of(length) {
+        let most = LARGER * slack_of(length);
+        if size > most {
             return Err("its shards are far larger than what is in them".into());
         }
+        let ranges = entries.into_iter().map(|entry| range_of(entry, length as u64)).collect::<Result<Vec<_>, _>>()?;
+        if ranges.iter().flatten().map(|range| range.end - range.start).sum::<u64>() > most {
+            return Err("the index of its chunks names the same bytes many times: it is damaged".into());
+        }
         let mut whole: Vec<u8> = value.fill.as_ne_bytes().iter().copied().cycle().take(size as usize).collect();
-        for (number, entry) in entries.into_iter().enumerate() {
-            let Some(range) = range_of(entry, length as u64)? else { continue };
+        for (number, range) in ranges.into_iter().enumerate() {
+            let Some(range) = range else { continue };
             let stored = shard[range.start as usize..range.end as usize].to_vec();
             let chunk = self.codecs.decode(stored, &self.chunk, value)?;
             let mut rest = number as u64;
