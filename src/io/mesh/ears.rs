@@ -11,8 +11,15 @@ use std::collections::VecDeque;
 use super::corner_cells::Cells;
 use super::flat_polygon::{STRAIGHT, Seen, is_star, seen_flat, turn, turns_once};
 
-/// At most so many looks at points for each corner: polygons that cross themselves everywhere must come to an end.
+/// At most so many looks at points for each corner, as long as spare ones are left: polygons that cross themselves
+/// everywhere must come to an end.
 const LOOKS: u64 = 10_000;
+
+/// So many looks each corner has in any case; polygons whose corners are spread evenly take no more.
+const OWN_LOOKS: u64 = 500;
+
+/// Looks that the polygons of a file have beyond those, all of them together: some seconds.
+pub(super) const SPARE_LOOKS: u64 = 200_000_000;
 
 /// How a polygon was cut.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +32,8 @@ pub(super) enum Cut {
     Crossed(Vec<[u32; 3]>),
 }
 
-/// Cuts the polygon with these corners, four at least.
-pub(super) fn cut(corners: &[[f64; 3]]) -> Cut {
+/// Cuts the polygon with these corners, four at least, and takes what it needs of the spare looks of its file.
+pub(super) fn cut(corners: &[[f64; 3]], spare: &mut u64) -> Cut {
     let points = match seen_flat(corners) {
         Seen::Line => return Cut::Fan,
         Seen::Cancelled => return Cut::Crossed((2..corners.len() as u32).map(|n| [0, n - 1, n]).collect()),
@@ -36,7 +43,9 @@ pub(super) fn cut(corners: &[[f64; 3]]) -> Cut {
     let turns_once = turns_once(&points);
     let mut ring = Ring::new(points);
     ring.crossed = !turns_once;
-    let triangles = ring.clip();
+    let own = OWN_LOOKS * corners.len() as u64;
+    let triangles = ring.clip((own + *spare).min(LOOKS * corners.len() as u64));
+    *spare -= ring.looks.saturating_sub(own).min(*spare);
     if ring.crossed { Cut::Crossed(triangles) } else { Cut::Ears(triangles) }
 }
 
@@ -92,9 +101,9 @@ impl Ring {
     }
 
     /// Corners wait in a line to be asked; one that is no ear is asked again once a neighbour is gone, or all have been.
-    fn clip(&mut self) -> Vec<[u32; 3]> {
+    /// After `most` looks any corner is taken.
+    fn clip(&mut self, most: u64) -> Vec<[u32; 3]> {
         let count = self.points.len();
-        let most = LOOKS * count as u64;
         let mut triangles = Vec::with_capacity(count - 2);
         let mut line: VecDeque<u32> = (0..count as u32).collect();
         let mut waits = vec![true; count];
@@ -204,8 +213,13 @@ mod tests {
         points.iter().map(|[x, y]| [2.0 * x + 7.0, *y - 3.0, x + 3.0 * y]).collect()
     }
 
+    fn alone(corners: &[[f64; 3]]) -> Cut {
+        let mut spare = SPARE_LOOKS;
+        cut(corners, &mut spare)
+    }
+
     fn triangles(corners: &[[f64; 3]]) -> (Vec<[u32; 3]>, bool) {
-        match cut(corners) {
+        match alone(corners) {
             Cut::Fan => ((1..corners.len() as u32 - 1).map(|n| [0, n, n + 1]).collect(), false),
             Cut::Ears(found) => (found, false),
             Cut::Crossed(found) => (found, true),
@@ -284,9 +298,9 @@ mod tests {
 
     #[test]
     fn what_encloses_nothing_stays_a_fan() {
-        assert_eq!(cut(&[[1.0; 3]; 5]), Cut::Fan);
-        assert_eq!(cut(&[[0.0; 3], [1.0; 3], [2.0; 3], [1.5; 3]]), Cut::Fan);
-        assert_eq!(cut(&[[0.0; 3], [1e308; 3], [-1e308, 1e308, 0.0], [5.0; 3]]), Cut::Fan);
+        assert_eq!(alone(&[[1.0; 3]; 5]), Cut::Fan);
+        assert_eq!(alone(&[[0.0; 3], [1.0; 3], [2.0; 3], [1.5; 3]]), Cut::Fan);
+        assert_eq!(alone(&[[0.0; 3], [1e308; 3], [-1e308, 1e308, 0.0], [5.0; 3]]), Cut::Fan);
     }
 
     #[test]
@@ -295,7 +309,7 @@ mod tests {
         let lopsided = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]];
         let pentagram = [[0.0, 3.0], [2.0, -2.0], [-3.0, 1.0], [3.0, 1.0], [-2.0, -2.0]];
         for points in [&bow[..], &lopsided, &pentagram] {
-            assert!(matches!(cut(&lifted(points)), Cut::Crossed(found) if found.len() == points.len() - 2));
+            assert!(matches!(alone(&lifted(points)), Cut::Crossed(found) if found.len() == points.len() - 2));
         }
         let mut far = 1_u64;
         let mut random = || {
@@ -305,6 +319,15 @@ mod tests {
         let points: Vec<[f64; 2]> = (0..400).map(|_| [random(), random()]).collect();
         let (found, crossed) = triangles(&lifted(&points));
         assert!(crossed && found.len() == 398);
+        // Polygons that take much leave others what these need.
+        let mut spare = 300_000;
+        for _ in 0..20 {
+            assert!(matches!(cut(&lifted(&points), &mut spare), Cut::Crossed(found) if found.len() == 398));
+        }
+        assert_eq!(spare, 0);
+        let comb = (0..400).map(|n| [f64::from(n), f64::from(n % 2)]).chain([[399.0, -1.0], [0.0, -1.0]]);
+        let comb: Vec<[f64; 2]> = comb.collect();
+        assert!(matches!(cut(&lifted(&comb), &mut spare), Cut::Ears(found) if found.len() == 400));
     }
 
     proptest! {

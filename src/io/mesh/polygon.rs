@@ -3,7 +3,7 @@
 //! While a polygon's corners come it is a fan about the first of them, in as much memory as its triangles take; fans that
 //! do not cover their polygon are cut anew in the end, in place, so that triangles keep the order of the faces.
 
-use super::ears::{Cut, cut};
+use super::ears::{Cut, SPARE_LOOKS, cut};
 use crate::error::{Error, Result};
 use crate::grid::MOST_SOURCES;
 
@@ -89,12 +89,12 @@ impl Faces {
 
     /// The triangles of all faces, in their order. Tells what was not as it should be.
     pub(in crate::io) fn finish(mut self, vertices: &[[f64; 3]], notes: &mut Vec<String>) -> Vec<[u32; 3]> {
-        let (mut crossed, mut first_crossed) = (0_u64, Vec::new());
+        let (mut crossed, mut first_crossed, mut spare) = (0_u64, Vec::new(), SPARE_LOOKS);
         for [start, count] in std::mem::take(&mut self.polygons) {
             let fan = &mut self.triangles[start as usize..][..count as usize];
             let names: Vec<u32> = fan[0][..2].iter().copied().chain(fan.iter().map(|triangle| triangle[2])).collect();
             let corners: Vec<[f64; 3]> = names.iter().map(|&v| vertices[v as usize]).collect();
-            let found = match cut(&corners) {
+            let found = match cut(&corners, &mut spare) {
                 Cut::Fan => continue,
                 Cut::Ears(found) => found,
                 Cut::Crossed(found) => {
