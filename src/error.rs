@@ -81,8 +81,8 @@ impl Error {
         let mut message = message.into();
         // What files and other libraries say may hold anything; a message is one line and moves no cursor. A run that
         // failed in part lists its reasons, each a message of its own.
-        if kind != ErrorKind::Partly && message.contains(char::is_control) {
-            message = message.chars().map(shown).collect();
+        if kind != ErrorKind::Partly {
+            message = one_line(message);
         }
         Self { kind, message, path: None }
     }
@@ -118,15 +118,17 @@ impl Error {
     }
 }
 
-/// A character as it may stand in a message.
-fn shown(c: char) -> String {
-    if c.is_control() { c.escape_debug().to_string() } else { c.to_string() }
+/// A text from elsewhere, a file's name or what stands in it, as it may be told: on one line, moving no cursor.
+#[must_use]
+pub fn one_line(text: String) -> String {
+    let shown = |c: char| if c.is_control() { c.escape_debug().to_string() } else { c.to_string() };
+    if text.contains(char::is_control) { text.chars().map(shown).collect() } else { text }
 }
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.path {
-            Some(path) => write!(f, "{}: {}", path.display(), self.message),
+            Some(path) => write!(f, "{}: {}", one_line(path.display().to_string()), self.message),
             None => f.write_str(&self.message),
         }
     }
@@ -140,7 +142,7 @@ mod tests {
 
     #[test]
     fn messages_are_one_line_whatever_they_quote() {
-        let error = Error::input("expected '>' not '\n', then \u{1b}[2J \u{b5}m").at(Path::new("a.tif"));
-        assert_eq!(error.to_string(), r"a.tif: expected '>' not '\n', then \u{1b}[2J µm");
+        let error = Error::input("expected '>' not '\n', then \u{1b}[2J \u{b5}m").at(Path::new("a\r\n.tif"));
+        assert_eq!(error.to_string(), r"a\r\n.tif: expected '>' not '\n', then \u{1b}[2J µm");
     }
 }

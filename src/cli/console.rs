@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::text::{duration, grouped};
+use crate::error::one_line;
 use crate::exec::Progress;
 
 /// Notes that are said; the report has all.
@@ -212,7 +213,7 @@ impl Progress for Console {
             self.say("more notes are in the report alone");
         }
         if self.voice != Voice::Quiet && before < MOST_NOTES {
-            draw_line(&self.lock(), &format!("note: {line}"));
+            draw_line(&self.lock(), &format!("note: {}", one_line(line.into())));
         }
     }
 

@@ -9,7 +9,7 @@ use super::info_store::store;
 use super::print;
 use super::table::cut;
 use super::text::{grouped, number, place};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use crate::grid::{PointCloud, TriangleMesh};
 use crate::io::ome_zarr::is_store;
 use crate::io::points::{PointFile, Scale};
@@ -50,7 +50,7 @@ pub(super) type Lines = Vec<(String, String)>;
 
 fn table(lines: &Lines) -> String {
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    let told = |(name, value): &(String, String)| format!("{name:<width$}  {value}");
+    let told = |(name, value): &(String, String)| one_line(format!("{name:<width$}  {value}"));
     let (objects, others): (Vec<_>, Vec<_>) = lines.iter().partition(|(name, _)| name.starts_with("object "));
     let objects = cut(objects.into_iter().map(told).collect(), "objects", "(--json tells all)");
     others.into_iter().map(told).chain(objects).fold(String::new(), |text, line| text + &line + "\n")
