@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-READERS = ("points", "meshes", "tiff", "slices", "zarr")
+READERS = ("points", "meshes", "rois", "tiff", "slices", "zarr")
 # Seconds after the end of its time in which a process has to end.
 GRACE = 30
 
@@ -36,6 +36,7 @@ def arguments():
     parser.add_argument("--hang", type=float, default=10, metavar="S", help="an input that takes longer hangs (10)")
     parser.add_argument("--memory", type=float, default=1, metavar="GIB", help="address space of a process (1)")
     parser.add_argument("--kept", type=Path, default=ROOT / "tests" / "kept", help="where inputs are kept (tests/kept)")
+    parser.add_argument("--slow", type=Path, default=ROOT / "target" / "fuzz-slow", help="where slow ones are put, for a look (target/fuzz-slow)")
     parser.add_argument("--binary", type=Path, help="a built tests/all, in place of building it")
     return parser.parse_args()
 
@@ -55,6 +56,7 @@ class Outcome:
     inputs: int = 0
     slowest: float = 0.0
     faults: list = field(default_factory=list)
+    slow: list = field(default_factory=list)
 
 
 def keep(folder, reader, kept):
@@ -113,7 +115,7 @@ def wait(child, folder, seconds, hang):
 
 def told(line):
     """Word and rest of what a process tells; its first line follows the test's name without a line break."""
-    found = re.search(r"(?:^|\.\.\. )(fault|slowest) (.+)", line)
+    found = re.search(r"(?:^|\.\.\. )(fault|slow|slowest) (.+)", line)
     return found.groups() if found else (None, "")
 
 
@@ -134,6 +136,9 @@ def fuzz(binary, reader, settings, seed):
                 if word == "fault":
                     place, what = rest.split(" ", 1)
                     outcome.faults.append((keep(Path(place), reader, settings.kept), what))
+                if word == "slow":
+                    place, took = rest.split(" ", 1)
+                    outcome.slow.append((keep(Path(place), reader, settings.slow), took))
                 if word == "slowest":
                     outcome.slowest = max(outcome.slowest, float(rest))
             if hung or child.returncode != 0:
@@ -155,7 +160,7 @@ def main():
         total += outcome.inputs
         bad += len(outcome.faults)
         print(f"{reader}: {outcome.inputs:,} inputs, slowest {outcome.slowest:.3f} s, {len(outcome.faults)} faults", flush=True)
-        for place, what in outcome.faults:
+        for place, what in outcome.faults + outcome.slow:
             print(f"  {place}: {what}", flush=True)
     print(f"{total:,} inputs from seed {seed} on, {bad} faults")
     sys.exit(1 if bad else 0)

@@ -3,8 +3,14 @@
 //! `scripts/fuzz_readers` runs [`worker`] for as long as it is told, in a process with little memory, and puts inputs at
 //! which a reader failed into `tests/kept`, from where they are read again with every run of the tests.
 
+mod costly;
+mod json;
 mod mutate;
+mod packed;
 mod readers;
+mod seeds;
+mod tags;
+mod words;
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -16,6 +22,7 @@ use std::time::{Duration, Instant};
 use strandline::error::Error;
 
 use crate::common::random::Random;
+use crate::common::stores;
 use crate::tiff_hostile::{LIMITED, rerun_limited};
 use mutate::mutate;
 use readers::{Files, READERS, Reader};
@@ -30,6 +37,12 @@ fn write(folder: &Path, files: &[(String, Vec<u8>)]) {
         let path = folder.join(name);
         fs::create_dir_all(path.parent().expect("a file in the folder")).expect("room for an input");
         fs::write(path, bytes).expect("room for an input");
+    }
+}
+
+fn remove<'a>(folder: &Path, names: impl Iterator<Item = &'a String>) {
+    for name in names {
+        fs::remove_file(folder.join(name)).expect("a file of the input");
     }
 }
 
@@ -49,13 +62,14 @@ fn fault(reader: &Reader, folder: &Path) -> Option<String> {
     }
 }
 
-/// What tells faults apart: the place of a panic, or the sentence without its numbers.
+/// What tells faults apart: the place of a panic, or the end of the sentence, which names no file, without its numbers.
 fn kind(fault: &str) -> String {
     let place = fault.split(" | ").next().unwrap_or(fault);
     if fault.starts_with("panicked") {
         place.to_owned()
     } else {
-        place.chars().filter(char::is_ascii_alphabetic).take(60).collect()
+        let end = place.rsplit(": ").next().unwrap_or(place);
+        end.chars().filter(char::is_ascii_alphabetic).take(60).collect()
     }
 }
 
@@ -67,6 +81,12 @@ fn remember_panics() {
         PANIC.with_borrow_mut(|last| *last = format!("{place} | {words}"));
     }));
 }
+
+/// No more kinds of faults are told of a run: one cause may show in many sentences.
+const MOST_FAULTS: usize = 20;
+
+/// What takes longer is told, though it is no fault.
+const SLOW: Duration = Duration::from_secs(2);
 
 /// A run of damaged inputs of one reader.
 struct Run<'a> {
@@ -87,27 +107,69 @@ impl Run<'_> {
         let _ = fs::remove_dir_all(&input);
         write(&input, &seed);
         for _ in 0..50 {
-            let (name, whole) = &seed[self.random.below(seed.len())];
-            let other = &self.seeds[self.random.below(self.seeds.len())];
-            let other = &other[self.random.below(other.len())].1;
-            let damaged = mutate(whole, other, &mut self.random);
-            fs::write(input.join(name), &damaged).expect("room for an input");
+            let (lost, new) = self.damage(&seed);
+            remove(&input, lost.iter());
+            write(&input, &new);
             let started = Instant::now();
             let found = fault(self.reader, &input);
-            self.slowest = self.slowest.max(started.elapsed());
+            let took = started.elapsed();
+            if took > SLOW.max(self.slowest) {
+                let place = self.folder.join("found").join(format!("slow-{:016x}", self.random.next()));
+                write(&place, &stores::contents(&input));
+                println!("slow {} {:.3} s", place.display(), took.as_secs_f64());
+            }
+            self.slowest = self.slowest.max(took);
             *count += 1;
-            if let Some(fault) = found.filter(|fault| self.known.insert(kind(fault))) {
-                let files: Files = seed
-                    .iter()
-                    .map(|(n, b)| (n.clone(), if n == name { damaged.clone() } else { b.clone() }))
-                    .collect();
+            if let Some(fault) = found.filter(|fault| self.known.len() < MOST_FAULTS && self.known.insert(kind(fault)))
+            {
                 let place = self.folder.join("found").join(format!("{}-{:016x}", self.reader.name, self.random.next()));
-                write(&place, &files);
+                write(&place, &stores::contents(&input));
                 println!("fault {} {fault}", place.display());
             }
-            fs::write(input.join(name), whole).expect("room for an input");
+            remove(&input, new.iter().map(|(name, _)| name));
+            let is_changed = |name: &String| lost.contains(name) || new.iter().any(|(n, _)| n == name);
+            seed.iter().filter(|(name, _)| is_changed(name)).for_each(|file| write(&input, std::slice::from_ref(file)));
         }
     }
+
+    /// What an input loses, and what it gets: mostly one file in place of itself, at times several, or under another name.
+    fn damage(&mut self, seed: &Files) -> (Vec<String>, Files) {
+        let random = &mut self.random;
+        let files = if random.below(4) == 0 { 1 + random.below(3) } else { 1 };
+        let (mut lost, mut new) = (BTreeSet::new(), Files::new());
+        for _ in 0..files {
+            let (name, whole) = &seed[random.below(seed.len())];
+            if !lost.insert(name.clone()) {
+                continue;
+            }
+            let other = &self.seeds[random.below(self.seeds.len())];
+            let other = &other[random.below(other.len())].1;
+            match random.below(16) {
+                0 if seed.len() > 1 => {}
+                1 => new.push((renamed(name, random), whole.clone())),
+                _ => new.push((name.clone(), mutate(whole, other, random))),
+            }
+        }
+        // A new name may be that of another file, or of a folder.
+        let holds = |name: &str, other: &str| {
+            other.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+        };
+        let is_free = |name: &String| lost.contains(name) || !seed.iter().any(|(other, _)| holds(name, other));
+        new.retain(|(name, _)| is_free(name));
+        new.sort();
+        new.dedup_by(|a, b| a.0 == b.0);
+        (lost.into_iter().collect(), new)
+    }
+}
+
+/// Another name in the same folder.
+fn renamed(name: &str, random: &mut Random) -> String {
+    let (folder, last) = name.rsplit_once('/').map_or(("", name), |(folder, last)| (folder, last));
+    let damaged = mutate::mutate_blindly(last.as_bytes(), b"c00_z01_t2.tif", random);
+    let text: String =
+        String::from_utf8_lossy(&damaged).chars().filter(|c| !matches!(c, '/' | '\0')).take(60).collect();
+    let text = if matches!(text.as_str(), "" | "." | "..") { "0".to_owned() } else { text };
+    if folder.is_empty() { text } else { format!("{folder}/{text}") }
 }
 
 /// What `scripts/fuzz_readers` runs: reader, seconds, seed, a folder to work in and perhaps one of further files come by

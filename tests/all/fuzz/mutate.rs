@@ -1,104 +1,26 @@
-//! Damage to files: bytes, numbers and lines of text, entries of TIFF directories, pieces of other files.
+//! Damage to files: bytes, numbers and lines of text, pieces of other files; and by the forms that files have, what would
+//! not get past their first check by chance: documents (`json`), what is packed or summed (`packed`), directories (`tags`).
 
+use super::tags::edit_tag;
+use super::words::{NUMBERS, WORDS};
+use super::{json, packed};
 use crate::common::random::Random;
 
 /// No damaged file is longer.
 const LONGEST: usize = 1 << 17;
 
-/// What is put in place of a number in a text.
-const NUMBERS: &[&str] = &[
-    "0",
-    "-1",
-    "1",
-    "2",
-    "-0",
-    "nan",
-    "-nan(ind)",
-    "inf",
-    "1e999",
-    "-1e-320",
-    "1e38",
-    "0.5",
-    "1,5",
-    "255",
-    "65536",
-    "2147483647",
-    "2147483648",
-    "4294967295",
-    "4294967296",
-    "9223372036854775807",
-    "18446744073709551615",
-    "99999999999999999999",
-    "1.#IND",
-    "",
-];
-
-/// What is put anywhere in a text.
-const WORDS: &[&str] = &[
-    " ",
-    "\n",
-    "\r",
-    "\r\n",
-    "\t",
-    ",",
-    ";",
-    "\"",
-    "'",
-    "#",
-    "\0",
-    "\u{feff}",
-    "\u{b5}m",
-    "null",
-    "[]",
-    "{}",
-    "true",
-    "x,y,z\n",
-    "object,",
-    "contour,",
-    "axis-0,axis-1,axis-2\n",
-    "sep=;\n",
-    "ply\n",
-    "end_header\n",
-    "element face 4000000000\n",
-    "element vertex 3\n",
-    "property list uchar int vertex_indices\n",
-    "property double x\n",
-    "format ascii 1.0\n",
-    "OFF\n",
-    "COFF",
-    "solid a\n",
-    "endsolid\n",
-    "facet normal 0 0 1\n",
-    "outer loop\n",
-    "vertex 0 0 0\n",
-    "v 0 0 0\n",
-    "f 1 2 3\n",
-    "f -1 -2 -3 -4\n",
-    "f 1/1/1 2//2 3\n",
-    "\\\n",
-    "ImageJ=1\n",
-    "images=9999999\n",
-    "slices=0\n",
-    "spacing=-1\n",
-    "unit=\\u00B5m\n",
-    "<OME>",
-    "</Pixels>",
-    "SizeZ=\"0\"",
-    "{\"shape\": [1]}",
-    "\"int64\"",
-    "\"scale\"",
-    "\"translation\"",
-    "\"gzip\"",
-    "\"zstd\"",
-    "\"blosc\"",
-    "\"sharding_indexed\"",
-    "\"transpose\"",
-    "\"z\"",
-    "\"c\"",
-];
-
-/// Damages a file in up to six places; `other` is another file of the format.
+/// Damages a file; `other` is another file of the format.
 pub(super) fn mutate(bytes: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
+    // What is damaged blindly, too, is the outside of what has an inside.
+    let inside =
+        (random.below(4) > 0).then(|| json::mutate(bytes, random).or_else(|| packed::mutate(bytes, other, random)));
+    let mut damaged = inside.flatten().unwrap_or_else(|| mutate_blindly(bytes, other, random));
+    damaged.truncate(LONGEST);
+    damaged
+}
+
+/// Damages a file in up to six places, whatever it holds.
+pub(super) fn mutate_blindly(bytes: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let is_tiff = matches!(bytes.get(..2), Some(b"II" | b"MM"));
     for _ in 0..=random.below(6) {
@@ -115,7 +37,6 @@ pub(super) fn mutate(bytes: &[u8], other: &[u8], random: &mut Random) -> Vec<u8>
             _ => edit_number(&mut bytes, random),
         }
     }
-    bytes.truncate(LONGEST);
     bytes
 }
 
@@ -125,8 +46,18 @@ fn range(len: usize, most: usize, random: &mut Random) -> std::ops::Range<usize>
     start..(start + random.below(most + 1)).min(len)
 }
 
+/// A place in a file; often among its first or last bytes, where headers and indices lie.
+fn place(len: usize, random: &mut Random) -> usize {
+    let end = random.below(len.min(64));
+    match random.below(4) {
+        0 => end,
+        1 => len - 1 - end,
+        _ => random.below(len),
+    }
+}
+
 /// A number at which readers may go wrong.
-fn interesting(len: usize, random: &mut Random) -> u64 {
+pub(super) fn interesting(len: usize, random: &mut Random) -> u64 {
     let len = len as u64;
     let values = [
         0,
@@ -158,7 +89,7 @@ fn interesting(len: usize, random: &mut Random) -> u64 {
 }
 
 /// Writes the lowest bytes of a number, as far as there is room.
-fn put(bytes: &mut [u8], at: usize, width: usize, value: u64, is_big: bool) {
+pub(super) fn put(bytes: &mut [u8], at: usize, width: usize, value: u64, is_big: bool) {
     let mut number = value.to_le_bytes();
     number[..width].reverse_if(is_big);
     let end = bytes.len().min(at + width);
@@ -167,7 +98,7 @@ fn put(bytes: &mut [u8], at: usize, width: usize, value: u64, is_big: bool) {
     }
 }
 
-trait ReverseIf {
+pub(super) trait ReverseIf {
     fn reverse_if(&mut self, is: bool);
 }
 
@@ -180,7 +111,7 @@ impl ReverseIf for [u8] {
 }
 
 fn edit_bytes(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
-    let at = random.below(bytes.len());
+    let at = place(bytes.len(), random);
     match random.below(9) {
         0 => bytes[at] ^= 1 << random.below(8),
         1 => bytes[at] = random.next() as u8,
@@ -250,49 +181,5 @@ fn edit_text(bytes: &mut Vec<u8>, random: &mut Random) {
         }
         4 => drop(bytes.splice(at..(at + 4).min(bytes.len()), WORDS[random.below(WORDS.len())].bytes())),
         _ => drop(bytes.splice(at..at, WORDS[random.below(WORDS.len())].bytes())),
-    }
-}
-
-/// Another tag, type, count or value in an entry of one of a TIFF file's directories, or another place of the next one.
-fn edit_tag(bytes: &mut [u8], random: &mut Random) {
-    let is_big = bytes.starts_with(b"MM");
-    let number = |bytes: &[u8], at: usize, width: usize| {
-        let mut value = [0; 8];
-        value[..width].copy_from_slice(bytes.get(at..at.checked_add(width)?)?);
-        value[..width].reverse_if(is_big);
-        Some(u64::from_le_bytes(value) as usize)
-    };
-    // Widths of an offset and of a count of entries.
-    let (wide, counts, mut link) = if number(bytes, 2, 2) == Some(43) { (8, 8, 8) } else { (4, 2, 4) };
-    let mut entries = Vec::new();
-    let mut links = vec![link];
-    for _ in 0..=random.below(4) {
-        let Some(directory) = number(bytes, link, wide).filter(|&at| at > 0 && at < bytes.len()) else { break };
-        let count = number(bytes, directory, counts).unwrap_or(0).min(64);
-        let size = 4 + 2 * wide;
-        entries.extend((0..count).map(|n| directory + counts + n * size));
-        link = directory + counts + count * size;
-        links.push(link);
-    }
-    let value = interesting(bytes.len(), random);
-    if entries.is_empty() || random.below(16) == 0 {
-        return put(bytes, links[random.below(links.len())], wide, value, is_big);
-    }
-    let entry = entries[random.below(entries.len())];
-    let tags = [
-        254, 256, 257, 258, 259, 262, 270, 273, 277, 278, 279, 282, 284, 317, 320, 322, 323, 324, 325, 339, 50838,
-        50839,
-    ];
-    match random.below(8) {
-        0 => put(bytes, entry, 2, tags[random.below(tags.len())], is_big),
-        1 => put(bytes, entry + 2, 2, random.below(20) as u64, is_big),
-        2 | 3 => put(bytes, entry + 4, wide, value, is_big),
-        4 => {
-            let from = entries[random.below(entries.len())] + 4 + wide;
-            let value = number(bytes, from, wide).unwrap_or(0) as u64;
-            put(bytes, entry + 4 + wide, wide, value, is_big);
-        }
-        5 => put(bytes, entry + 4 + wide, 2, random.below(70) as u64, is_big),
-        _ => put(bytes, entry + 4 + wide, wide, value, is_big),
     }
 }

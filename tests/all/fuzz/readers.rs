@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 
 use strandline::error::Result;
 use strandline::grid::{Box3, Geometry};
-use strandline::io::label_volume::LabelVolume;
-use strandline::io::ome_zarr::{ImageSpec, StoreWriter};
+use strandline::io::label_volume::{LabelVolume, labels_of};
 use strandline::io::points::read_cloud;
-use strandline::io::sources::read_source;
-use strandline::io::stacks::open_stack;
-use strandline::io::tiff_stack::{Select, TiffStack};
-use strandline::store::{Element, PlaneSource};
+use strandline::io::sources::{describe, read_source};
+use strandline::io::stacks::{Stack, open_stack};
+use strandline::io::tiff_stack::Select;
+use strandline::io::zarr_image;
+use strandline::store::{ElementType, Sample};
 
-use crate::common::meshes::{Form, cuboid, sphere};
-use crate::common::{stores, tiff_planes};
+use super::seeds::{images, meshes, pages, rois, slices, tables};
+use crate::common::stores;
 
 /// Files of an input: paths in its folder, and what they hold.
 pub(super) type Files = Vec<(String, Vec<u8>)>;
@@ -46,16 +46,20 @@ pub(super) const READERS: &[Reader] = &[
         read: sources,
         blames_input: true,
     },
+    Reader { name: "rois", endings: &["roi", "zip"], seeds_of: rois, read: sources, blames_input: true },
     Reader { name: "tiff", endings: &["tif", "tiff"], seeds_of: pages, read: pages_of_file, blames_input: true },
-    Reader { name: "slices", endings: &[], seeds_of: slices, read: planes, blames_input: true },
-    Reader { name: "zarr", endings: &["zarr"], seeds_of: images, read: labels, blames_input: false },
+    Reader { name: "slices", endings: &[], seeds_of: slices, read: volume, blames_input: true },
+    Reader { name: "zarr", endings: &["zarr"], seeds_of: images, read: image, blames_input: true },
 ];
 
-/// Voxels and planes that are read of an image at most.
-const MOST_VOXELS: i64 = 1 << 20;
-const MOST_PLANES: i64 = 64;
-/// Files from elsewhere that are larger are left out.
+/// Boxes and voxels that are read of an image at most; each voxel may be a chunk, and each chunk a file.
+const MOST_BOXES: usize = 64;
+const MOST_VOXELS: u64 = 1 << 18;
+/// Images whose chunks or pages take more are refused by whoever reads them in a gigabyte.
+const MOST_BYTES: u64 = 1 << 29;
+/// Files from elsewhere that are larger, and folders of more, are left out.
 const LARGEST: u64 = 1 << 16;
+const MOST_FILES: usize = 24;
 
 impl Reader {
     /// Small whole inputs: made here, and those below a folder.
@@ -75,7 +79,9 @@ impl Reader {
             let is_ours = self.endings.contains(&ending.as_str());
             if path.is_dir() && is_ours {
                 let files = stores::contents(&path);
-                seeds.extend((files.iter().all(|(_, bytes)| bytes.len() as u64 <= LARGEST)).then_some(files));
+                let is_small =
+                    files.len() <= MOST_FILES && files.iter().all(|(_, bytes)| bytes.len() as u64 <= LARGEST);
+                seeds.extend(is_small.then_some(files));
             } else if path.is_dir() {
                 self.add_from(&path, seeds);
             } else if is_ours && path.metadata().is_ok_and(|m| m.len() <= LARGEST) {
@@ -92,130 +98,84 @@ fn only_file(folder: &Path) -> PathBuf {
     paths.next().expect("an input of one file")
 }
 
+/// Of several ways to read an input, which may all refuse it, the worst end.
+fn worst<const N: usize>(ends: [Result<()>; N]) -> Result<()> {
+    let is_bad = |end: &Result<()>| end.as_ref().is_err_and(|error| error.exit_code() != 2);
+    let mut ends = Vec::from(ends);
+    if let Some(bad) = ends.iter().position(is_bad) {
+        return ends.swap_remove(bad);
+    }
+    ends.into_iter().collect()
+}
+
 fn sources(folder: &Path) -> Result<()> {
     let path = only_file(folder);
-    // Both are asked: neither may panic where the other refuses.
-    let (source, cloud) = (read_source(&path).map(drop), read_cloud(&path).map(drop));
-    source.and(cloud)
+    // All are asked: none may panic where another refuses.
+    worst([read_source(&path).map(drop), describe(&path).map(drop), read_cloud(&path).map(drop)])
 }
 
 fn pages_of_file(folder: &Path) -> Result<()> {
-    planes(&only_file(folder))
+    volume(&only_file(folder))
 }
 
-fn planes(path: &Path) -> Result<()> {
-    let stack = TiffStack::open(path, Select::default())?;
-    let [width, height, depth] = stack.shape();
-    let size = width.saturating_mul(height).max(1);
-    (0..depth.min(MOST_VOXELS / size).min(MOST_PLANES)).try_for_each(|z| tiff_planes::plane(&stack, z).map(drop))
+/// Reads the first channel and time, and the last ones, by natural boxes.
+fn volume(path: &Path) -> Result<()> {
+    let stack = open_stack(path, Select::default())?;
+    let first = boxes(stack.as_ref());
+    let last = |count: u32| count.saturating_sub(1);
+    let select = Select { channel: last(stack.info().channels), time: last(stack.info().times), ..Select::default() };
+    let last =
+        if select == Select::default() { Ok(()) } else { open_stack(path, select).and_then(|s| boxes(s.as_ref())) };
+    worst([first, last])
+}
+
+fn boxes(stack: &dyn Stack) -> Result<()> {
+    let natural = Box3::from_shape(stack.shape()).tiles(stack.natural_shape());
+    read_of(natural, stack.decoding_bytes()).try_for_each(|part| match stack.element() {
+        ElementType::U8 => values::<u8>(stack, &part),
+        ElementType::U16 => values::<u16>(stack, &part),
+        ElementType::U32 => values::<u32>(stack, &part),
+        ElementType::F16 | ElementType::F32 => values::<f32>(stack, &part),
+        ElementType::F64 => values::<f64>(stack, &part),
+    })
+}
+
+/// Which of the boxes are read: none where the budget of memory would forbid it.
+fn read_of(boxes: impl Iterator<Item = Box3>, decoding_bytes: u64) -> impl Iterator<Item = Box3> {
+    let most = if decoding_bytes < MOST_BYTES { MOST_BOXES } else { 0 };
+    let mut left = MOST_VOXELS;
+    boxes.map(shortened).take(most).take_while(move |part| {
+        let is_read = left > 0;
+        left = left.saturating_sub(part.volume());
+        is_read
+    })
+}
+
+/// The first part of a box, of so many voxels as are read at once.
+fn shortened(mut part: Box3) -> Box3 {
+    for a in [2, 1, 0] {
+        if part.volume() > MOST_VOXELS {
+            part.hi[a] = part.lo[a] + 1;
+        }
+    }
+    part
+}
+
+fn values<T: Sample>(stack: &dyn Stack, part: &Box3) -> Result<()> {
+    let mut values = vec![T::default(); part.len()];
+    stack.read_box(part, T::buffer(&mut values))
+}
+
+/// Reads an image of Zarr as `info`, `segment` and `middle` do.
+fn image(folder: &Path) -> Result<()> {
+    let described = zarr_image::describe(folder).map(drop);
+    worst([described, volume(folder), labels_of(folder).and_then(|(path, _)| labels(&path))])
 }
 
 fn labels(folder: &Path) -> Result<()> {
     let stack = open_stack(folder, Select::default())?;
-    let [width, height, depth] = stack.shape();
-    let geometry = Geometry { shape: [width, height, depth], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+    let geometry = Geometry { shape: stack.shape(), spacing: [1.0; 3], origin: [0.0; 3], unit: None };
     let volume = LabelVolume::new(folder, stack, geometry);
-    let size = width.saturating_mul(height).max(1);
-    (0..depth.min(MOST_VOXELS / size).min(MOST_PLANES))
-        .try_for_each(|z| volume.read_box(&Box3::new([0, 0, z], [width, height, z + 1]), &mut Vec::new()))
-}
-
-fn tables() -> Vec<Files> {
-    let texts = [
-        "x,y,z\n1,2,3\n4,5,6\n7.5,8,9e0\n",
-        "x;y;z;object;contour\n1,5;2;3;1;1\n4;5,25;6;1;1\n7;8;9;2;3\n",
-        "\"object\"\t\"x\"\t\"y\"\t\"z\"\n1\t1\t2\t3\n2\t4\t5\t6\n",
-        "index,axis-0,axis-1,axis-2\n0,3.0,2.0,1.0\n1,4.0,2.0,1.0\n",
-        "index,shape-type,vertex-index,axis-0,axis-1,axis-2\n0,polygon,0,3,2,1\n0,polygon,1,3,4,1\n0,polygon,2,3,4,5\n",
-        "# a cloud\n1 2 3\n4 5 6 0.1 0.2 0.3\n\n7 8 9\n",
-        "3\n1 2 3\n4 5 6\n7 8 9\n",
-        "sep=;\nx;y;z\n1;2;3\n4;5;6\n",
-        "LABEL,ID,POSITION_X,POSITION_Y,POSITION_Z\nLabel,Id,X,Y,Z\n,,(micron),(micron),(micron)\nID1,1,1.0,2.0,3.0\nID2,2,4.0,5.0,6.0\n",
-        "Position\n====================\nPosition X,Position Y,Position Z,Unit\n1,2,3,um\n4,5,6,um\n",
-        " ,Area,X,Y,Slice\n1,10,1.5,2.5,3\n2,12,4.5,5.5,4\n",
-    ];
-    texts.iter().map(|text| vec![("input.csv".to_owned(), text.as_bytes().to_vec())]).collect()
-}
-
-fn meshes() -> Vec<Files> {
-    let shapes = [cuboid([0.0; 3], [1.0, 2.0, 3.0]), sphere([1.0, 0.0, -1.0], 2.0, 4, std::f64::consts::PI)];
-    let written = shapes.iter().flat_map(|mesh| Form::ALL.iter().map(|form| form.write(mesh)));
-    let rest = [
-        &b"ply\nformat ascii 1.0\ncomment c\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-           property uchar red\nproperty list uchar float extra\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n\
-           end_header\n0 0 0 1 0\n1 0 0 1 2 1 1\n0 1 0 1 0\n0 1\n"[..],
-        b"ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n\
-          element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n5 0 1 2 3 -1\n",
-        b"OFF8 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n5 0 1 2 3 4\n",
-        b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 .5 0\nf 1 2 3 4 5\nl 1 2\np 1\ng a\nusemtl b\nf 1/2/3 2/3 3//4\n",
-    ];
-    let all = written.chain(rest.iter().map(|bytes| bytes.to_vec()));
-    all.map(|bytes| vec![("input.mesh".to_owned(), bytes)]).collect()
-}
-
-fn pages() -> Vec<Files> {
-    let made = crate::tiff_hostile::seeds();
-    made.into_iter().map(|(_, bytes)| vec![("input.tif".to_owned(), bytes)]).collect()
-}
-
-/// Folders of three slices each.
-fn slices() -> Vec<Files> {
-    let made = crate::tiff_hostile::seeds();
-    let three = |bytes: &Vec<u8>| (8..11).map(|n| (format!("s{n:02}.tif"), bytes.clone())).collect();
-    made.iter().map(|(_, bytes)| three(bytes)).collect()
-}
-
-/// Stores that this program writes, and those of plain chunks by hand, of both versions.
-fn images() -> Vec<Files> {
-    vec![written::<u16>(), written::<u8>(), plain_three(), plain_two()]
-}
-
-fn written<T: Element>() -> Files {
-    let folder = tempfile::tempdir().expect("room for a store");
-    let path = folder.path().join("seed.zarr");
-    let store = StoreWriter::create(&path, false).expect("a new store");
-    let geometry =
-        Geometry { shape: [5, 4, 3], spacing: [0.5, 0.5, 2.0], origin: [0.0; 3], unit: Some("micrometer".into()) };
-    let spec = ImageSpec { name: "seed", geometry: &geometry, element: T::TYPE, window: None };
-    let image = store.image("", &spec).expect("an image");
-    for level in image.levels() {
-        for shard in level.shards() {
-            let values: Vec<T> = (0..shard.len()).map(|n| T::from_f64((n % 7) as f64)).collect();
-            level.write_shard(&shard, &values).expect("a shard");
-        }
-    }
-    store.finish().expect("a whole store");
-    stores::contents(&path)
-}
-
-fn plain_three() -> Files {
-    let group = r#"{"zarr_format": 3, "node_type": "group", "attributes": {"ome": {"version": "0.5", "multiscales": [{"axes": [
-        {"name": "z", "type": "space", "unit": "micrometer"}, {"name": "y", "type": "space", "unit": "micrometer"},
-        {"name": "x", "type": "space", "unit": "micrometer"}], "datasets": [{"path": "0", "coordinateTransformations":
-        [{"type": "scale", "scale": [2.0, 0.5, 0.5]}, {"type": "translation", "translation": [1, 2, 3]}]}]}]}}}"#;
-    let array = r#"{"zarr_format": 3, "node_type": "array", "shape": [2, 3, 4], "data_type": "uint16", "chunk_grid": {"name": "regular",
-        "configuration": {"chunk_shape": [2, 3, 4]}}, "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
-        "fill_value": 0, "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}], "dimension_names": ["z", "y", "x"]}"#;
-    vec![
-        ("zarr.json".to_owned(), group.into()),
-        ("0/zarr.json".to_owned(), array.into()),
-        ("0/c/0/0/0".to_owned(), (0..48).map(|n| u8::from(n % 2 == 0 && n > 9)).collect()),
-    ]
-}
-
-fn plain_two() -> Files {
-    let attributes = r#"{"multiscales": [{"version": "0.4", "axes": [{"name": "t", "type": "time"}, {"name": "c", "type": "channel"},
-        {"name": "z", "type": "space"}, {"name": "y", "type": "space"}, {"name": "x", "type": "space", "unit": "micrometer"}],
-        "datasets": [{"path": "0", "coordinateTransformations": [{"type": "scale", "scale": [1, 1, 2.0, 0.5, 0.5]}]}],
-        "coordinateTransformations": [{"type": "scale", "scale": [1, 1, 1, 1, 1]}]}]}"#;
-    let array = r#"{"zarr_format": 2, "shape": [1, 1, 2, 3, 4], "chunks": [1, 1, 1, 3, 4], "dtype": "<i8", "order": "C",
-        "compressor": null, "filters": null, "fill_value": 0, "dimension_separator": "/"}"#;
-    let chunk = |z: u8| (0..96).map(|n| if n % 8 == 0 { z + 1 } else { 0 }).collect();
-    vec![
-        (".zgroup".to_owned(), br#"{"zarr_format": 2}"#.to_vec()),
-        (".zattrs".to_owned(), attributes.into()),
-        ("0/.zarray".to_owned(), array.into()),
-        ("0/0/0/0/0/0".to_owned(), chunk(0)),
-        ("0/0/0/1/0/0".to_owned(), chunk(1)),
-    ]
+    let mut boxes = read_of(volume.natural_boxes(), volume.reading_bytes());
+    boxes.try_for_each(|part| volume.read_box(&part, &mut Vec::new()))
 }
