@@ -11,7 +11,7 @@ from pathlib import Path
 from common import page
 from common.program import METHODS, Program
 
-from . import cube, embryo, middle, sponge, surface, teddy
+from . import cube, embryo, middle, printed, sponge, surface, teddy
 from .setting import Setting
 
 SECTIONS = {
@@ -19,6 +19,7 @@ SECTIONS = {
     "teddy": teddy.section,
     "sponge": sponge.section,
     "middle": middle.section,
+    "printed": printed.section,
     "surface": surface.section,
     "embryo": embryo.section,
 }
@@ -46,6 +47,9 @@ def arguments():
     parser.add_argument(
         "--data", type=Path, default=data and Path(data), help=f"folder that holds {teddy.FILE} and embryo-like ($STRANDLINE_DATA)"
     )
+    parser.add_argument(
+        "--keep", type=Path, metavar="FOLDER", help="keep what runs gave; those that are there are not run again"
+    )
     parser.add_argument("--scratch", type=Path, help="folder for temporary fields (the system's)")
     parser.add_argument(
         "--out", type=Path, default=page.ROOT / "docs" / "reproduction.md", help="page to write (docs/reproduction.md)"
@@ -67,7 +71,7 @@ def main():
         settings.out.write_text(TITLE + "\n", encoding="utf-8")
     whole = time.monotonic()
     with tempfile.TemporaryDirectory(dir=settings.scratch) as scratch:
-        setting = Setting(program, methods, settings.finest, Path(scratch), settings.data)
+        setting = Setting(program, methods, settings.finest, Path(scratch), settings.data, settings.keep)
         for name in settings.only or SECTIONS:
             print(name, flush=True)
             started = time.monotonic()

@@ -11,8 +11,7 @@ from common.grids import Grid, around
 from common.program import METHODS
 
 from . import middle_shapes, paper, picture
-from .setting import DEFAULT, SWEEP, Notes
-from .surface import run
+from .setting import DEFAULT, Notes, run
 
 # The surface between the cube and an exact sphere, by quadrature.
 VOLUME, AREA = 0.29308839, 2.23246683

@@ -1,9 +1,12 @@
 """How the program is run for these tables, and what its runs are called in them."""
 
+import hashlib
+import json
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.program import METHODS, Program, RunFailed
+from common.program import METHODS, Program, Run, RunFailed
 
 # The papers' setting, and what a user gets without any flag.
 SWEEP = ("--schedule", "sweep", "--precision", "f64", "--threads", "1")
@@ -19,22 +22,67 @@ class Setting:
     finest: int
     scratch: Path
     data: Path | None
+    kept: Path | None = None
 
     def grids(self, grids):
         """Those no finer than asked for, as (index, grid)."""
         return [(n, grid) for n, grid in enumerate(grids) if max(grid.shape) <= self.finest]
 
-    def run(self, method, sources, grid, flags, store=None):
-        """A run, or the sentence that says why there is none."""
+    def run(self, method, sources, grid, flags, store=None, measure=None):
+        """A run, or the sentence that says why there is none; and what `measure` says of its store, where it is given.
+
+        With --keep a run that was done before is not done again.
+        """
         if method not in self.methods:
-            return "not in this version"
+            return "not in this version" if measure is None else ("not in this version", None)
         flags = ["--method", method, *flags]
         print(f"  {grid}: {' '.join(flags)}", flush=True)
+        place = self.place_of(sources, [*grid.flags(), *flags])
+        if place and place.exists():
+            report, measured = json.loads(place.read_text())
+            return Run(report) if measure is None else (Run(report), measured)
         try:
-            return self.program.distance(sources, [*grid.flags(), *flags], store=store)
+            run = self.program.distance(sources, [*grid.flags(), *flags], store=store)
         except RunFailed as error:
             print(f"    {error}", flush=True)
-            return str(error)
+            return str(error) if measure is None else (str(error), None)
+        measured = measure and measure()
+        if place:
+            place.write_text(json.dumps([run.report, measured]))
+        return run if measure is None else (run, measured)
+
+    def place_of(self, sources, flags):
+        """Where the result of a run is kept: a name made of the program, the sources' bytes, and the flags."""
+        if self.kept is None:
+            return None
+        name = hashlib.sha256(Path(self.program.path).read_bytes())
+        for source in sources:
+            name.update(Path(source).read_bytes())
+        name.update("\0".join(flags).encode())
+        self.kept.mkdir(parents=True, exist_ok=True)
+        return self.kept / f"{name.hexdigest()[:24]}.json"
+
+
+def run(setting, command, flags, *, store=None):
+    """A run of another command than `distance`: its report, or the sentence that says why there is none."""
+    print(f"  {' '.join(map(str, [*command, *flags]))}", flush=True)
+    files = [word for word in command[1:] if Path(word).is_file()]
+    words = list(map(str, [command[0], *flags]))
+    # One that leaves something behind is done again.
+    place = None if store or "--mesh" in words else setting.place_of(files, words)
+    if place and place.exists():
+        return json.loads(place.read_text())
+    path = setting.scratch / "report.json"
+    output = ["-o", str(store or "none"), "--report", str(path), "--overwrite", "-q"]
+    done = subprocess.run(
+        [setting.program.path, *map(str, command), *output, *words[1:]], capture_output=True, text=True
+    )
+    if done.returncode != 0:
+        return (done.stderr.strip().splitlines() or ["failed"])[-1]
+    report = json.loads(path.read_text())
+    if place:
+        place.write_text(json.dumps(report))
+    return report
 
 
 class Notes:
