@@ -50,6 +50,9 @@ def arguments():
     parser.add_argument(
         "--keep", type=Path, metavar="FOLDER", help="keep what runs gave; those that are there are not run again"
     )
+    parser.add_argument(
+        "--patience", type=float, default=float("inf"), metavar="SECONDS", help="leave out runs that would take longer (none)"
+    )
     parser.add_argument("--scratch", type=Path, help="folder for temporary fields (the system's)")
     parser.add_argument(
         "--out", type=Path, default=page.ROOT / "docs" / "reproduction.md", help="page to write (docs/reproduction.md)"
@@ -71,7 +74,7 @@ def main():
         settings.out.write_text(TITLE + "\n", encoding="utf-8")
     whole = time.monotonic()
     with tempfile.TemporaryDirectory(dir=settings.scratch) as scratch:
-        setting = Setting(program, methods, settings.finest, Path(scratch), settings.data, settings.keep)
+        setting = Setting(program, methods, settings.finest, Path(scratch), settings.data, settings.keep, settings.patience)
         for name in settings.only or SECTIONS:
             print(name, flush=True)
             started = time.monotonic()

@@ -20,50 +20,26 @@ def sponge(setting):
     inside = (np.abs(z) < 1) & ((x / ring) ** 2 + y**2 < 1 - s2)
     path = setting.scratch / "sponge.tif"
     tifffile.imwrite(path, (255 * inside).astype(np.uint8), imagej=True, metadata={"axes": "ZYX"})
-    middle = half
-    flags = [
-        "--seed",
-        f"{middle},{middle},{middle},1.35",
-        "--image-spacing",
-        f"{h},{h},{h}",
-        "--edge",
-        "plain",
-        "--smoothing",
-        "heat",
-        "--rho",
-        1,
-    ]
-    flags += [
-        "--delta",
-        0.025,
-        "--k",
-        10,
-        "--sigma",
-        h,
-        "--tau",
-        h / 4,
-        "--epsilon",
-        0.01,
-        "--max-steps",
-        4000,
-        "--tol",
-        0.001,
-    ]
+    settings = {"seed": f"{half},{half},{half},1.35", "image-spacing": f"{h},{h},{h}", "edge": "plain", "smoothing": "heat"}
+    settings |= {"rho": 1, "delta": 0.025, "sigma": h, "tau": h / 4, "epsilon": 0.01, "max-steps": 4000, "tol": 0.001}
+    flags = [word for name, value in settings.items() for word in (f"--{name}", value)]
     mesh = setting.scratch / "image.ply"
-    report = run(setting, ["segment", path], [*flags, "--mesh", mesh])
-    if isinstance(report, str):
-        text = f"No result: {report}."
-    else:
-        result = report["result"]
-        voxels = int(inside.sum())
+    report = run(setting, ["segment", path], [*flags, "--k", 10, "--mesh", mesh])
+    if not isinstance(report, str):
         picture.draw(mesh, page.ROOT / "docs" / "pictures" / "sponge-image.png")
-        text = (
-            f"Volume {result['volume']:.3f} where the image's inside has {voxels * h**3:.3f}; {result['components']} piece, "
-            f"{result['time_steps']} steps.\n\n![from the image](pictures/sponge-image.png)"
-        )
+    of_grey_values = run(setting, ["segment", path], [*flags, "--k", 10 * 255**2])
     return (
         "## The Sponge as an image, without points (Kósa PhD, Fig. 2.3)\n\n"
-        "`segment sponge.tif --seed ... --edge plain`: v = -grad g, not normalised, delta = 0.025, K = 10 for grey values on\n"
-        "[0, 1] (the thesis gives 255 inside and 0 outside, and no range for K; on 0..255 g would be all but 0 on the whole border); the start is\n"
-        f"a ball around the Sponge. {text}"
+        "`segment sponge.tif --seed ... --edge plain`: v = -grad g, not normalised, delta = 0.025; the start is a ball around the Sponge. The\n"
+        "thesis gives 255 inside, 0 outside and K = 10, and does not say of which values the gradient is taken. K is read here for values on [0, 1];\n"
+        f"on 0 to 255 it would be 10 * 255^2 for those, and the surface passes through the border. The image's inside has {int(inside.sum()) * h**3:.3f}.\n\n"
+        + page.table(["K = 10 for values on", "volume", "pieces", "steps"], [["[0, 1]", *told(report)], ["0 to 255", *told(of_grey_values)]])
+        + "\n\n![from the image](pictures/sponge-image.png)"
     )
+
+
+def told(report):
+    if isinstance(report, str):
+        return [report, "-", "-"]
+    result = report["result"]
+    return [f"{result['volume']:.3f}", result["components"], result["time_steps"]]

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from common.program import METHODS, Program, Run, RunFailed
@@ -23,6 +23,9 @@ class Setting:
     scratch: Path
     data: Path | None
     kept: Path | None = None
+    # Runs that would take longer than so many seconds are left out.
+    patience: float = float("inf")
+    speeds: dict = field(default_factory=dict)
 
     def grids(self, grids):
         """Those no finer than asked for, as (index, grid)."""
@@ -40,16 +43,26 @@ class Setting:
         place = self.place_of(sources, [*grid.flags(), *flags])
         if place and place.exists():
             report, measured = json.loads(place.read_text())
+            self.learn(method, flags, Run(report))
             return Run(report) if measure is None else (Run(report), measured)
+        expected = grid.voxels * self.speeds.get((method, *flags), 0.0)
+        if expected > self.patience:
+            why = f"the run on {grid} points was left out: about {expected / 60:.0f} minutes, by the grid before it"
+            return why if measure is None else (why, None)
         try:
             run = self.program.distance(sources, [*grid.flags(), *flags], store=store)
         except RunFailed as error:
             print(f"    {error}", flush=True)
             return str(error) if measure is None else (str(error), None)
+        self.learn(method, flags, run)
         measured = measure and measure()
         if place:
             place.write_text(json.dumps([run.report, measured]))
         return run if measure is None else (run, measured)
+
+    def learn(self, method, flags, run):
+        """Seconds a voxel, for what the next grid will take."""
+        self.speeds[(method, *flags)] = run.seconds / run.voxels
 
     def place_of(self, sources, flags):
         """Where the result of a run is kept: a name made of the program, the sources' bytes, and the flags."""
