@@ -27,13 +27,16 @@ TITLE = """# Reproduction
 
 B. Kósa, K. Mikula: *Direct simple computation of middle surface between 3D point clouds and/or discrete surfaces by
 tracking sources in distance function calculation algorithms*, 2023: the tables of its experiments; B. Kósa's
-diploma thesis, 2015, and PhD thesis: surfaces from point clouds and images; and what this program gives. Tables are numbered as printed; what is
-misprinted in the papers is in [algorithms.md](algorithms.md).
+diploma thesis of 2015 ("Kósa 2015") and his PhD thesis ("Kósa PhD"): surfaces from point clouds and images; and what this program gives. Tables
+are numbered as printed; what is misprinted in the papers is in [algorithms.md](algorithms.md). A figure that is not the
+paper's has its reason below its table; the part `printed` tries the reasons out.
 `scripts/reproduce` runs the experiments and writes this page, part by part.
 
     scripts/reproduce --data FOLDER            # all grids, up to 893 x 1279 x 482
     scripts/reproduce --finest 340             # those of at most 340 points along an axis
     scripts/reproduce --only middle            # one part
+    scripts/reproduce --keep FOLDER            # what was run before is taken from there: for runs that are interrupted
+    scripts/reproduce --patience 200           # runs that would take longer than so many seconds are left out
 """
 
 
@@ -80,7 +83,7 @@ def main():
             started = time.monotonic()
             text = SECTIONS[name](setting)
             minutes = (time.monotonic() - started) / 60
-            head = f"{page.circumstances(program.version())} This part took {minutes:.0f} minutes."
+            head = f"{page.circumstances(program.version())} This part took {minutes:.0f} minutes.{setting.busy()}"
             page.write_part(settings.out, f"scripts/reproduce --only {name}", f"{text}\n\n{head}")
     print(f"{settings.out} in {(time.monotonic() - whole) / 60:.1f} minutes")
 

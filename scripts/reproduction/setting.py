@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +27,8 @@ class Setting:
     # Runs that would take longer than so many seconds are left out.
     patience: float = float("inf")
     speeds: dict = field(default_factory=dict)
+    # The largest load of the machine, by which seconds are to be judged.
+    load: float = 0.0
 
     def grids(self, grids):
         """Those no finer than asked for, as (index, grid)."""
@@ -42,8 +45,8 @@ class Setting:
         print(f"  {grid}: {' '.join(flags)}", flush=True)
         place = self.place_of(sources, [*grid.flags(), *flags])
         if place and place.exists():
-            report, measured = json.loads(place.read_text())
-            self.learn(method, flags, Run(report))
+            report, measured, load = json.loads(place.read_text())
+            self.learn(method, flags, Run(report), load)
             return Run(report) if measure is None else (Run(report), measured)
         expected = grid.voxels * self.speeds.get((method, *flags), 0.0)
         if expected > self.patience:
@@ -54,15 +57,24 @@ class Setting:
         except RunFailed as error:
             print(f"    {error}", flush=True)
             return str(error) if measure is None else (str(error), None)
-        self.learn(method, flags, run)
+        load = os.getloadavg()[0]
+        self.learn(method, flags, run, load)
         measured = measure and measure()
         if place:
-            place.write_text(json.dumps([run.report, measured]))
+            place.write_text(json.dumps([run.report, measured, load]))
         return run if measure is None else (run, measured)
 
-    def learn(self, method, flags, run):
-        """Seconds a voxel, for what the next grid will take."""
+    def learn(self, method, flags, run, load):
+        """Seconds a voxel, for what the next grid will take; and how busy the machine was."""
         self.speeds[(method, *flags)] = run.seconds / run.voxels
+        self.load = max(self.load, load)
+
+    def busy(self):
+        """A sentence where other programs took the processors."""
+        cores = os.cpu_count() or 1
+        if self.load <= 2 * cores:
+            return ""
+        return f" Other programs kept the machine busy (load up to {self.load:.0f} on {cores} cores): seconds are too large."
 
     def place_of(self, sources, flags):
         """Where the result of a run is kept: a name made of the program, the sources' bytes, and the flags."""
