@@ -1,4 +1,4 @@
-"""What the paper prints: Kósa, Mikula, Direct simple computation of middle surface ..., 2023, Tables 2 to 11.
+"""What the paper prints: Kósa, Mikula, Direct simple computation of middle surface ..., 2023, Tables 2 to 11; and Kósa 2015 and PhD.
 
 Rows go from the coarsest to the finest grid. MSE are texts: the paper truncates them, and so they are compared.
 """
