@@ -15,7 +15,8 @@ from . import cube, embryo, middle, printed, sponge, surface, teddy
 from .setting import Setting
 
 SECTIONS = {
-    "cube": cube.section,
+    "cube": cube.table_2,
+    "cube-times": cube.table_3,
     "teddy": teddy.section,
     "counts": teddy.counted,
     "sponge": sponge.section,
@@ -49,13 +50,20 @@ def arguments():
     parser.add_argument("--only", choices=SECTIONS, action="append", help="only this experiment; may be repeated (all)")
     data = os.environ.get("STRANDLINE_DATA")
     parser.add_argument(
-        "--data", type=Path, default=data and Path(data), help=f"folder that holds {teddy.FILE} and embryo-like ($STRANDLINE_DATA)"
+        "--data",
+        type=Path,
+        default=data and Path(data),
+        help=f"folder that holds {teddy.FILE} and embryo-like ($STRANDLINE_DATA)",
     )
     parser.add_argument(
         "--keep", type=Path, metavar="FOLDER", help="keep what runs gave; those that are there are not run again"
     )
     parser.add_argument(
-        "--patience", type=float, default=float("inf"), metavar="SECONDS", help="leave out runs that would take longer (none)"
+        "--patience",
+        type=float,
+        default=float("inf"),
+        metavar="SECONDS",
+        help="leave out runs that would take longer (none)",
     )
     parser.add_argument("--scratch", type=Path, help="folder for temporary fields (the system's)")
     parser.add_argument(
@@ -78,7 +86,9 @@ def main():
         settings.out.write_text(TITLE + "\n", encoding="utf-8")
     whole = time.monotonic()
     with tempfile.TemporaryDirectory(dir=settings.scratch) as scratch:
-        setting = Setting(program, methods, settings.finest, Path(scratch), settings.data, settings.keep, settings.patience)
+        setting = Setting(
+            program, methods, settings.finest, Path(scratch), settings.data, settings.keep, settings.patience
+        )
         for name in settings.only or SECTIONS:
             print(name, flush=True)
             started = time.monotonic()

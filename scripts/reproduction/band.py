@@ -15,7 +15,15 @@ def table(setting):
         rows.append([f"{grid}^3", "bracelet", *printed[0], None])
         rows.append([None, "sealer", *printed[1], None])
         rows += [[None, "plain, here", *line[1:]] for line in lines if line[0] == f"{grid}^3"]
-    header = ["grid", "cloud", "points in band", "seconds, all points", "band", "mean squared difference", "this program"]
+    header = [
+        "grid",
+        "cloud",
+        "points in band",
+        "seconds, all points",
+        "band",
+        "mean squared difference",
+        "this program",
+    ]
     return (
         "## The band (Kósa 2015, Tables 1 and 2)\n\n"
         "The papers' program solves u on all points of the grid, or in a band of twice beta. `plain, here` is a program written\n"

@@ -16,8 +16,20 @@ PRINTED_FMM = "all finite neighbours in one quadratic, as Alg. 4 prints, give th
 KNOWN = {("fmm", 1): PRINTED_FMM}
 
 
-def section(setting):
-    """Both tables as Markdown."""
+def table_2(setting):
+    """Table 2 as Markdown."""
+    grids, _, errors = everything(setting)
+    return accuracy(grids, errors)
+
+
+def table_3(setting):
+    """Table 3 as Markdown: a part of its own, which hangs on how busy the machine is."""
+    grids, runs, _ = everything(setting)
+    return times(grids, runs)
+
+
+def everything(setting):
+    """Grids; runs and errors, each [method][grid] = (sweep, default)."""
     grids = setting.grids([shapes.cube_grid(n) for n in paper.CUBE_SIZES])
     runs = {method: {} for method in METHODS}
     errors = {method: {} for method in METHODS}
@@ -28,7 +40,7 @@ def section(setting):
             found = [measured(setting, method, cloud, grid, flags) for flags in (SWEEP, DEFAULT)]
             runs[method][index] = [run for run, _ in found]
             errors[method][index] = [error for _, error in found]
-    return accuracy(grids, errors) + "\n\n" + times(grids, runs)
+    return grids, runs, errors
 
 
 def measured(setting, method, cloud, grid, flags):
@@ -72,6 +84,15 @@ def accuracy(grids, errors):
             rows.append([None, None, name, *(cell(errors[method][index][which]) for method in METHODS)])
     header = ["grid points", "h", "", *(m.upper() for m in METHODS)]
     compare(grids, errors, notes)
+    for method, found in errors.items():
+        absent = [
+            f"{name} on {grid}"
+            for index, grid in grids
+            for name, error in zip(("sweep", "default"), found[index])
+            if error is None
+        ]
+        if absent:
+            notes.add(f"{method.upper()}, not run (it would have taken too long): {', '.join(absent)}.")
     eoc = page.table(["grids", *(f"{m.upper()}, sweep" for m in ("fsm", "fmm"))], orders(grids, errors))
     return (
         "## Table 2: mean squared error, Cube experiment\n\n"

@@ -105,7 +105,9 @@ def cube_and_sphere(setting):
         for method, (v, a), (w, b) in zip(METHODS, line, printed):
             if max(abs(v / w - 1), abs(a / b - 1)) > 3e-6:
                 reason = REASONS["vdt" if method in TIED[0] and grid.shape[0] == TIED[1] else method]
-                notes.add(f"{method.upper()} at {grid}: {100 * (v / w - 1):+.3f} %, {100 * (a / b - 1):+.3f} %: {reason}.")
+                notes.add(
+                    f"{method.upper()} at {grid}: {100 * (v / w - 1):+.3f} %, {100 * (a / b - 1):+.3f} %: {reason}."
+                )
         v, a = measures(run(setting, ["middle", cube, fine], grid.flags()))
         exact.append([grid, f"{grid.spacing:g}", f"{100 * (v / VOLUME - 1):+.4f} %", f"{100 * (a / AREA - 1):+.4f} %"])
     mesh = setting.scratch / "middle.ply"

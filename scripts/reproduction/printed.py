@@ -79,7 +79,9 @@ def middle(setting):
             getattr(plain, method)(*fields, *more)
             volume, area = isosurface(fields[1] >= len(triangles), grid.spacing)
             printed = paper.TABLE_11[method][n]
-            off = [f"{round(100 * (ours / theirs - 1), 3) + 0.0:+.3f} %" for ours, theirs in zip((volume, area), printed)]
+            off = [
+                f"{round(100 * (ours / theirs - 1), 3) + 0.0:+.3f} %" for ours, theirs in zip((volume, area), printed)
+            ]
             cells_of_row = [f"{printed[0]:.6g} {printed[1]:.6g}", f"{volume:.6g} {area:.6g}", *off]
             rows.append([grid if rule == "Alg. 3" else None, name, rule, *cells_of_row])
     header = ["grid points", "", "rule", "paper", "plain", "volume", "area"]
@@ -90,7 +92,8 @@ def middle(setting):
         "set given first, the paper's to whichever was looked at first. FSM's labels hang on rounding: beside a plane of the cube a neighbour is\n"
         "exactly h farther, and whether it enters the solution, which does not change the distance, decides whose source is copied. A margin of a\n"
         "millionth of h either way shows how much that is: up to 0.2 % of the volume, with the paper inside that at 73^3, and outside, by 0.08 %, at 145^3. What\n"
-        "decides the last part is not known; this program, which follows the same rule, is nearer there than the plain loops.\n\n" + page.table(header, rows)
+        "decides the last part is not known; this program, which follows the same rule, is nearer there than the plain loops.\n\n"
+        + page.table(header, rows)
     )
 
 
@@ -120,7 +123,8 @@ def neighbours(setting):
         "### DP with 26 neighbours\n\n"
         "Kósa and Mikula took 6 neighbours in place of the 26 of the first Dijkstra-Pythagoras method: much faster, precision about the same.\n"
         "`--neighbours 26` asks all; parts of all voxels whose distance is not that of a k-d tree (1e-9), the papers' order in f64 on one\n"
-        "thread, and `front` in f64 on all cores. Sweeps by bricks, which `sweep` is with VDT, cannot keep the order of 26.\n\n" + page.table(header, rows)
+        "thread, and `front` in f64 on all cores. Sweeps by bricks, which `sweep` is with VDT, cannot keep the order of 26.\n\n"
+        + page.table(header, rows)
     )
 
 

@@ -30,7 +30,9 @@ PAPERS = (
 
 def section(setting):
     """All tables as Markdown."""
-    return "\n\n".join([sponge(setting), sealer.tables(setting), band.table(setting), noise(setting), image.sponge(setting)])
+    return "\n\n".join(
+        [sponge(setting), sealer.tables(setting), band.table(setting), noise(setting), image.sponge(setting)]
+    )
 
 
 def figures(report, h):

@@ -42,7 +42,8 @@ def section(setting):
             "## Tables 4 and 5: teddy bear\n\n"
             f"The paper's bear has some 9,550 vertices. Ours has {len(positions):,} and {len(triangles):,} triangles,\n"
             "stands otherwise, and is scaled into the same grids: fixed points are of the same size, not equal. On the finest grid a\n"
-            "vertex fixes the eight corners of a cell of its own, as in the paper (76,384 / 8 = 9,548).\n\n" + TIMES_EXPLAINED,
+            "vertex fixes the eight corners of a cell of its own, as in the paper (76,384 / 8 = 9,548).\n\n"
+            + TIMES_EXPLAINED,
             times("### Table 4: time to the point cloud", grids, of_cloud, paper.TEDDY_CLOUD),
             times("### Table 5: time to the triangles", grids, of_mesh, paper.TEDDY_MESH),
         ]
