@@ -104,6 +104,7 @@ def run(setting, command, flags, *, store=None):
     )
     if done.returncode != 0:
         return (done.stderr.strip().splitlines() or ["failed"])[-1]
+    setting.load = max(setting.load, os.getloadavg()[0])
     report = json.loads(path.read_text())
     if place:
         place.write_text(json.dumps(report))

@@ -38,7 +38,7 @@ def section(setting):
 def figures(report, h):
     """Volume, MeanHD, MaxHD, points farther than a voxel."""
     if isinstance(report, str):
-        return [report, "-", "-"]
+        return ["vanished" if "vanished" in report else "no surface", "-", "-"]
     result = report["result"]
     if not result["hausdorff"]:
         return ["vanished", "-", "-"]
