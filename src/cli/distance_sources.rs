@@ -6,15 +6,15 @@ use super::args::PointsIn;
 use super::console::Console;
 use super::distance_args::{DistanceJobArgs, GridArgs};
 use super::grid::check_spacing;
-use super::input::open_stack;
+use super::input::{chosen_notes, open_stack};
 use super::marks::{Reading, placed};
-use super::sources::read_told;
+use super::sources::read_in_unit;
 use super::text::{bytes, grouped};
 use crate::error::{Error, Result};
 use crate::exec::{Cancel, Progress};
 use crate::grid::{DataSets, Geometry, PointCloud, TriangleMesh, refuse_too_many};
 use crate::io::label_volume::{LabelVolume, is_label_volume, labels_of};
-use crate::io::points::PointFile;
+use crate::io::points::{LengthUnit, PointFile};
 use crate::io::sources::{Source, read_parts};
 use crate::kernel::solid::Solid;
 use crate::pipeline::label_borders::label_borders;
@@ -45,10 +45,13 @@ pub(super) fn read_sets(
         ));
     }
     let mut read = Read { sets: DataSets::default(), volume: None };
+    // The unit of the first file that tells one.
+    let mut unit = None;
     for path in &args.sources {
         let is_volume = is_label_volume(path);
         if is_volume && !args.choice.signed {
             let volume = open_volume(path, &args.job.grid, console)?;
+            refuse_other_unit(volume.geometry(), &mut unit).map_err(|error| error.at(path))?;
             if volume.reading_bytes() > memory {
                 let needed = bytes(volume.reading_bytes());
                 let error = format!("needs {needed} to be read, for its chunks or planes; give more with --memory");
@@ -59,7 +62,7 @@ pub(super) fn read_sets(
         } else if is_volume {
             return Err(without_inside("label volumes").at(path));
         } else {
-            match read_placed(path, &args.job.grid, grid, &|text| console.note(text))? {
+            match read_placed(path, &args.job.grid, grid, &mut unit, &|text| console.note(text))? {
                 Source::Cloud(_) if args.choice.signed => return Err(without_inside("points").at(path)),
                 Source::Cloud(cloud) => read.sets.add_cloud(&cloud.positions),
                 Source::Mesh(mesh) if args.choice.signed => {
@@ -75,9 +78,15 @@ pub(super) fn read_sets(
 
 /// Reads points or a mesh. Points that count voxels are placed where the grid has them: of a file whose form says so where the
 /// grid is that of an image, of any where that was asked for.
-fn read_placed(path: &Path, args: &GridArgs, grid: Option<&Geometry>, note: &dyn Fn(&str)) -> Result<Source> {
+fn read_placed(
+    path: &Path,
+    args: &GridArgs,
+    grid: Option<&Geometry>,
+    unit: &mut Option<LengthUnit>,
+    note: &dyn Fn(&str),
+) -> Result<Source> {
     let image = grid.filter(|_| args.like.is_some() || args.points_in.is_some());
-    let Some(image) = image else { return read_told(path, note) };
+    let Some(image) = image else { return read_in_unit(path, unit, note) };
     let (source, form, notes) = read_parts(path)?;
     for text in &notes {
         note(text);
@@ -100,6 +109,19 @@ fn read_placed(path: &Path, args: &GridArgs, grid: Option<&Geometry>, note: &dyn
             Ok(mesh)
         }
     }
+}
+
+/// Refuses a volume whose lengths are in another unit than those of the files before it.
+fn refuse_other_unit(volume: &Geometry, unit: &mut Option<LengthUnit>) -> Result<()> {
+    let Some(own) = volume.unit.as_deref().and_then(LengthUnit::named) else { return Ok(()) };
+    let before = *unit.get_or_insert(own);
+    if own == before {
+        return Ok(());
+    }
+    Err(Error::input(format!(
+        "its lengths are in {}, those of the files before it in {}; name it first, so that points are told in its unit",
+        own.name, before.name
+    )))
 }
 
 fn without_inside(what: &str) -> Error {

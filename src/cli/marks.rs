@@ -98,14 +98,8 @@ pub(super) fn placed(file: PointFile, reading: &Reading<'_>, note: impl Fn(&str)
 /// How many units of the image a unit of the file has, where both are known.
 fn unit_factor(unit: Option<LengthUnit>, image: &Geometry) -> f64 {
     let known = image.unit.as_deref().and_then(LengthUnit::named);
-    // Most units are whole multiples of each other, which their metres are up to rounding.
-    let ratio = |large: f64, small: f64| {
-        let ratio = large / small;
-        if (ratio - ratio.round()).abs() < 1e-9 * ratio { ratio.round() } else { ratio }
-    };
     match (unit, known) {
-        (Some(from), Some(to)) if from.metres < to.metres => 1.0 / ratio(to.metres, from.metres),
-        (Some(from), Some(to)) => ratio(from.metres, to.metres),
+        (Some(from), Some(to)) => from.in_units_of(to),
         _ => 1.0,
     }
 }

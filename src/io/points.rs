@@ -79,6 +79,25 @@ impl PointFile {
         }
     }
 
+    /// The same points with all lengths in one unit, that of the first axis that tells one; which is told.
+    pub(super) fn in_one_unit(mut self) -> Self {
+        let Some(to) = self.units.into_iter().flatten().next() else { return self };
+        if self.units.into_iter().flatten().all(|unit| unit == to) {
+            return self;
+        }
+        let told = (0..3).filter_map(|a| Some(format!("{} of {}", self.units[a]?.name, ["x", "y", "z"][a])));
+        let told = told.collect::<Vec<_>>().join(", ");
+        self.notes.push(format!("units differ ({told}); all lengths are told in {}", to.name));
+        for (axis, unit) in self.units.iter_mut().enumerate() {
+            if let Some(unit) = unit {
+                let factor = unit.in_units_of(to);
+                *unit = to;
+                self.cloud.positions.iter_mut().for_each(|point| point[axis] *= factor);
+            }
+        }
+        self
+    }
+
     /// What is to be told where the points are taken as they are, without an image.
     pub(super) fn notes_without_image(&self) -> Vec<String> {
         let mut notes = self.notes.clone();

@@ -185,8 +185,9 @@ fn read_table(input: &mut Input) -> Result<Source> {
 
 /// The points of a file, with how they are to be understood.
 fn cloud_of(file: PointFile, input: &mut Input) -> Result<Source> {
-    let cloud = points::refuse_empty(file.cloud)?;
-    input.points = Some(PointFile { cloud: PointCloud::default(), ..file });
+    let mut file = file.in_one_unit();
+    let cloud = points::refuse_empty(std::mem::take(&mut file.cloud))?;
+    input.points = Some(file);
     Ok(Source::Cloud(cloud))
 }
 

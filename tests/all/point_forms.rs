@@ -10,6 +10,7 @@ use std::process::Stdio;
 
 use serde_json::Value;
 use strandline::io::points::{Scale, read_points};
+use strandline::io::sources::{Source, read_source};
 
 use crate::common::ball::{Ball, Bench, HEADER};
 use crate::common::python;
@@ -242,6 +243,55 @@ fn tables_say_what_they_are() {
     bench.write("other.csv", "name,width,height\na,1,2\n");
     let complaint = bench.fail("info other.csv", 2);
     assert!(complaint.contains("'name, width, height'") && complaint.contains("three columns x, y, z"), "{complaint}");
+}
+
+/// 7.125 micrometers are 7125 nanometers, along whichever axis and in whichever file.
+#[test]
+fn lengths_in_several_units_become_one() {
+    let bench = Bench::bare();
+    let rows = [[12.5, 30.25, 4.0], [13.5, 7.125, 8.5], [21.25, 18.75, 12.0]];
+    let table = |header: &str, factors: [f64; 3]| {
+        let row = |p: &[f64; 3]| format!("{},{},{}\n", p[0] * factors[0], p[1] * factors[1], p[2] * factors[2]);
+        header.to_owned() + &rows.iter().map(row).collect::<String>()
+    };
+    bench.write("um.csv", &table("x_um,y_um,z_um\n", [1.0; 3]));
+    bench.write("nm.csv", &table("x [nm],y [nm],z [nm]\n", [1000.0; 3]));
+    bench.write("mixed.csv", &table("x_um,y_um,z_nm\n", [1.0, 1.0, 1000.0]));
+    let plan = |files: &str| {
+        let output = bench.run(&format!("distance {files} --spacing 1 -o none --dry-run"));
+        let (plan, notes) = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()).into();
+        assert!(output.status.success(), "{notes}");
+        (plan.lines().find(|line| line.starts_with("grid ")).unwrap().to_owned(), notes)
+    };
+    let (grid, _) = plan("um.csv");
+    for (files, told) in [
+        ("mixed.csv", "units differ (micrometer of x, micrometer of y, nanometer of z)"),
+        ("um.csv nm.csv", "nm.csv: its lengths are in nanometer, those before it in micrometer"),
+    ] {
+        let (found, notes) = plan(files);
+        assert_eq!(found, grid, "{files}");
+        assert!(notes.contains(told), "{files}: {notes}");
+    }
+    assert!(bench.succeed("info mixed.csv").contains("(12.5, 7.125, 4)"));
+}
+
+/// Corners may spell the count of a binary STL file, and its numbers; the first word decides.
+#[test]
+fn no_polygon_of_imagej_is_taken_for_stl() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("polygon.roi");
+    let mut random = crate::common::random::Random(3);
+    for corners in 3..120_i16 {
+        let mut roi = box_by_hand();
+        (roi[6], roi[7]) = (0, 0);
+        roi[16..18].copy_from_slice(&corners.to_be_bytes());
+        roi.extend((0..2 * corners).flat_map(|_| (random.below(600) as i16).to_be_bytes()));
+        std::fs::write(&path, &roi).unwrap();
+        match read_source(&path).unwrap_or_else(|error| panic!("{error}")) {
+            Source::Cloud(cloud) => assert_eq!(cloud.len(), corners as usize),
+            Source::Mesh(_) => panic!("{corners} corners are a mesh"),
+        }
+    }
 }
 
 /// A ROI of two bytes for each number of its header, by hand: a box from (3, 5) to (13, 25) on slice 8.

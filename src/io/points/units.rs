@@ -52,6 +52,21 @@ impl LengthUnit {
         let found = LENGTHS.iter().find(|(name, _, spellings)| *name == text || spellings.contains(&text))?;
         Some(Self { name: found.0, metres: found.1 })
     }
+
+    /// How many of another unit this one has.
+    #[must_use]
+    pub fn in_units_of(self, other: Self) -> f64 {
+        // Most units are whole multiples of each other, which their metres are up to rounding.
+        let ratio = |large: f64, small: f64| {
+            let ratio = large / small;
+            if (ratio - ratio.round()).abs() < 1e-9 * ratio { ratio.round() } else { ratio }
+        };
+        if self.metres < other.metres {
+            1.0 / ratio(other.metres, self.metres)
+        } else {
+            ratio(self.metres, other.metres)
+        }
+    }
 }
 
 /// The micro sign as it was meant: of a text in Latin-1 only a replacement character is left, of UTF-8 that was read as
