@@ -151,8 +151,9 @@ pub fn read_parts(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>
 fn read(input: &mut Input) -> Result<Source> {
     let length = input.length;
     let head = input.head()?;
-    // What the length says counts for more than any looks.
-    if stl::has_binary_length(head, length) {
+    // What the length says counts for more than any looks, but for those of an outline: it starts with a word of its own,
+    // and its corners may say of triangles whatever they like.
+    if stl::has_binary_length(head, length) && !roi::is_roi(head) {
         return stl::read(input);
     }
     if let Some(error) = foreign::no_source(head, &names()) {

@@ -21,8 +21,8 @@ const HEADER: usize = 84;
 /// Bytes of a triangle.
 const RECORD: usize = 50;
 
-/// How other binary files start: TIFF, PNG, NumPy, HDF5, zip, gzip.
-const OTHERS: [&[u8]; 7] = [b"II*\0", b"II+\0", b"MM\0", b"\x89PNG", b"\x93NUMPY", b"\x89HDF", b"PK\x03\x04"];
+/// How other binary files start: TIFF, PNG, NumPy, HDF5, zip, ROIs of ImageJ; gzip is looked for beside them.
+const OTHERS: [&[u8]; 8] = [b"II*\0", b"II+\0", b"MM\0", b"\x89PNG", b"\x93NUMPY", b"\x89HDF", b"PK\x03\x04", b"Iout"];
 
 /// True for what starts like an STL file.
 pub(in crate::io) fn is_stl(head: &[u8]) -> bool {
