@@ -233,12 +233,42 @@ fn tables_say_what_they_are() {
             format!(" ,X,Y,Slice\n{}", "1,7.5,3.25,14\n2,7,3,15\n"),
             &["results table of ImageJ", "2 points", "z in", "slices", "(7, 3, 13)"],
         ),
+        (
+            "mass.csv",
+            " ,Label,XM,YM,Frame,Slice\n1,a:1,7.5,3.25,1,14\n2,a:2,7,3,2,15\n".into(),
+            &["results table of ImageJ", "slices", "(7, 3, 13)", "0 to 1"],
+        ),
+        ("suite.csv", headed("CX (pix),CY (pix),CZ (pix)"), &["4 points", "voxels, the first one 0"]),
+        // A frame 0 is none of ImageJ, which counts from 1.
+        (
+            "trackpy.csv",
+            ",y,x,z,mass,frame\n0,3,7,13,5.5,0\n1,3,8,13,5.5,1\n".into(),
+            &["table of points", "times", "0 to 1"],
+        ),
+        (
+            "labels.csv",
+            "Label,X,Y,Z\n1,2,3,4\n1,3,4,5\n2,4,5,6\n2,5,6,8\n".into(),
+            &["its column label holds 2 different numbers", "name it object", "4 points, no contours"],
+        ),
+        // Row numbers, or one number for all, tell no objects.
+        ("rows.csv", "Label,X,Y,Z\n1,2,3,4\n2,3,4,5\n3,4,5,6\n4,5,6,8\n".into(), &["4 points"]),
     ] {
         bench.write(name, &text);
         let info = bench.succeed(&format!("info {name}"));
         for line in lines {
             assert!(info.contains(line), "{name}: {line}: {info}");
         }
+    }
+    assert!(!bench.succeed("info rows.csv").contains("column label"));
+    // A comment that names more columns than the lines have.
+    for (header, told) in [("# x y z object", "column 4 as object"), ("# x y z q contour", "column 5 as contour")] {
+        bench.write("short.xyz", &format!("{header}\n1 2 3\n2 3 4\n"));
+        let complaint = bench.fail("info short.xyz", 2);
+        assert!(complaint.contains("line 2 has 3 columns") && complaint.contains(told), "{complaint}");
+    }
+    for grouped in ["1.234,5", "1\u{202f}234,5", "\"1,234.5\""] {
+        bench.write("grouped.csv", &format!("x;y;z\n{grouped};2;3\n"));
+        assert!(bench.fail("info grouped.csv", 2).contains("signs between thousands"), "{grouped}");
     }
     bench.write("other.csv", "name,width,height\na,1,2\n");
     let complaint = bench.fail("info other.csv", 2);

@@ -1,5 +1,7 @@
 //! The points gathered from the lines of a table.
 
+use std::collections::HashSet;
+
 use super::names::{Columns, Form};
 use super::shapes;
 use super::units::Unit;
@@ -53,6 +55,8 @@ pub(super) struct Rows {
     header_lines: u32,
     /// The unit that a line named first.
     unit: Option<String>,
+    /// The different whole numbers of a column that may tell objects; none once it holds something else.
+    labels: Option<HashSet<i64>>,
 }
 
 impl Rows {
@@ -67,6 +71,7 @@ impl Rows {
             counted_from: None,
             header_lines: 0,
             unit: None,
+            labels: Some(HashSet::new()),
         }
     }
 
@@ -99,6 +104,14 @@ impl Rows {
             let field = fields.get(self.columns.position[axis]).ok_or_else(|| too_few(line, wanted))?;
             position[axis] = self.coordinate(field, name, line)? - self.columns.scales[axis].first();
         }
+        // A comment may name columns that the lines do not have.
+        if let Some((column, what)) = self.columns.others().find(|&(column, _)| column >= fields.len()) {
+            return Err(Error::input(format!(
+                "line {line} has {wanted} columns, and the header names column {} as {what}; complete the line or correct \
+                 the header",
+                column + 1
+            )));
+        }
         self.take_numbers(line, fields)?;
         self.count(fields);
         self.cloud.positions.push(position);
@@ -117,6 +130,13 @@ impl Rows {
                 "contours are named by whole numbers",
                 line,
             )?);
+        }
+        if let Some((column, _)) = self.columns.label {
+            self.labels =
+                self.labels.take().zip(fields.get(column).and_then(|field| whole(field))).map(|(mut labels, label)| {
+                    labels.insert(label);
+                    labels
+                });
         }
         if let Some((column, first)) = self.columns.time {
             let time = number_of(fields[column], "the time", "times are whole numbers", line)?;
@@ -181,7 +201,13 @@ impl Rows {
     fn coordinate(&mut self, field: &str, name: &str, line: u64) -> Result<f64> {
         let field = field.trim();
         let (value, decimals) = number(field).ok_or_else(|| {
-            let hint = if field.contains(',') { "; write decimals with a point" } else { "; give a number" };
+            let has_thousands = field.contains(',') && (field.contains('.') || field.matches(',').count() > 1)
+                || field.chars().any(char::is_whitespace) && field.chars().all(|c| !c.is_alphabetic());
+            let hint = match (has_thousands, field.contains(',')) {
+                (true, _) => "; write it without signs between thousands and with a point before decimals",
+                (false, true) => "; write decimals with a point",
+                (false, false) => "; give a number",
+            };
             Error::input(format!("line {line}: {name} is {}, which is not a number{hint}", quoted(field)))
         })?;
         if let Some(decimals) = decimals {
@@ -205,8 +231,22 @@ impl Rows {
     }
 
     pub(super) fn finish(self) -> PointFile {
-        let Self { columns, mut cloud, mut times, .. } = self;
+        let Self { columns, mut cloud, mut times, labels, .. } = self;
         let mut notes = Vec::new();
+        // Numbers that come again are no row numbers.
+        let of_objects = |labels: &HashSet<i64>| labels.len() > 1 && 2 * labels.len() <= cloud.len();
+        if let (Some((_, name)), Some(labels)) = (columns.label, labels.filter(of_objects)) {
+            notes.push(format!(
+                "its column {name} holds {} different numbers and is left aside; name it object if it tells the objects",
+                labels.len()
+            ));
+        }
+        let mut form = columns.form;
+        if form == Form::ImageJ && times.iter().min().is_some_and(|&first| first < 0) {
+            // ImageJ counts frames from 1: a table with a frame 0 is another program's.
+            times.iter_mut().for_each(|time| *time += 1);
+            form = Form::Named;
+        }
         if columns.form == Form::NapariShapes {
             (cloud, notes) = shapes::drawn(&cloud, &self.corners, &mut times);
         }
@@ -225,7 +265,7 @@ impl Rows {
                 Unit::Voxels => scales = [Scale::Voxels; 3],
             }
         }
-        PointFile { cloud, form: columns.form.name().into(), scales, units, times, notes }
+        PointFile { cloud, form: form.name().into(), scales, units, times, notes }
     }
 }
 

@@ -45,6 +45,8 @@ pub(super) struct Columns {
     pub(super) time: Option<(usize, i64)>,
     /// A column that holds the unit of the others.
     pub(super) unit: Option<usize>,
+    /// A column that may tell objects, where none is named so.
+    pub(super) label: Option<(usize, &'static str)>,
 }
 
 impl Columns {
@@ -65,7 +67,22 @@ impl Columns {
             shape: None,
             time: None,
             unit: None,
+            label: None,
         }
+    }
+
+    /// The columns beside the position that are read of every line, and what they hold.
+    pub(super) fn others(&self) -> impl Iterator<Item = (usize, &'static str)> {
+        let time = self.time.map(|(column, _)| column);
+        let all = [
+            (self.object, "object"),
+            (self.contour, "contour"),
+            (self.vertex, "vertex-index"),
+            (self.shape, "shape-type"),
+            (time, "the time"),
+            (self.unit, "the unit"),
+        ];
+        all.into_iter().filter_map(|(column, what)| Some((column?, what)))
     }
 
     /// Finds the columns by the names in a header; upper and lower case are the same.
@@ -78,6 +95,10 @@ impl Columns {
         };
         columns.object = one_column(&plain, "object")?;
         columns.contour = one_column(&plain, "contour")?;
+        if columns.object.is_none() {
+            let label = |n: usize| Some((n, *LABELS.iter().find(|&&label| label == plain[n])?));
+            columns.label = (0..plain.len()).find_map(label);
+        }
         match columns.form {
             Form::NapariPoints if has("vertex-index") || has("shape-type") => {
                 columns.form = Form::NapariShapes;
@@ -190,7 +211,7 @@ impl Columns {
 }
 
 /// Words that say that a position follows, or of what; those that say it best come first.
-const FILLERS: [&str; 23] = [
+const FILLERS: [&str; 25] = [
     "position",
     "pos",
     "coordinate",
@@ -214,6 +235,25 @@ const FILLERS: [&str; 23] = [
     "the",
     "at",
     "in",
+    // XM, YM and CX, CY, CZ: centres of mass and of volume (ImageJ).
+    "m",
+    "c",
+];
+
+/// Columns that often tell which object a point is of, though that is not what their names say here.
+const LABELS: [&str; 12] = [
+    "label",
+    "labels",
+    "object_id",
+    "object id",
+    "objectid",
+    "object number",
+    "cell",
+    "cell_id",
+    "cell id",
+    "cellid",
+    "segment",
+    "nucleus",
 ];
 
 /// The name of a column that holds coordinates.
