@@ -24,11 +24,14 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     if !path.exists() && !is_standard_input(path) {
         return Err(Error::input("there is no such file or folder").at(path));
     }
-    if args.pages.is_given() && (is_store(path) || stacks::format_of(path).is_none()) {
-        return Err(Error::usage("is no TIFF stack; --axes and --image-index are for these").at(path));
+    if args.pages.is_given() && stacks::format_of(path).is_none() {
+        return Err(Error::usage("is no TIFF stack and no Zarr image; --axes and --image-index are for these").at(path));
     }
     let (document, lines) = if is_store(path) {
-        store(path)?
+        if args.pages.axes.is_some() {
+            return Err(Error::usage("names its axes itself; --axes is for TIFF files").at(path));
+        }
+        store(path, args.pages.image_index)?
     } else if let Some(format) = stacks::format_of(path) {
         stack(path, format, args.pages.select(0, 0, 0))?
     } else {

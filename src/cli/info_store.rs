@@ -11,17 +11,20 @@ use super::text::{number, place};
 use crate::error::{Error, Result};
 use crate::io::zarr_image::{LevelDescription, ZarrDescription, describe, holds_image};
 
-/// What a store holds, as JSON and as lines.
-pub(super) fn store(path: &Path) -> Result<(Value, Lines)> {
+/// What a store holds, as JSON and as lines; `image` chooses the image of a store with several.
+pub(super) fn store(path: &Path, image: Option<u32>) -> Result<(Value, Lines)> {
     let mut lines = vec![line("kind", "OME-Zarr store")];
     let (mut images, mut stored) = (Map::new(), Map::new());
     for group in groups(path) {
         let name = if group.is_empty() { "image" } else { &group };
-        match describe(&path.join(&group)) {
+        let chosen = image.filter(|_| group.is_empty());
+        match describe(&path.join(&group), chosen) {
+            // Whoever asks for an image that is not there is told so.
+            Err(error) if chosen.is_some() => return Err(error),
             Ok(image) => {
                 lines.extend(image_lines(name, &image));
                 let mut levels: Vec<Value> = image.levels.iter().map(level_json).collect();
-                match range(&path.join(&group), &image.levels) {
+                match range(&path.join(&group), chosen, &image.levels) {
                     Ok(Some((level, [low, high]))) => {
                         let of =
                             if level == 0 { String::new() } else { format!(" on level {}", image.levels[level].path) };
@@ -46,7 +49,7 @@ pub(super) fn store(path: &Path) -> Result<(Value, Lines)> {
     }
     if images.is_empty() {
         // Says why the store itself cannot be read.
-        describe(path)?;
+        describe(path, image)?;
         return Err(Error::input("holds no image that can be read").at(path));
     }
     let files = contents(path);

@@ -53,11 +53,12 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect()
 }
 
-/// The smallest and largest value of an image, and the level that was read for them; none where no level is small enough.
-pub(super) fn range(path: &Path, levels: &[LevelDescription]) -> Result<Option<(usize, [f64; 2])>> {
+/// The smallest and largest value of an image, that of this number where there are several, and the level that was read
+/// for them; none where no level is small enough.
+pub(super) fn range(path: &Path, image: Option<u32>, levels: &[LevelDescription]) -> Result<Option<(usize, [f64; 2])>> {
     let voxels = |level: &LevelDescription| level.shape.iter().map(|&n| u128::from(n.unsigned_abs())).product::<u128>();
     let Some(level) = levels.iter().position(|level| voxels(level) <= MOST_READ) else { return Ok(None) };
-    let image = ZarrImage::open(path, Select { level: level as u32, ..Select::default() })?;
+    let image = ZarrImage::open(path, Select { level: level as u32, image, ..Select::default() })?;
     Ok(value_range(&image)?.map(|range| (level, range)))
 }
 

@@ -133,7 +133,10 @@ pub fn format_of(path: &Path) -> Option<&'static Format> {
 /// supported, or has no such channel or time.
 pub fn open_stack(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
     if !path.exists() {
-        return Err(Error::input("there is no such file or folder").at(path));
+        let is_address = path.to_string_lossy().contains("://");
+        let what =
+            if is_address { "is an address; copy what is there to a disk" } else { "there is no such file or folder" };
+        return Err(Error::input(what).at(path));
     }
     if !(path.is_file() || path.is_dir()) {
         let what = "is a pipe or a device, where an image has to be a file or a folder; write it to a file first";
@@ -143,10 +146,22 @@ pub fn open_stack(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
         if let Some(error) = first_bytes(path).as_deref().and_then(foreign::no_stack) {
             return Err(error.at(path));
         }
+        if let Some(reason) = near_miss(path) {
+            return Err(Error::input(reason).at(path));
+        }
         let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
         return Err(Error::input(format!("is no stack of images that can be read ({})", names.join(", "))).at(path));
     };
     (format.open)(path, select)
+}
+
+/// What is nearly an image: a file inside of a store, or a store that is packed.
+fn near_miss(path: &Path) -> Option<String> {
+    let folder = path.parent().filter(|folder| is_store(folder));
+    if let (Some(folder), true) = (folder, path.is_file()) {
+        return Some(format!("is a file of a Zarr store; name its folder, {}", folder.display()));
+    }
+    (head(path)? == *b"PK\x03\x04").then(|| "is a ZIP archive; unpack it first".to_owned())
 }
 
 fn open_zarr(path: &Path, select: Select) -> Result<Box<dyn Stack>> {

@@ -12,6 +12,7 @@ use zarrs::filesystem::FilesystemStore;
 use zarrs::plugin::{ExtensionName, ZarrVersion};
 
 use super::codecs::{Codecs, ValueType, bytes_of, guarded, one_line, slack};
+use super::keys::Keys;
 use super::samples::Kind;
 use super::shards::{Shards, range_of};
 use crate::error::{Error, Result};
@@ -39,6 +40,7 @@ pub(super) struct ChunkedArray {
     outer: Vec<NonZeroU64>,
     /// The shape of what is decoded at once: the chunks, those in shards where there are some.
     pub(super) chunk: Vec<NonZeroU64>,
+    pub(super) keys: Keys,
     indices: Mutex<Vec<(Vec<u64>, Index)>>,
 }
 
@@ -47,8 +49,12 @@ impl ChunkedArray {
     pub(super) fn open(folder: &Path, document: &Value) -> Result<Self> {
         let refuse = |reason: String| Error::input(reason).at(folder);
         check_shape(document).map_err(refuse)?;
-        let unreadable =
-            |error: &dyn std::fmt::Display| refuse(format!("is no array that can be read: {}", one_line(error)));
+        let unreadable = |error: &dyn std::fmt::Display| {
+            let error = one_line(error);
+            let about_codecs = ["codec", "configuration"].iter().any(|word| error.to_lowercase().contains(word));
+            let save = if about_codecs { "; save it with gzip, zstd or blosc" } else { "" };
+            refuse(format!("is no array that can be read: {error}{save}"))
+        };
         let array = guarded(|| {
             let store = FilesystemStore::new(folder).map_err(|error| one_line(&error))?;
             Array::open(Arc::new(store), "/").map_err(|error| one_line(&error))
@@ -77,13 +83,30 @@ impl ChunkedArray {
             Some(bytes) if bytes <= MAX_CHUNK => {}
             _ => return Err(refuse("has chunks of more than 2 GiB; save it with smaller ones".into())),
         }
+        let keys = Keys::of(folder, shape.len(), |at| array.chunk_key(at).as_str().to_owned());
+        if let Keys::Foreign(name) = &keys {
+            let due = array.chunk_key(&vec![0; shape.len()]).as_str().to_owned();
+            return Err(refuse(format!("has chunks named like {name}, where its metadata name them like {due}")));
+        }
         let (folder, indices) = (folder.to_path_buf(), Mutex::default());
-        Ok(Self { folder, array, codecs, value, kind, shape, outer, chunk, indices })
+        Ok(Self { folder, array, codecs, value, kind, shape, outer, chunk, keys, indices })
     }
 
     /// The shape of the shards, where there are some.
     pub(super) fn shards(&self) -> Option<&[NonZeroU64]> {
         self.codecs.shards.is_some().then_some(&self.outer[..])
+    }
+
+    /// What is odd about where its chunks are.
+    pub(super) fn note(&self) -> Option<String> {
+        match &self.keys {
+            Keys::Separated(separator) => Some(format!(
+                "its chunks are named with '{separator}' between their numbers, which its metadata do not say; they are \
+                 read so"
+            )),
+            Keys::Nothing => Some("none of its chunks is there: all of its voxels hold the fill value".into()),
+            Keys::AsTold | Keys::Foreign(_) => None,
+        }
     }
 
     /// Bytes of a decoded chunk.
@@ -125,7 +148,10 @@ impl ChunkedArray {
     }
 
     fn path(&self, at: &[u64]) -> PathBuf {
-        self.folder.join(self.array.chunk_key(at).as_str())
+        match self.keys.name(at) {
+            Some(name) => self.folder.join(name),
+            None => self.folder.join(self.array.chunk_key(at).as_str()),
+        }
     }
 
     fn whole_file(&self, path: &Path) -> Result<Option<Vec<u8>>> {

@@ -52,12 +52,12 @@ pub struct LevelDescription {
     pub codecs: String,
 }
 
-/// Describes the image at a path.
+/// Describes the image at a path; `image` chooses among several, counted from 0.
 ///
 /// # Errors
 /// When there is none that can be read.
-pub fn describe(path: &Path) -> Result<ZarrDescription> {
-    let found = find::find(path, None)?;
+pub fn describe(path: &Path, image: Option<u32>) -> Result<ZarrDescription> {
+    let found = find::find(path, image)?;
     let mut notes = found.notes.clone();
     let (mut levels, mut names) = (Vec::new(), Vec::new());
     let mut unreadable = None;
@@ -89,6 +89,10 @@ pub fn describe(path: &Path) -> Result<ZarrDescription> {
 fn describe_level(found: &Found, number: usize, notes: &mut Vec<String>) -> Result<(LevelDescription, Vec<String>)> {
     let opened = open_level(found, number)?;
     let space = axes::places(&opened.axes).map_err(|reason| Error::input(reason).at(&opened.folder))?;
+    if !opened.axes_told {
+        notes.push(format!("the axes are not named; {} is taken", axes::names(&opened.axes)));
+    }
+    notes.extend(opened.array.note());
     let lengths = lengths(&opened.axes, space, opened.placed.as_ref(), notes);
     let plain = |list: &[NonZeroU64]| list.iter().map(|n| n.get()).collect();
     let level = LevelDescription {

@@ -36,7 +36,8 @@ pub(super) fn find(path: &Path, image: Option<u32>) -> Result<Found> {
     if ome["plate"].is_object() || ome["well"].is_object() {
         let what = if ome["plate"].is_object() { "a plate of wells" } else { "a well" };
         let example = if ome["plate"].is_object() { "A/1/0" } else { "0" };
-        return Err(Error::input(format!("is {what}; name one image in it, such as {}", path.join(example).display())));
+        let example = path.join(example);
+        return Err(Error::input(format!("is {what}; name one image in it, such as {}", example.display())).at(path));
     }
     if !ome["bioformats2raw.layout"].is_null() {
         return series(path, image);

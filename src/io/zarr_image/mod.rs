@@ -9,6 +9,7 @@ mod axes;
 mod codecs;
 mod describe;
 mod find;
+mod keys;
 mod multiscale;
 mod node;
 mod samples;
@@ -62,6 +63,7 @@ impl ZarrImage {
         if !axes_told {
             notes.push(format!("the axes are not named; {} is taken", axes::names(&axes)));
         }
+        notes.extend(array.note());
         let lengths = lengths(&axes, space, placed.as_ref(), &mut notes);
         let along = |role: Role| (0..axes.len()).find(|&a| axes[a].role == role).map_or(1, |a| array.shape[a]);
         let letters: String = axes.iter().filter_map(|axis| axis.name.chars().next()).collect();
@@ -158,6 +160,10 @@ impl VolumeSource for ZarrImage {
         natural
     }
 
+    fn path(&self) -> Option<&Path> {
+        Some(&self.folder)
+    }
+
     fn decoding_bytes(&self) -> u64 {
         // As stored, unpacked, and with its axes in order.
         3 * self.array.chunk_bytes()
@@ -220,6 +226,10 @@ fn open_level(found: &Found, number: usize) -> Result<OpenLevel> {
         told.or_else(|| axes::usual(count)).ok_or_else(|| fault(format!("has {count} axes; 3 to 5 are read")))?;
     if axes.len() != count {
         return Err(fault(format!("has {count} axes where its image names {} ({})", axes.len(), axes::names(&axes))));
+    }
+    if let Some(placed) = level.placed.as_ref().filter(|placed| placed.scale.len() != count) {
+        let told = placed.scale.len();
+        return Err(fault(format!("has {count} axes where its transformations have {told} numbers")));
     }
     Ok(OpenLevel { array, axes, axes_told, placed: level.placed.clone(), folder })
 }

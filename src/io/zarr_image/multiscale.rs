@@ -57,13 +57,17 @@ pub(super) fn parse(document: &Value, ome: &Value) -> Result<Multiscale, String>
 
 fn level(dataset: &Value, common: &Value, axes: Option<usize>) -> Result<Level, String> {
     let path = dataset["path"].as_str().ok_or("holds a multiscale image with a dataset that has no path")?.to_owned();
-    if !Path::new(&path).components().all(|part| matches!(part, Component::Normal(_))) || path.is_empty() {
+    let is_below = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    if !Path::new(&path).components().all(is_below) || path.is_empty() {
         return Err(format!("names the array '{path}', which is no folder below it"));
     }
     let own = &dataset["coordinateTransformations"];
     let mut placed: Option<Placed> = None;
     for transformation in [own, common].into_iter().filter_map(Value::as_array).flatten() {
-        let count = axes.ok_or("has transformations and no axes")?;
+        // Where no axes are named their number is that of the transformations, which the array's is held against.
+        let kind = transformation["type"].as_str().unwrap_or("");
+        let numbers = transformation[kind].as_array().map_or(0, Vec::len);
+        let count = axes.or_else(|| placed.as_ref().map(|placed| placed.scale.len())).unwrap_or(numbers);
         apply(transformation, count, &mut placed).map_err(|reason| format!("{reason} (of array {path})"))?;
     }
     Ok(Level { path, placed })

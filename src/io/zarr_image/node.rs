@@ -54,8 +54,38 @@ fn document(path: &Path) -> Result<Option<Value>> {
     if text.len() as u64 > LONGEST {
         return Err(Error::input("has more than 64 MiB, which is no metadata of an image").at(path));
     }
-    let value: Value = serde_json::from_slice(&text).map_err(|e| Error::input(format!("is no JSON: {e}")).at(path))?;
+    // Editors of Windows put a byte order mark first.
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
+    let parsed = serde_json::from_slice(text).or_else(|e| serde_json::from_slice(&without_nan(text)).map_err(|_| e));
+    let value: Value = parsed.map_err(|e| Error::input(format!("is no JSON: {e}")).at(path))?;
     if value.is_object() { Ok(Some(value)) } else { Err(Error::input("is no JSON object").at(path)) }
+}
+
+/// The text with null in place of NaN and Infinity, which JSON does not know and Python writes all the same, such as for
+/// the contrast of an empty channel.
+fn without_nan(text: &[u8]) -> Vec<u8> {
+    const WORDS: [&[u8]; 3] = [b"-Infinity", b"Infinity", b"NaN"];
+    let (mut out, mut in_string, mut rest) = (Vec::with_capacity(text.len()), false, text);
+    while let [first, after @ ..] = rest {
+        let word = WORDS.iter().find(|word| !in_string && rest.starts_with(word));
+        let taken = match (word, first) {
+            (Some(word), _) => {
+                out.extend_from_slice(b"null");
+                word.len()
+            }
+            (None, b'\\') if in_string && !after.is_empty() => {
+                out.extend_from_slice(&rest[..2]);
+                2
+            }
+            (None, _) => {
+                in_string ^= *first == b'"';
+                out.push(*first);
+                1
+            }
+        };
+        rest = &rest[taken..];
+    }
+    out
 }
 
 /// Names of the nodes right below a folder, sorted.
@@ -67,4 +97,17 @@ pub(super) fn children(folder: &Path) -> Vec<String> {
         .collect();
     names.sort();
     names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_python_that_json_has_not() {
+        let text = br#"{"a": [NaN, -Infinity, 1.5], "NaN \" Infinity": {"b": Infinity}}"#;
+        let value: Value = serde_json::from_slice(&without_nan(text)).unwrap();
+        assert_eq!(value, serde_json::json!({"a": [null, null, 1.5], "NaN \" Infinity": {"b": null}}));
+        assert_eq!(without_nan(b"\"open \\"), b"\"open \\");
+    }
 }
