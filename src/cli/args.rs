@@ -97,7 +97,7 @@ pub(super) struct ImageArgs {
     /// Time point of the file, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) time: u32,
-    /// Resolution of an OME-Zarr image, 0 the finest
+    /// Resolution of an OME-Zarr image or of a TIFF with smaller copies of its pages, 0 the finest
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) level: u32,
     #[command(flatten)]

@@ -68,7 +68,7 @@ pub(super) struct GridArgs {
     /// Time point of label volumes, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) time: u32,
-    /// Resolution of OME-Zarr label volumes and of --like, 0 the finest
+    /// Resolution of label volumes and of --like (OME-Zarr, TIFF with smaller copies of its pages), 0 the finest
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) level: u32,
     #[command(flatten)]

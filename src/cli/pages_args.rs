@@ -12,7 +12,8 @@ pub(super) struct PagesArgs {
     /// for the axes as they are stored, or for the numbers in the names of a folder's files; zc2yx with a size
     #[arg(long, value_name = "ZYX")]
     pub(super) axes: Option<PageAxes>,
-    /// Image of a TIFF with several, counted from 0: of OME-XML, or the pages of one size and type [default: the first]
+    /// Image of a file with several, counted from 0: of OME-XML or a bioformats2raw store, or the pages of one size and
+    /// type [default: the first]
     #[arg(long, value_name = "N")]
     pub(super) image_index: Option<u32>,
 }

@@ -172,10 +172,6 @@ fn open_zarr(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
 }
 
 fn open_tiff(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
-    if select.level > 0 {
-        let error = format!("--level {} chooses a level of an OME-Zarr image; TIFF is read as it is", select.level);
-        return Err(Error::usage(error).at(path));
-    }
     Ok(Box::new(TiffStack::open(path, select)?))
 }
 

@@ -51,6 +51,7 @@ mod tiff_derived;
 mod tiff_dialects;
 mod tiff_handmade;
 mod tiff_hostile;
+mod tiff_levels;
 mod told;
 mod zarr_input;
 mod zarr_readers;

@@ -81,6 +81,11 @@ fn the_message_names_the_flag() {
         assert!(bench.succeed("info t.tif").contains(&due));
         assert!(bench.succeed("info t.tif --axes zyx").contains("4, 3, 31"));
     }
+    write(&bench.path("ct.tif"), 62, "ImageJ=1.11a\nimages=62\nchannels=2\nframes=31\nhyperstack=true\nunit=um\n");
+    let complaint = bench.fail("segment ct.tif --points marks.csv -o none", 2);
+    let due = "if the times are slices, give --axes zcyx, if the channels are, --axes tzyx, if all are, --axes zyx";
+    assert!(complaint.contains("31 times and 2 channels") && complaint.contains(due), "{complaint}");
+    assert!(bench.succeed("info ct.tif --axes zcyx").contains("4, 3, 31"));
     let complaint = bench.fail("info t.tif --axes xyz", 2);
     assert!(complaint.contains("zyx, tzyx"), "{complaint}");
     assert!(bench.fail("info marks.csv --axes zyx", 2).contains("no TIFF"));

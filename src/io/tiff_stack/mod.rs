@@ -10,6 +10,7 @@ mod ifd;
 mod imagej;
 mod images;
 mod layout;
+mod levels;
 mod names;
 mod ome_xml;
 mod page;

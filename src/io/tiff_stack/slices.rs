@@ -22,6 +22,11 @@ pub(super) fn open_folder(folder: &Path, select: Select) -> Result<Opened> {
             Error::usage("--image-index is for one file with several images; a folder of slices is one").at(folder)
         );
     }
+    if select.level > 0 {
+        return Err(
+            Error::usage("--level is for one file with smaller copies of its pages; slices are read whole").at(folder)
+        );
+    }
     let found = list(folder)?;
     let sequence = sequence::arrange(found.slices, select.axes.as_ref()).map_err(refuse)?;
     let dimensions = sequence.dimensions;

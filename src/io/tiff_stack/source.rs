@@ -8,7 +8,7 @@ use super::images::{self, Chosen, PagePlace};
 use super::layout::{Axis, Description, Dimensions};
 use super::page::{Kind, Page};
 use super::raw::Contiguous;
-use super::{ImageSummary, Select, StackInfo, slices};
+use super::{ImageSummary, Select, StackInfo, levels, slices};
 use crate::error::{Error, Result};
 use crate::io::page_axes::PageAxes;
 use crate::store::SamplesMut;
@@ -125,13 +125,18 @@ pub(super) fn open_file(path: &Path, select: Select) -> Result<Opened> {
         order =
             named(&axes, order, &mut description, available, images.len() > 1).map_err(|r| Error::usage(r).at(path))?;
     }
-    let Order { dimensions, pixel } = order;
+    let Order { dimensions, mut pixel } = order;
     let (channel, sample) = choose(path, &dimensions, pixel.kind.samples, select)?;
     // A plane takes a directory of its own or at least one byte.
     let Some(total) = dimensions.count().filter(|&n| n <= file.len) else {
         return Err(file.error("the description promises more planes than the file can hold: it is damaged"));
     };
     let order = PlaneOrder { dimensions, channel, time: select.time.into() };
+    let in_copies = pixel.kind == first.kind && !(description.single_page && available == 1 && total > 1);
+    if select.level > 0 && !in_copies {
+        return Err(levels::refused(&file, select.level as usize, 1));
+    }
+    let mut factors = [1.0; 3];
     let source = if pixel.kind != first.kind {
         // Samples were said to be planes.
         let planes = (0..dimensions.size(Axis::Z)).map(|z| order.plane(z) as u16);
@@ -145,14 +150,23 @@ pub(super) fn open_file(path: &Path, select: Select) -> Result<Opened> {
         let planes: Vec<u64> = (0..dimensions.size(Axis::Z)).map(|z| order.plane(z)).collect();
         let pages = description.pages(&file, &planes, total, available)?;
         let places: Vec<PagePlace> = pages.iter().map(|&page| places[page as usize]).collect();
-        refuse_odd_pages(&file, first.kind, &places, description.runs.is_none())?;
+        let (level, places) = levels::choose(&file, select, first, places, &mut description.notes)?;
+        refuse_odd_pages(&file, level.kind, &places, description.runs.is_none() && select.level == 0)?;
+        factors = levels::factors(&first, &level);
+        pixel = level;
         Source::Pages {
             file,
-            kind: first.kind,
+            kind: level.kind,
             places: places.into_iter().map(|page| Place { page, sample }).collect(),
         }
     };
-    Ok(Opened { info: info(&pixel, &dimensions, description), images, source })
+    let mut info = info(&pixel, &dimensions, description);
+    for (axis, factor) in factors.into_iter().enumerate().filter(|&(_, factor)| factor != 1.0) {
+        // Both levels cover the same place, so that the first voxel of the coarser one lies farther in.
+        info.origin[axis] = 0.5 * (factor - 1.0) * info.spacing[axis].unwrap_or(0.0);
+        info.spacing[axis] = info.spacing[axis].map(|h| h * factor);
+    }
+    Ok(Opened { info, images, source })
 }
 
 /// The axes of the planes, and a page with the samples that are channels.
@@ -255,6 +269,18 @@ pub(super) fn choose(path: &Path, dimensions: &Dimensions, samples: u16, select:
     Ok((u64::from(select.channel) / u64::from(samples), (select.channel % u32::from(samples)) as u16))
 }
 
+/// What is said of channels and times without slices, of which one may be these.
+fn one_of_two(dimensions: &Dimensions, page: &Page) -> String {
+    let (channels, times) = (dimensions.size(Axis::Channel), dimensions.size(Axis::Time));
+    let stored: String = dimensions.letters(page).to_lowercase().chars().filter(|c| "ct".contains(*c)).collect();
+    let [of_times, of_channels] = ['t', 'c'].map(|axis| stored.replace(axis, "z"));
+    format!(
+        "{} planes are stored as {times} times and {channels} channels; if the times are slices, give --axes {of_times}yx, if \
+         the channels are, --axes {of_channels}yx, if all are, --axes zyx",
+        times.saturating_mul(channels)
+    )
+}
+
 pub(super) fn info(page: &Page, dimensions: &Dimensions, description: Description) -> StackInfo {
     let mut notes = description.notes;
     let (depth, planes) = (dimensions.size(Axis::Z), dimensions.count().unwrap_or(u64::MAX));
@@ -269,10 +295,13 @@ pub(super) fn info(page: &Page, dimensions: &Dimensions, description: Descriptio
             [false, true] => "times",
             [_, false] => "channels",
         };
-        notes.push(format!(
-            "{} planes are stored as {stored}; if they are slices, give --axes zyx",
-            planes.saturating_mul(sample_planes)
-        ));
+        let planes = planes.saturating_mul(sample_planes);
+        let both = (stored == "channels and times").then(|| one_of_two(dimensions, page));
+        notes.push(
+            both.unwrap_or_else(|| {
+                format!("{planes} planes are stored as {stored}; if they are slices, give --axes zyx")
+            }),
+        );
     }
     let sample = page.kind.sample;
     let channels = dimensions.size(Axis::Channel).saturating_mul(u64::from(page.kind.samples));
