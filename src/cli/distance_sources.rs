@@ -131,7 +131,8 @@ fn without_inside(what: &str) -> Error {
 fn open_volume(path: &Path, args: &GridArgs, console: &Console) -> Result<LabelVolume> {
     let (path, note) = labels_of(path)?;
     let stack = open_stack(&path, args.select(), args.image_spacing)?;
-    for note in note.iter().chain(&stack.notes) {
+    let chosen = chosen_notes(&path, stack.stack.info(), args.select());
+    for note in note.iter().chain(&stack.notes).chain(&chosen) {
         console.note(note);
     }
     Ok(LabelVolume::new(&path, stack.stack, stack.geometry))

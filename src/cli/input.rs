@@ -20,6 +20,19 @@ pub(super) struct OpenStack {
     pub(super) notes: Vec<String>,
 }
 
+/// Says which channel and time of several is read, where neither was chosen and nothing says it yet.
+pub(super) fn chosen_notes(path: &Path, info: &StackInfo, select: Select) -> Vec<String> {
+    let of = |what: &str, flag: &str, count: u32, chosen: u32| {
+        let is_told = info.notes.iter().any(|note| note.contains(flag));
+        let name = path.display();
+        (count > 1 && chosen == 0 && !is_told)
+            .then(|| format!("{name}: has {count} {what}s; {what} 0 is read, {flag} N picks another"))
+    };
+    let channel = of("channel", "--channel", info.channels, select.channel);
+    let time = of("time", "--time", info.times, select.time);
+    channel.into_iter().chain(time).collect()
+}
+
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Opens one channel and time of a stack; `spacing` stands in place of the file's.

@@ -11,7 +11,7 @@ use crate::exec::Progress;
 use crate::grid::{Geometry, PointCloud};
 use crate::io::points::{LengthUnit, PointFile, Scale, read_points};
 use crate::pipeline::marks::{ObjectMarks, split};
-use crate::pipeline::segment::{Grids, check_marks, crossed, doubts, same_place, spans_slices};
+use crate::pipeline::segment::{Grids, check_marks, crossed, doubts, open_outlines, same_place, spans_slices};
 
 /// What decides how the numbers of a file are read.
 pub(super) struct Reading<'a> {
@@ -38,6 +38,10 @@ pub(super) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Con
         if path.as_os_str() == "-" && paths[..n].contains(path) {
             return Err(Error::usage("--points - is given twice; standard input holds one file"));
         }
+        if let Some(before) = paths[..n].iter().find(|before| is_same(before, path)) {
+            let (path, before) = (path.display(), before.display());
+            console.note(&format!("{path} is given twice (--points {before}): each of its objects is solved twice"));
+        }
         let file = read_points(path)?;
         let note = |note: &str| console.note(&format!("{}: {note}", path.display()));
         file.notes.iter().for_each(|told| note(told));
@@ -58,6 +62,11 @@ pub(super) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Con
         }
     }
     Ok(marks)
+}
+
+/// Whether two paths name one file, by whatever spelling.
+fn is_same(a: &Path, b: &Path) -> bool {
+    a == b || a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
 
 /// The points of a file in the world of the image.
@@ -182,6 +191,20 @@ pub(super) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: usize, cons
         for number in crossed(object, grids.part) {
             console.note(&format!("outline {number} of object {label} crosses itself: are its marks in order?"));
         }
+        if object.drawn && object.contours.len() == 1 {
+            console.note(&format!(
+                "object {label} has one outline: how far it goes on beyond it is guessed; mark it on more slices"
+            ));
+        }
+        let open = open_outlines(object);
+        if !open.is_empty() {
+            let numbers: Vec<String> = open.iter().take(MOST_NAMED).map(i64::to_string).collect();
+            let more = if open.len() > MOST_NAMED { ", ..." } else { "" };
+            console.note(&format!(
+                "outlines of object {label} are open ({}{more}): their ends, far from each other, are joined by a straight line",
+                numbers.join(", ")
+            ));
+        }
         for (number, slices) in spans_slices(object, grids.whole) {
             console.note(&format!(
                 "outline {number} of object {label} has marks on {slices} slices: give each slice's outline a number of its own"
@@ -195,6 +218,9 @@ pub(super) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: usize, cons
     }
     Ok(several)
 }
+
+/// Outlines that a note names, at most.
+const MOST_NAMED: usize = 8;
 
 /// Pairs of objects that are compared, at most: it is looked at for people's files, not for thousands of cells.
 const MOST_PAIRS: usize = 1 << 20;

@@ -9,7 +9,7 @@ use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::disk::Disk;
 use super::files::{export_mesh, mesh_format, tell_of_anchor};
-use super::input::{crop_box, open_stack};
+use super::input::{chosen_notes, crop_box, open_stack};
 use super::marks::{Marks, Reading, look_at_marks, read_marks};
 use super::outputs::{Outputs, numbered};
 use super::report::{Found, Ran, Report, Settings, Solver, crop_xyz};
@@ -90,7 +90,8 @@ impl Job {
         let picture = &args.picture;
         let select = picture.pages.select(picture.channel, picture.time, picture.level);
         let opened = open_stack(&args.image, select, spacing)?;
-        opened.notes.iter().for_each(|note| console.note(note));
+        let chosen = chosen_notes(&args.image, opened.stack.info(), select);
+        opened.notes.iter().chain(&chosen).for_each(|note| console.note(note));
         let crop = crop_box(args.picture.crop, opened.geometry.shape)?;
         let reading = Reading { image: &opened.geometry, points_in: args.points_in, time: select.time };
         let marks = read_marks(&args.points, &reading, &console)?;

@@ -43,6 +43,7 @@ mod clouds_cli;
 mod layering;
 mod outlines;
 #[cfg(target_os = "linux")]
+mod segment_notes;
 mod signals;
 mod slice_folders;
 mod terminal;

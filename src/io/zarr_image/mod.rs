@@ -160,10 +160,6 @@ impl VolumeSource for ZarrImage {
         natural
     }
 
-    fn path(&self) -> Option<&Path> {
-        Some(&self.folder)
-    }
-
     fn decoding_bytes(&self) -> u64 {
         // As stored, unpacked, and with its axes in order.
         3 * self.array.chunk_bytes()

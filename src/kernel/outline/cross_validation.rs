@@ -1,5 +1,7 @@
 //! Leave one section out: how far its marks lie from the shape of the others tells how sure a shape is between marks.
 
+use rstar::RTree;
+
 use super::fitted::Fitted;
 use super::section::Section;
 use crate::kernel::vector::{dot, sub};
@@ -27,7 +29,9 @@ pub struct HeldOut {
 #[must_use]
 pub fn leave_out(sections: &[&Section], n: usize, least: f64) -> Option<Vec<HeldOut>> {
     let out = sections[n];
-    let away = |other: &Section| other.marks.iter().map(|&p| nearest(&out.marks, p)).fold(f64::INFINITY, f64::min);
+    // Outlines of many thousand marks are near to one another in many pairs.
+    let marks = RTree::bulk_load(out.marks.clone());
+    let away = |other: &Section| other.marks.iter().map(|&p| nearest(&marks, p)).fold(f64::INFINITY, f64::min);
     let mut others: Vec<(f64, usize)> =
         (0..sections.len()).filter(|m| *m != n).map(|m| (away(sections[m]), m)).collect();
     others.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -35,19 +39,20 @@ pub fn leave_out(sections: &[&Section], n: usize, least: f64) -> Option<Vec<Held
     others.sort_by_key(|(_, m)| *m);
     let others: Vec<&Section> = others.into_iter().map(|(_, m)| sections[m]).collect();
     let fitted = Fitted::new(&others, SAMPLES, least)?;
+    let beside: Vec<(&Section, RTree<[f64; 3]>)> =
+        others.iter().map(|&other| (other, RTree::bulk_load(other.marks.clone()))).collect();
     let held = |&mark: &[f64; 3]| {
         let (off, normal) = fitted.distance(mark);
-        let away = others.iter().map(|other| nearest(&other.marks, mark).min(other.plane.height(mark).abs()));
+        let away = beside.iter().map(|(other, marks)| nearest(marks, mark).min(other.plane.height(mark).abs()));
         let away = away.fold(f64::INFINITY, f64::min);
         HeldOut { mark, off, away, normal }
     };
     Some(out.marks.iter().map(held).collect())
 }
 
-fn nearest(points: &[[f64; 3]], to: [f64; 3]) -> f64 {
-    let squares = points.iter().map(|&p| {
+fn nearest(points: &RTree<[f64; 3]>, to: [f64; 3]) -> f64 {
+    points.nearest_neighbor(to).map_or(f64::INFINITY, |&p| {
         let by = sub(p, to);
-        dot(by, by)
-    });
-    squares.fold(f64::INFINITY, f64::min).sqrt()
+        dot(by, by).sqrt()
+    })
 }

@@ -1,13 +1,15 @@
 //! Marks that fit the image and may be meant otherwise: slice numbers and pixels for lengths, one outline number for many
 //! slices, one object marked in two files.
 
-use crate::grid::Geometry;
+use crate::grid::{Geometry, digits};
 use crate::pipeline::marks::ObjectMarks;
 
 /// Marks whose whole numbers say something: fewer may be whole by chance.
 const TELLING: usize = 8;
 /// An object so few voxels wide was hardly marked on this image by lengths.
 const HARDLY_MARKED: f64 = 4.0;
+/// An object so much smaller than a voxel was marked in another unit: a thousandth, or less, of its size.
+const IN_ANOTHER_UNIT: f64 = 0.2;
 /// Two objects whose boxes share so much of what both fill are likely one.
 const SAME: f64 = 0.5;
 
@@ -48,6 +50,14 @@ pub fn doubts(marks: &ObjectMarks, image: &Geometry) -> Vec<String> {
         let (low, high) = limits(&points, axis);
         (high - low) / image.spacing[axis]
     };
+    if points.len() >= TELLING && (0..3).all(|axis| wide(axis) < IN_ANOTHER_UNIT) {
+        let unit = image.unit.as_deref().map_or(String::new(), |unit| format!(", {unit}"));
+        let [x, y, z] = [0, 1, 2].map(|axis| digits::number(wide(axis)));
+        return vec![format!(
+            "the marks of object {object} span {x} x {y} x {z} voxels: their lengths are in another unit than the image's{unit}; \
+             name theirs in the header, as in x [mm]"
+        )];
+    }
     let narrow = fits[0] && fits[1] && wide(0) < HARDLY_MARKED && wide(1) < HARDLY_MARKED;
     if points.len() >= TELLING && narrow && image.spacing[..2] != [1.0; 2] {
         return vec![format!(
@@ -99,6 +109,24 @@ pub fn spans_slices(marks: &ObjectMarks, image: &Geometry) -> Vec<(i64, usize)> 
     };
     let numbered = marks.numbers.iter().zip(&marks.contours).filter(|_| marks.drawn);
     numbered.filter_map(|(&number, contour)| Some((number, slices(contour)?))).collect()
+}
+
+/// An outline is open when its ends are farther apart than so many of its longest step from mark to mark.
+const OPEN_STEPS: f64 = 4.0;
+/// With fewer marks steps tell nothing: they are the sides of a polygon.
+const FEWEST_STEPS: usize = 6;
+
+/// The outlines whose ends lie far from each other, as one has it that was drawn half around.
+#[must_use]
+pub fn open_outlines(marks: &ObjectMarks) -> Vec<i64> {
+    let step = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt();
+    let is_open = |contour: &[[f64; 3]]| {
+        let longest = contour.windows(2).map(|pair| step(&pair[0], &pair[1])).fold(0.0, f64::max);
+        let ends = contour.first().zip(contour.last());
+        contour.len() > FEWEST_STEPS && ends.is_some_and(|(a, b)| step(a, b) > OPEN_STEPS * longest)
+    };
+    let numbered = marks.numbers.iter().zip(&marks.contours).filter(|_| marks.drawn);
+    numbered.filter(|(_, contour)| is_open(contour)).map(|(&number, _)| number).collect()
 }
 
 /// The share that the boxes of two objects have in common of what both fill, where it is so large that they may be one

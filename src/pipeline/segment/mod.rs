@@ -26,7 +26,7 @@ mod survey;
 mod tissue;
 
 pub use check::{Grids, check_lengths, check_marks, check_seed, check_smoothing};
-pub use doubts::{doubts, same_place, spans_slices};
+pub use doubts::{doubts, open_outlines, same_place, spans_slices};
 pub use estimate::{Estimate, estimate};
 pub use labels::{Overlap, Placed};
 pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_faces, join};

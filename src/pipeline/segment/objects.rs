@@ -8,7 +8,7 @@ use super::settings::{ImageModel, SegmentSettings, Start};
 use super::survey::{Looking, Outlined, Trust, left_out_of, trust};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
-use crate::grid::Geometry;
+use crate::grid::{Geometry, digits};
 use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::Hausdorff;
 use crate::pipeline::cell_needs::SOLVE_BYTES;
@@ -228,12 +228,12 @@ fn check_surface(marks: &ObjectMarks, geometry: &Geometry, hausdorff: Option<Hau
             let points = marks.contours.concat();
             let bound = |a: usize, of: fn(f64, f64) -> f64| points.iter().map(|p| p[a]).reduce(of).unwrap_or(0.0);
             let [low, high] = [f64::min, f64::max].map(|of| [0, 1, 2].map(|a| bound(a, of)));
-            let [x, y, z] = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
-            let [width, height, depth] = [0, 1, 2].map(|a| high[a] - low[a]);
+            let middle = digits::place([0, 1, 2].map(|a| 0.5 * (low[a] + high[a])), geometry.min_spacing());
+            let [width, height, depth] = [0, 1, 2].map(|a| digits::number(high[a] - low[a]));
             let [h, k, l] = geometry.spacing;
             Err(Error::input(format!(
-                "object {object} encloses nothing: its marks around ({x:.6}, {y:.6}, {z:.6}) span {width:.3} x {height:.3} \
-                 x {depth:.3}, where voxels are {h} x {k} x {l}; mark its border all around, on every few slices"
+                "object {object} encloses nothing: its marks around {middle} span {width} x {height} x {depth}, where voxels \
+                 are {h} x {k} x {l}; mark its border all around, on every few slices"
             )))
         }
         Some(found) if found.mean > MOST_OFF * geometry.max_spacing() => Err(Error::input(format!(
