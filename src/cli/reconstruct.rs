@@ -30,6 +30,9 @@ use crate::pipeline::reconstruct::{
 };
 use crate::store::Unfinished;
 
+/// Points without three others within so many spacings stand alone, where nothing else is said.
+const ISOLATED_SPACINGS: f64 = 4.0;
+
 /// Of so many points one may be off the surface without a word.
 const MOST_LOST: u64 = 20;
 
@@ -136,8 +139,13 @@ impl Job {
         let laid = laid_grid(&args.grid, &grid, &cloud, &console)?;
         settings.keeps_grid = laid.is_some();
         let grid = laid.unwrap_or(grid);
-        check_counts(grid.shape.map(|n| n as f64))?;
-        refuse_too_fine(&grid, resources.memory)?;
+        refuse_too_fine(&grid, resources.memory).map_err(|error| {
+            let rest = || strays(&cloud, spacing).filter(|(_, grid)| refuse_too_fine(grid, resources.memory).is_ok());
+            match args.grid.drop_isolated.map_or_else(rest, |_| None) {
+                Some((alone, _)) => far_strays(alone, cloud.len()).at(&args.cloud),
+                None => error,
+            }
+        })?;
         let typed = typed.to_vec();
         Ok(Self { args, typed, settings, resources, cloud, grid, console, cancel, started })
     }
@@ -252,8 +260,25 @@ impl Job {
     }
 }
 
+/// The points that stand alone, and the grid around the others.
+fn strays(cloud: &[[f64; 3]], spacing: Option<[f64; 3]>) -> Option<(usize, Geometry)> {
+    let kept = without_isolated(cloud, ISOLATED_SPACINGS * typical_spacing(cloud)?);
+    let alone = cloud.len() - kept.len();
+    if alone == 0 { None } else { Some((alone, grid_for(&kept, spacing)?)) }
+}
+
+fn far_strays(alone: usize, all: usize) -> Error {
+    Error::usage(format!(
+        "{} of {} points stand alone, and a grid that holds them and the others does not fit the memory; give \
+         --drop-isolated to leave them out",
+        grouped(alone as u64),
+        grouped(all as u64)
+    ))
+}
+
 /// Refuses a grid whose cells alone would not fit the memory, before any is taken for them.
 fn refuse_too_fine(grid: &Geometry, memory: u64) -> Result<()> {
+    check_counts(grid.shape.map(|n| n as f64))?;
     let least = least_memory(grid);
     if least <= memory {
         return Ok(());

@@ -67,6 +67,19 @@ impl Search<'_> {
         f64::from(basin.saddle) < beta && deep
     }
 
+    /// No space can be deeper than this. On the way out of one along any axis the distance falls to the space's saddle, at
+    /// the latest that far beyond the box around the cloud: half the box and two saddles bound the depth, and a start
+    /// surface that was asked for lies beyond its saddle.
+    fn deepest_possible(&self) -> f64 {
+        let extents = self.extents();
+        match self.beta {
+            Some(beta) => {
+                0.5 * extents.into_iter().fold(f64::INFINITY, f64::min) + 2.0 * beta + self.grid.max_spacing()
+            }
+            None => extents.into_iter().fold(0.0, f64::max),
+        }
+    }
+
     /// The cloud's extents along x, y, z.
     fn extents(&self) -> [f64; 3] {
         let bounds = voxel_bounds(self.cloud, self.grid);
@@ -205,7 +218,7 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
             if let (Some(_), Some(deepest)) = (search.beta, persists) {
                 return Ok(Found::Leaks(deepest));
             }
-            if farthest > search.extents().into_iter().fold(0.0, f64::max) {
+            if farthest > search.deepest_possible() {
                 return Ok(Found::Nothing(deepest));
             }
             farthest *= 2.0;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
-use crate::grid::{Box3, BrickId, Geometry};
+use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
 use crate::io::mesh_ply::PlyWriter;
 use crate::kernel::surface::{
     Hausdorff, MarchingCubes, Measures, Patch, SurfaceMeasure, Triangle, Welder, cells_of_brick,
@@ -168,10 +168,7 @@ impl Shells {
         let centre = grid.coords(brick);
         let (mut squared, mut due) = (vec![f64::INFINITY; targets.len()], Vec::new());
         for radius in 0..=grid.counts().into_iter().max().unwrap_or(1) {
-            let around = Box3::new(centre, centre.map(|c| c + 1)).grow(radius);
-            let shell = around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
-            let on_shell = shell.filter(|at| (0..3).any(|a| (at[a] - centre[a]).abs() == radius));
-            for id in on_shell.filter_map(|at| grid.id_at(at)).filter(|&id| holds_surface(u, id)) {
+            for id in shell(&grid, centre, radius).filter(|&id| holds_surface(u, id)) {
                 let (lo, hi) = extent_of(u, geometry, id);
                 let away = |target: &[f64; 3]| {
                     (0..3).map(|a| (lo[a] - target[a]).max(target[a] - hi[a]).max(0.0).powi(2)).sum::<f64>()
@@ -225,6 +222,21 @@ impl Shells {
     }
 }
 
+/// The bricks of a grid that are `radius` bricks away from one along some axis, and no farther along any.
+fn shell(grid: &BrickGrid, centre: [i64; 3], radius: i64) -> impl Iterator<Item = BrickId> {
+    let around = Box3::new(centre, centre.map(|c| c + 1)).grow(radius);
+    // A stray point far away has a long thin grid: only the part of a shell that lies in it is gone through.
+    let inside = around.intersect(&Box3::from_shape(grid.counts()));
+    let grid = *grid;
+    inside.rows().flat_map(move |(y, z)| {
+        let is_face = (y - centre[1]).abs() == radius || (z - centre[2]).abs() == radius;
+        let ends = [centre[0] - radius, centre[0] + radius].into_iter().take(if radius == 0 { 1 } else { 2 });
+        let whole = inside.lo[0]..if is_face { inside.hi[0] } else { inside.lo[0] };
+        let ends = ends.filter(move |x| !is_face && (inside.lo[0]..inside.hi[0]).contains(x));
+        whole.chain(ends).filter_map(move |x| grid.id_at([x, y, z]))
+    })
+}
+
 /// The box that the surface in a brick's cells lies in, world coordinates; a little larger, for positions are f32.
 fn extent_of(u: &BrickArray<f32>, geometry: &Geometry, id: BrickId) -> ([f64; 3], [f64; 3]) {
     let grid = u.set().grid();
@@ -247,4 +259,29 @@ fn patch_of(
     read_padded(u, &part, values)?;
     cubes.extract(values, &part, &cells, patch);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against the plain definition, over all bricks of flat and thick grids.
+    #[test]
+    fn shells_hold_what_is_as_far_away_and_nothing_twice() {
+        for shape in [[7, 1, 1], [5, 4, 3], [1, 6, 9]] {
+            let grid = BrickGrid::new(shape.map(|n| 16 * n), 16);
+            for centre in (0..grid.len()).map(|id| grid.coords(id)) {
+                for radius in 0..10 {
+                    let away = |id: &BrickId| {
+                        let at = grid.coords(*id);
+                        (0..3).map(|a| (at[a] - centre[a]).abs()).max() == Some(radius)
+                    };
+                    let expected: Vec<BrickId> = (0..grid.len()).filter(away).collect();
+                    let mut found: Vec<BrickId> = shell(&grid, centre, radius).collect();
+                    found.sort_unstable();
+                    assert_eq!(found, expected, "{shape:?} {centre:?} {radius}");
+                }
+            }
+        }
+    }
 }

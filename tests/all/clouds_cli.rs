@@ -114,3 +114,49 @@ fn a_vanished_surface_is_a_failure_that_names_the_beta() {
         assert!(bench.entries("out").is_empty(), "{output}: {:?} left", bench.entries("out"));
     }
 }
+
+/// A stray point far away makes a long thin grid of many thousand empty bricks, or one that no memory holds.
+#[test]
+fn far_strays_cost_nothing_or_are_named() {
+    let bench = Bench::bare();
+    let once = sphere([0.0; 3], 1.0, 500, |_| true);
+    write(&bench, "cloud.xyz", &[once.clone(), vec![[1e4, 0.0, 0.0]]].concat());
+    bench.succeed("reconstruct cloud.xyz -q -o none --report out/r.json");
+    let report = bench.json("out/r.json");
+    let volume = report["result"]["volume"].as_f64().unwrap();
+    assert!((volume / (4.0 / 3.0 * PI) - 1.0).abs() < 0.04, "{volume}");
+    // From the stray point to the surface, straight along x.
+    let farthest = report["result"]["hausdorff"]["max"].as_f64().unwrap();
+    assert!((farthest - (1e4 - 1.0)).abs() < 0.1, "{farthest}");
+    let survey: Vec<[f64; 3]> = once.iter().map(|p| [p[0] + 5e5, p[1] + 4e6, p[2]]).collect();
+    write(&bench, "survey.xyz", &[survey, vec![[0.0; 3]]].concat());
+    let said = bench.fail("reconstruct survey.xyz -o none", 2);
+    assert!(said.contains("survey.xyz: 1 of 501 points") && said.contains("--drop-isolated"), "{said}");
+    bench.succeed("reconstruct survey.xyz --drop-isolated -q -o none");
+}
+
+#[test]
+fn flat_clouds_are_told_to_be_flat() {
+    let bench = Bench::bare();
+    let tilted = |i: f64, j: f64| [i + 100.0, j, 0.5 * i + 2.0 * j];
+    let plane: Vec<_> = (0..400).map(|n| tilted(f64::from(n % 20), f64::from(n / 20))).collect();
+    let line: Vec<_> = (0..60).map(|n| tilted(f64::from(n), 0.0)).collect();
+    for (cloud, told) in [(plane, "in one plane"), (line, "on one line")] {
+        write(&bench, "flat.xyz", &cloud);
+        for beta in ["", "--beta 0.9"] {
+            let said = bench.fail(&format!("reconstruct flat.xyz -o none {beta}"), 2);
+            assert!(said.contains(told) && said.contains("no inside"), "{said}");
+        }
+    }
+}
+
+/// The two faces of a plate without its rim, nearer to each other than their points are: with a beta that lies under the
+/// depth by rounding alone nothing is found, within the reach that such a space can have.
+#[test]
+fn a_beta_that_encloses_nothing_is_told_soon() {
+    let bench = Bench::bare();
+    let face = |z: f64| (0..441).map(move |n| [0.05 * f64::from(n % 21), 0.05 * f64::from(n / 21), z]);
+    write(&bench, "plate.xyz", &face(0.0).chain(face(0.02)).collect::<Vec<_>>());
+    let said = bench.fail("reconstruct plate.xyz --beta 0.03 --spacing 0.01 -o none", 2);
+    assert!(said.contains("enclose nothing") && said.contains("with --beta 0.03"), "{said}");
+}

@@ -5,6 +5,7 @@
 //! ```
 
 mod estimate;
+mod flat;
 mod grid;
 mod isolated;
 mod on_grid;

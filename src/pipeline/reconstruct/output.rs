@@ -1,5 +1,6 @@
 //! The whole job: search what the cloud encloses, move the surface, draw, measure and write it.
 
+use super::flat::flat;
 use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
@@ -18,6 +19,9 @@ use crate::store::{BoxSource, ElementType};
 
 /// Points farther from the solved surface than so many largest spacings have been left by it.
 const LEFT_VOXELS: f64 = 0.6;
+
+/// A cloud that is no thicker than this part of a spacing, root mean square, is flat.
+const FLAT_VOXELS: f64 = 0.1;
 
 /// What a reconstruction found.
 #[derive(Clone, Debug)]
@@ -68,8 +72,11 @@ pub fn reconstruct(
     };
     let enclosure = match enclose(engine, &search)? {
         Found::Enclosed(enclosure) => enclosure,
-        Found::Leaks(deepest) => return Err(leaks(settings, grid, &deepest)),
-        Found::Nothing(deepest) => return Err(encloses_nothing(settings, grid, deepest.as_ref())),
+        Found::Leaks(deepest) => return Err(flat_cloud(grid, cloud).unwrap_or_else(|| leaks(settings, grid, &deepest))),
+        Found::Nothing(deepest) => {
+            let nothing = || encloses_nothing(settings, grid, deepest.as_ref());
+            return Err(flat_cloud(grid, cloud).unwrap_or_else(nothing));
+        }
     };
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
     let window = enclosure.window;
@@ -149,6 +156,14 @@ fn write_fields(
         stage.finish();
     }
     Ok(())
+}
+
+/// What is said of a cloud that no setting gives an inside.
+fn flat_cloud(grid: &Geometry, cloud: &[[f64; 3]]) -> Option<Error> {
+    let place = flat(cloud, FLAT_VOXELS * grid.min_spacing())?;
+    Some(Error::input(format!(
+        "the points enclose nothing: all of them lie {place}, which has no inside; give points of all sides of the body"
+    )))
 }
 
 fn leaks(settings: &ReconstructSettings, grid: &Geometry, deepest: &Deepest) -> Error {
