@@ -93,6 +93,15 @@ impl Box3 {
         places.rows().flat_map(move |(y, z)| (places.lo[0]..places.hi[0]).map(move |x| cut([x, y, z])))
     }
 
+    /// The values of `part`, which lies inside this box, out of those of the whole, both dense `[z][y][x]`.
+    pub fn cut<T: Copy>(&self, values: &[T], part: &Self, out: &mut Vec<T>) {
+        let width = part.shape()[0] as usize;
+        out.clear();
+        for (y, z) in part.rows() {
+            out.extend_from_slice(&values[self.offset_of([part.lo[0], y, z])..][..width]);
+        }
+    }
+
     /// The place of `voxel` in a dense `[z][y][x]` array over this box.
     #[must_use]
     pub fn offset_of(&self, voxel: [i64; 3]) -> usize {
@@ -118,6 +127,15 @@ mod tests {
         let tiles: Vec<Box3> = part.tiles([4, 3, 2]).collect();
         assert_eq!(tiles[0], Box3::new([3, 0, 5], [4, 3, 6]));
         assert_eq!((tiles.len(), tiles.iter().map(Box3::len).sum::<usize>()), (6, part.len()));
+    }
+
+    #[test]
+    fn parts_are_cut_out() {
+        let whole = Box3::new([1, 2, 3], [4, 4, 5]);
+        let values: Vec<usize> = (0..whole.len()).collect();
+        let mut out = vec![99];
+        whole.cut(&values, &Box3::new([2, 3, 3], [4, 4, 5]), &mut out);
+        assert_eq!(out, [4, 5, 10, 11]);
     }
 
     #[test]

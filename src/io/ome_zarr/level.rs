@@ -1,16 +1,20 @@
-//! `LevelWriter`: one resolution level, a Zarr array that is written shard by shard from any number of threads.
+//! `LevelWriter`: one resolution level, a Zarr array that takes chunks from any number of threads, in any order, and
+//! writes each shard when its last chunk has come.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use super::files::{write_json, write_whole};
 use super::metadata;
 use super::pyramid::LevelPlan;
-use super::shard::{ChunkCodec, ShardLayout, write_shard};
+use super::shard::{ChunkCodec, ShardLayout, encode_chunk, write_shard};
 use crate::error::Result;
 use crate::grid::{Box3, Geometry};
 use crate::store::{Element, ElementType};
 
-/// Writes one level of an image. Shards may be written in any order and from any thread, each by one caller.
+/// Writes one level of an image. Chunks may come in any order and from any thread; those of a shard are best given one soon
+/// after the other, as they wait for the last in memory.
 #[derive(Debug)]
 pub struct LevelWriter {
     folder: PathBuf,
@@ -19,6 +23,15 @@ pub struct LevelWriter {
     element: ElementType,
     layout: ShardLayout,
     codec: ChunkCodec,
+    /// Shards of which some chunks have come, by their places.
+    pending: Mutex<HashMap<[i64; 3], Pending>>,
+}
+
+/// A shard of which some chunks have come, compressed.
+#[derive(Debug)]
+struct Pending {
+    chunks: Vec<Option<Vec<u8>>>,
+    missing: usize,
 }
 
 impl LevelWriter {
@@ -27,7 +40,15 @@ impl LevelWriter {
         let layout = ShardLayout::new(plan.geometry.shape, element);
         let codec = ChunkCodec::new(element)?;
         write_json(&folder.join("zarr.json"), &metadata::array(plan.geometry.shape, element, layout, &codec))?;
-        Ok(Self { folder: folder.to_path_buf(), store: store.to_path_buf(), plan, element, layout, codec })
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            store: store.to_path_buf(),
+            plan,
+            element,
+            layout,
+            codec,
+            pending: Mutex::default(),
+        })
     }
 
     /// The level's grid.
@@ -54,69 +75,76 @@ impl LevelWriter {
         self.layout.shard
     }
 
-    /// Bytes that a call of [`LevelWriter::write_shard_with`] holds beside the caller's own: one chunk as voxels, as
-    /// bytes and compressed.
+    /// Voxels of a whole chunk, `[x, y, z]`; those at the far ends may be cut short.
     #[must_use]
-    pub fn bytes_per_call(&self) -> u64 {
-        3 * Box3::from_shape(self.layout.chunk).volume() * self.element.size() as u64
+    pub fn chunk_shape(&self) -> [i64; 3] {
+        self.layout.chunk
     }
 
-    /// The boxes to be written, x fastest: whole shards, clipped to the level.
+    /// The boxes of the shards, x fastest, clipped to the level.
     pub fn shards(&self) -> impl Iterator<Item = Box3> + use<> {
-        let domain = self.plan.geometry.domain();
-        let shard = self.layout.shard;
-        let counts: [i64; 3] = std::array::from_fn(|a| (domain.hi[a] + shard[a] - 1) / shard[a]);
-        Box3::from_shape(counts).rows().flat_map(move |(y, z)| {
-            (0..counts[0]).map(move |x| {
-                let lo = [x * shard[0], y * shard[1], z * shard[2]];
-                Box3::from_shape(shard).translate(lo).intersect(&domain)
-            })
-        })
+        self.plan.geometry.domain().tiles(self.layout.shard)
     }
 
-    /// Writes the voxels of one shard, dense `[z][y][x]`; returns the bytes that went to disk. A shard of zeros, the
-    /// fill value, takes none.
+    /// Takes the voxels of one chunk, dense `[z][y][x]`, and keeps them compressed until all chunks of their shard have
+    /// come; the last one writes the shard. Returns the bytes that went to disk. A shard of zeros, the fill value, takes
+    /// none.
     ///
     /// # Errors
     /// When the file cannot be written; nothing of the shard is left then.
     ///
     /// # Panics
+    /// When `chunk` is not one whole chunk, clipped to the level, or comes twice, `data` does not fit it, or `T` is not the
+    /// level's type.
+    pub fn write_chunk<T: Element>(&self, chunk: &Box3, data: &[T]) -> Result<u64> {
+        assert_eq!(T::TYPE, self.element, "the level holds voxels of another type");
+        assert_eq!(data.len(), chunk.len(), "the data does not fit the chunk");
+        let whole = Box3::from_shape(self.layout.chunk).translate(chunk.lo).intersect(&self.plan.geometry.domain());
+        let is_whole = *chunk == whole && (0..3).all(|a| chunk.lo[a] % self.layout.chunk[a] == 0);
+        assert!(is_whole, "only whole chunks are taken");
+        let encoded = encode_chunk(&self.codec, self.layout, chunk, data).map_err(|error| error.at(&self.store))?;
+        let (shard, place) = self.layout.place_of(chunk.lo);
+        let Some(chunks) = self.enter(shard, place, encoded) else { return Ok(0) };
+        write_whole(&self.shard_path(shard), |sink| write_shard(sink, &chunks)).map_err(|error| error.at(&self.store))
+    }
+
+    /// Writes the voxels of one shard, dense `[z][y][x]`; returns the bytes that went to disk.
+    ///
+    /// # Errors
+    /// As [`LevelWriter::write_chunk`].
+    ///
+    /// # Panics
     /// When `shard` is none of [`LevelWriter::shards`], `data` does not fit it, or `T` is not the level's type.
     pub fn write_shard<T: Element>(&self, shard: &Box3, data: &[T]) -> Result<u64> {
         assert_eq!(data.len(), shard.len(), "the data does not fit the shard");
-        self.write_shard_with(shard, |part, out: &mut [T]| {
-            let length = part.shape()[0] as usize;
-            for ((y, z), row) in part.rows().zip(out.chunks_exact_mut(length)) {
-                row.copy_from_slice(&data[shard.offset_of([part.lo[0], y, z])..][..length]);
-            }
-            Ok(())
+        let mut values = Vec::new();
+        shard.tiles(self.layout.chunk).try_fold(0, |bytes, chunk| {
+            shard.cut(data, &chunk, &mut values);
+            Ok(bytes + self.write_chunk(&chunk, &values)?)
         })
     }
 
-    /// Like [`LevelWriter::write_shard`], but asks for the voxels chunk by chunk, so that no whole shard need be in
-    /// memory: `fill` gets boxes inside the shard and writes their voxels, dense `[z][y][x]`.
-    ///
-    /// # Errors
-    /// What `fill` returns, or when the file cannot be written; nothing of the shard is left then.
-    ///
-    /// # Panics
-    /// When `shard` is none of [`LevelWriter::shards`] or `T` is not the level's type.
-    pub fn write_shard_with<T: Element>(
-        &self,
-        shard: &Box3,
-        mut fill: impl FnMut(&Box3, &mut [T]) -> Result<()>,
-    ) -> Result<u64> {
-        assert_eq!(T::TYPE, self.element, "the level holds voxels of another type");
-        let path = self.shard_path(shard);
-        write_whole(&path, |sink| write_shard(sink, &self.codec, self.layout, shard, &mut fill))
-            .map_err(|error| error.at(&self.store))
+    /// Keeps a chunk; returns those of its shard when it was the last of them.
+    fn enter(&self, shard: [i64; 3], place: usize, encoded: Option<Vec<u8>>) -> Option<Vec<Option<Vec<u8>>>> {
+        let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
+        let entry = pending.entry(shard).or_insert_with(|| Pending {
+            chunks: vec![None; self.layout.chunks_in_shard()],
+            missing: self.shard_box(shard).tiles(self.layout.chunk).count(),
+        });
+        entry.chunks[place] = encoded;
+        entry.missing = entry.missing.checked_sub(1).expect("each chunk comes once");
+        if entry.missing > 0 {
+            return None;
+        }
+        pending.remove(&shard).map(|shard| shard.chunks)
     }
 
-    fn shard_path(&self, shard: &Box3) -> PathBuf {
-        let place: [i64; 3] = std::array::from_fn(|a| shard.lo[a] / self.layout.shard[a]);
+    fn shard_box(&self, place: [i64; 3]) -> Box3 {
         let lo = std::array::from_fn(|a| place[a] * self.layout.shard[a]);
-        let whole = Box3::from_shape(self.layout.shard).translate(lo).intersect(&self.plan.geometry.domain());
-        assert_eq!(*shard, whole, "only whole shards are written");
+        Box3::from_shape(self.layout.shard).translate(lo).intersect(&self.plan.geometry.domain())
+    }
+
+    fn shard_path(&self, place: [i64; 3]) -> PathBuf {
         let [x, y, z] = place.map(|v| v.to_string());
         self.folder.join("c").join(z).join(y).join(x)
     }
@@ -193,20 +221,19 @@ mod tests {
     }
 
     #[test]
-    fn a_source_that_fails_leaves_no_shard() {
+    fn a_shard_appears_with_its_last_chunk_in_whatever_order_they_come() {
         let folder = tempfile::tempdir().unwrap();
-        let level = level(folder.path(), [130, 10, 10], ElementType::U8);
-        let shard = level.shards().next().unwrap();
-        let mut calls = 0;
-        let error = level.write_shard_with(&shard, |part, out: &mut [u8]| {
-            assert_eq!(out.len(), part.len());
-            out.fill(1);
-            calls += 1;
-            if calls == 2 { Err(Error::input("page 3 is broken")) } else { Ok(()) }
-        });
-        let error = error.unwrap_err();
-        assert!(error.to_string().ends_with("page 3 is broken"));
-        assert_eq!(error.path(), Some(folder.path()));
-        assert_eq!(std::fs::read_dir(folder.path().join("0/c/0/0")).unwrap().count(), 0);
+        let level = level(folder.path(), [130, 70, 10], ElementType::U8);
+        let chunks: Vec<Box3> = level.geometry().domain().tiles(level.chunk_shape()).collect();
+        let file = folder.path().join("0/c/0/0/0");
+        for (n, chunk) in chunks.iter().enumerate().rev() {
+            assert!(!file.exists());
+            let bytes = level.write_chunk(chunk, &vec![n as u8; chunk.len()]).unwrap();
+            assert_eq!(bytes > 0, n == 0);
+        }
+        let back = read_back::<u8>(folder.path());
+        for (n, chunk) in chunks.iter().enumerate() {
+            assert_eq!(back[level.geometry().domain().offset_of(chunk.lo)], n as u8);
+        }
     }
 }

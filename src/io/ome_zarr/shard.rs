@@ -42,14 +42,22 @@ impl ShardLayout {
         Self { chunk, shard }
     }
 
-    /// Places of a shard's chunks from the shard's first voxel on, in the order of the index.
-    fn chunks(self) -> impl Iterator<Item = Box3> {
-        let counts: [i64; 3] = std::array::from_fn(|a| self.shard[a] / self.chunk[a]);
-        let chunk = Box3::from_shape(self.chunk);
-        Box3::from_shape(counts)
-            .rows()
-            .flat_map(move |(y, z)| (0..counts[0]).map(move |x| [x, y, z]))
-            .map(move |at| chunk.translate(std::array::from_fn(|a| at[a] * self.chunk[a])))
+    /// Chunks of a whole shard along each axis.
+    fn counts(self) -> [i64; 3] {
+        std::array::from_fn(|a| self.shard[a] / self.chunk[a])
+    }
+
+    /// Chunks of a whole shard, those beyond the array counted.
+    pub(super) fn chunks_in_shard(self) -> usize {
+        Box3::from_shape(self.counts()).len()
+    }
+
+    /// The shard that holds the chunk which begins at a voxel, as its place among the shards, and the chunk's place in its
+    /// index.
+    pub(super) fn place_of(self, voxel: [i64; 3]) -> ([i64; 3], usize) {
+        let shard: [i64; 3] = std::array::from_fn(|a| voxel[a] / self.shard[a]);
+        let chunk = std::array::from_fn(|a| (voxel[a] - shard[a] * self.shard[a]) / self.chunk[a]);
+        (shard, Box3::from_shape(self.counts()).offset_of(chunk))
     }
 }
 
@@ -110,44 +118,40 @@ fn encode_with(codec: &dyn BytesToBytesCodecTraits, bytes: &[u8]) -> std::result
     codec.encode(Cow::Borrowed(bytes), &options).map(Cow::into_owned)
 }
 
-/// Encodes one shard into `sink`, chunk by chunk; returns the bytes written, 0 when all voxels hold the fill value.
-///
-/// `part` is the shard's box inside the array; `fill` writes the voxels of a box inside `part`, dense `[z][y][x]`.
-/// Nothing is written to `sink` when there is nothing but the fill value.
-pub(super) fn write_shard<T: Element>(
-    sink: &mut dyn Write,
+/// Encodes one chunk, whose voxels inside the array are `values`, dense `[z][y][x]` over `valid`; nothing where all of
+/// them hold the fill value.
+pub(super) fn encode_chunk<T: Element>(
     codec: &ChunkCodec,
     layout: ShardLayout,
-    part: &Box3,
-    fill: &mut dyn FnMut(&Box3, &mut [T]) -> Result<()>,
-) -> Result<u64> {
+    valid: &Box3,
+    values: &[T],
+) -> Result<Option<Vec<u8>>> {
+    if values.iter().all(|&value| value == T::default()) {
+        return Ok(None);
+    }
+    let chunk = Box3::from_shape(layout.chunk).translate(valid.lo);
+    let mut bytes = Vec::with_capacity(chunk.len() * T::TYPE.size());
+    padded_bytes(values, valid, &chunk, &mut bytes);
+    codec.encode(&bytes).map(Some)
+}
+
+/// Writes one shard of encoded chunks, in the order of its index; returns the bytes written, 0 when all voxels hold the
+/// fill value: nothing is written to `sink` then.
+pub(super) fn write_shard(sink: &mut dyn Write, chunks: &[Option<Vec<u8>>]) -> Result<u64> {
     let io = |error: std::io::Error| io_error("a shard cannot be written", &error);
-    let mut index = Vec::new();
+    let mut index = Vec::with_capacity(16 * chunks.len());
     let mut offset = 0_u64;
-    let chunk_len = Box3::from_shape(layout.chunk).len();
-    let mut dense = vec![T::default(); chunk_len];
-    let mut bytes = Vec::with_capacity(chunk_len * T::TYPE.size());
-    for chunk in layout.chunks() {
-        let chunk = chunk.translate(part.lo);
-        let valid = chunk.intersect(part);
-        let values = &mut dense[..valid.len()];
-        let mut encoded = Vec::new();
-        if !valid.is_empty() {
-            fill(&valid, values)?;
-            if values.iter().any(|&value| value != T::default()) {
-                padded_bytes(values, &valid, &chunk, &mut bytes);
-                encoded = codec.encode(&bytes)?;
-            }
+    for chunk in chunks {
+        let place = chunk.as_ref().map_or([u64::MAX; 2], |encoded| [offset, encoded.len() as u64]);
+        index.extend(place.into_iter().flat_map(u64::to_le_bytes));
+        if let Some(encoded) = chunk {
+            sink.write_all(encoded).map_err(io)?;
+            offset += encoded.len() as u64;
         }
-        let length = encoded.len() as u64;
-        index.extend(if length == 0 { [u64::MAX; 2] } else { [offset, length] });
-        sink.write_all(&encoded).map_err(io)?;
-        offset += length;
     }
     if offset == 0 {
         return Ok(0);
     }
-    let index: Vec<u8> = index.into_iter().flat_map(u64::to_le_bytes).collect();
     let index = encode_with(&Crc32cCodec::new(), &index)
         .map_err(|error| Error::failed(format!("a shard's index cannot be encoded: {error}")))?;
     sink.write_all(&index).map_err(io)?;
@@ -196,23 +200,22 @@ mod tests {
         padded_bytes(&[1_u16, 2, 3, 0x0405], &valid, &chunk, &mut bytes);
         let expected = [[1, 0, 2, 0, 0, 0], [3, 0, 5, 4, 0, 0], [0; 6], [0; 6], [0; 6], [0; 6]];
         assert_eq!(bytes, expected.concat());
-        let mut bytes = Vec::new();
-        append_bytes(&[-1.5_f64], &mut bytes);
-        assert_eq!(bytes, (-1.5_f64).to_le_bytes());
     }
 
     #[test]
     fn an_empty_shard_writes_nothing() {
         let layout = ShardLayout::new([100, 10, 10], ElementType::F32);
         let codec = ChunkCodec::new(ElementType::F32).unwrap();
+        let valid = Box3::new([64, 0, 0], [100, 10, 10]);
+        assert_eq!(encode_chunk(&codec, layout, &valid, &vec![0.0_f32; valid.len()]).unwrap(), None);
         let mut sink = Vec::new();
-        let part = Box3::from_shape([100, 10, 10]);
-        let mut seen = 0;
-        let written = write_shard::<f32>(&mut sink, &codec, layout, &part, &mut |part, out| {
-            seen += part.len();
-            out.fill(0.0);
-            Ok(())
-        });
-        assert_eq!((written.unwrap(), sink.len(), seen), (0, 0, 10_000));
+        assert_eq!((write_shard(&mut sink, &[None, None]).unwrap(), sink.len()), (0, 0));
+    }
+
+    #[test]
+    fn chunks_know_their_places() {
+        let layout = ShardLayout::new([1000, 300, 100], ElementType::F32);
+        assert_eq!((layout.chunks_in_shard(), layout.place_of([0; 3])), (8, ([0; 3], 0)));
+        assert_eq!(layout.place_of([192, 128, 64]), ([1, 1, 0], 5));
     }
 }

@@ -102,6 +102,19 @@ impl StoreWriter {
             .map_err(|error| error.at(&self.path))
     }
 
+    /// Describes an image anew, where its values are known only when they have been written: the window that viewers show.
+    ///
+    /// # Errors
+    /// When the metadata cannot be written.
+    ///
+    /// # Panics
+    /// When `group` leads out of the store.
+    pub fn describe(&self, group: &str, spec: &ImageSpec<'_>) -> Result<()> {
+        let attributes = metadata::image(spec, &plan_levels(spec.geometry));
+        write_json(&self.inside(group).join(METADATA), &metadata::group(Some(attributes)))
+            .map_err(|error| error.at(&self.path))
+    }
+
     /// Begins a label image of the root's image, in the group `labels`.
     ///
     /// # Errors

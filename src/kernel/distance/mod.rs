@@ -3,6 +3,7 @@
 pub mod all_neighbours;
 pub(crate) mod beside_sources;
 mod buckets;
+pub mod closest_point;
 pub mod culling;
 mod diagonals;
 pub mod dijkstra_heap;
@@ -15,6 +16,7 @@ pub mod extent;
 pub mod fast_marching;
 pub mod fast_sweeping;
 pub mod initialise;
+pub mod inside;
 mod label_borders;
 pub mod labelled_shapes;
 pub mod leaving;

@@ -1,17 +1,14 @@
 //! What a solved distance can be read as: distances and the indices of nearest sources, both made out of the state of
 //! the method as they are read, so that no second field is stored.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::exec::{Stage, Workers};
-use crate::grid::{Box3, BrickGrid, BrickId, BrickSet, DataSets};
-use crate::kernel::distance::extent::extent;
+use crate::exec::Workers;
+use crate::grid::Box3;
 use crate::kernel::distance::initialise::NO_SOURCE;
 use crate::kernel::distance::method::DistanceMethod;
 use crate::kernel::distance::precision::Precision;
-use crate::kernel::image::labels;
 use crate::store::{BoxSource, BrickArray};
 
 /// A solved distance.
@@ -39,65 +36,12 @@ pub trait Together<P>: Sync {
     fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()>;
 }
 
-/// Edge of the boxes that all voxels are looked at in: a second look reads two voxels more around each, whatever bricks
-/// it cuts.
-const LOOK_EDGE: i64 = 64;
-
-/// These boxes.
-pub(super) fn boxes_to_look_at(grid: &BrickGrid) -> BrickGrid {
-    BrickGrid::new(grid.shape(), LOOK_EDGE.max(grid.edge()))
-}
-
-/// What a field holds, for the report.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measured {
-    /// The largest finite distance.
-    pub max: f64,
-    /// Voxels that no source reached.
-    pub unlabelled_voxels: u64,
-}
-
 impl<P: Precision> Solved<'_, P> {
-    /// Looks at every voxel; counts those of each label where `labelled` says which data set a source belongs to.
+    /// Reads distances and sources of a box, dense `[z][y][x]`.
     ///
     /// # Errors
-    /// When the run is interrupted.
-    pub fn measure(
-        &self,
-        stage: &Stage<'_>,
-        set: &BrickSet,
-        labelled: Option<&DataSets>,
-    ) -> Result<(Measured, BTreeMap<u32, u64>)> {
-        let boxes = boxes_to_look_at(set.grid());
-        let ids: Vec<BrickId> = (0..boxes.len()).collect();
-        let workers = Workers::new(|| (Vec::new(), Vec::new(), Vec::new()));
-        let parts = stage.run(&ids, &workers, |(values, sources, labels_of_voxels), &id| {
-            let part = boxes.brick_box(id);
-            values.resize(part.len(), P::default());
-            let mut counts = BTreeMap::new();
-            if let Some(sets) = labelled {
-                sources.resize(part.len(), NO_SOURCE);
-                self.read_both(&part, values, sources)?;
-                counts = labels::count_sources(sets, sources, labels_of_voxels);
-            } else {
-                self.values.read_box(&part, values)?;
-            }
-            let (max, unlabelled_voxels) = extent(values);
-            Ok((Measured { max, unlabelled_voxels }, counts))
-        })?;
-        let mut all = (Measured::default(), BTreeMap::<u32, u64>::new());
-        for (measured, counts) in parts {
-            all.0.max = all.0.max.max(measured.max);
-            all.0.unlabelled_voxels += measured.unlabelled_voxels;
-            for (label, n) in counts {
-                *all.1.entry(label).or_default() += n;
-            }
-        }
-        Ok(all)
-    }
-
-    /// Reads distances and sources of a box.
-    fn read_both(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
+    /// When they cannot be read.
+    pub fn read_both(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
         if let Some(together) = &self.together {
             return together.read_together(part, values, sources);
         }

@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::contiguous::contiguous_margin;
-use super::field::boxes_to_look_at;
-use super::output::write_fields;
-use super::sign::Signed;
+use super::output::Wanted;
+use super::readout::ReadOut;
 use super::{Method, Options, Schedule, Solved, Sources, solve};
 use crate::error::Result;
 use crate::exec::Engine;
@@ -17,7 +16,6 @@ use crate::kernel::distance::initialise::Cube;
 use crate::kernel::distance::outside::OutsideSources;
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::source_trees::SourceTrees;
-use crate::kernel::distance::winding_number::WindingTree;
 
 /// Which voxels points fix at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,46 +92,9 @@ pub fn distance<P: Precision>(
     store: Option<&StoreWriter>,
 ) -> Result<DistanceFound> {
     let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));
-    solve_sets::<P, _>(engine, geometry, sets, trees.as_ref(), settings, |mut solved, set| {
-        if settings.signed {
-            let values = Arc::new(Signed::new(&solved, geometry, WindingTree::new(&sets.mesh), &sets.mesh));
-            solved = Solved { values, together: None, ..solved };
-        }
-        let found = measure(engine, geometry, sets, settings, &solved, set)?;
-        if let Some(store) = store {
-            write_fields(engine, geometry, sets, settings, &solved, found.max, store)?;
-        }
-        Ok(found)
-    })
-}
-
-/// Looks at all voxels of a solved distance, for the report.
-///
-/// # Errors
-/// When the run is interrupted.
-pub fn measure<P: Precision>(
-    engine: &Engine,
-    geometry: &Geometry,
-    sets: &DataSets,
-    settings: &DistanceSettings,
-    solved: &Solved<'_, P>,
-    set: &Arc<BrickSet>,
-) -> Result<DistanceFound> {
-    let stage = engine.stage("measure", boxes_to_look_at(set.grid()).len());
-    stage.voxels(geometry.domain().volume());
-    let (measured, mut label_voxels) = solved.measure(&stage, set, settings.labels.then_some(sets))?;
-    if settings.labels {
-        for &label in sets.labels() {
-            label_voxels.entry(label).or_default();
-        }
-    }
-    stage.finish();
-    Ok(DistanceFound {
-        max: measured.max,
-        fixed_voxels: solved.fixed_voxels,
-        unlabelled_voxels: measured.unlabelled_voxels,
-        triangle_distances: (!sets.mesh.is_empty()).then_some(solved.triangle_distances),
-        label_voxels,
+    solve_sets::<P, _>(engine, geometry, sets, trees.as_ref(), settings, |solved, _| {
+        let wanted = Wanted { labels: settings.labels, borders: false, closest_point: settings.closest_point };
+        ReadOut { geometry, sets, solved: &solved, is_signed: settings.signed, wanted }.run(engine, store)
     })
 }
 

@@ -13,8 +13,8 @@ mod look_outside;
 mod needs;
 mod output;
 mod ranks;
+mod readout;
 mod second_look;
-mod sign;
 mod solvers;
 mod solving;
 mod sources;
@@ -25,12 +25,13 @@ mod trace;
 
 use std::sync::Arc;
 
-pub use field::{Measured, Solved, Together};
-pub use job::{DistanceFound, DistanceSettings, Init, distance, measure, solve_sets};
+pub use field::{Solved, Together};
+pub use job::{DistanceFound, DistanceSettings, Init, distance, solve_sets};
 pub use needs::Needs;
 pub(crate) use needs::tree_bytes;
-pub use output::{NearestLabels, write_fields, write_label_field};
+pub(crate) use output::Wanted;
 pub use ranks::solve;
+pub(crate) use readout::ReadOut;
 pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};
 pub use solving::Solving;
 pub use sources::Sources;

@@ -1,169 +1,204 @@
-//! Writes a solved distance: the distance itself, the label of the nearest data set, the position of the nearest
-//! source.
+//! The images that a distance is written as: the distance itself, the label of the nearest data set and where it borders
+//! on another, the position of the nearest source.
 
-use super::{DistanceSettings, Solved};
+use super::readout::Tile;
 use crate::error::Result;
-use crate::exec::Engine;
+use crate::exec::{Engine, Stage};
 use crate::grid::{Box3, DataSets, Geometry};
-use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
-use crate::kernel::distance::initialise::NO_SOURCE;
+use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, LevelWriter, StoreWriter};
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::image::palette::label_color;
-use crate::kernel::triangle::Triangle;
-use crate::pipeline::pyramid::{Reduce, write_levels};
-use crate::store::{BoxSource, Element};
+use crate::pipeline::pyramid::{Pyramid, Reduce};
+use crate::store::Element;
 
-/// Writes all fields that the settings ask for.
-///
-/// # Errors
-/// When the output cannot be written or the run is interrupted.
-pub fn write_fields<P: Precision>(
-    engine: &Engine,
-    geometry: &Geometry,
-    sets: &DataSets,
-    settings: &DistanceSettings,
-    solved: &Solved<'_, P>,
-    max: f64,
-    store: &StoreWriter,
-) -> Result<()> {
-    let window = Some([if settings.signed { -max } else { 0.0 }, max]);
-    let image = store.image("", &ImageSpec { name: "distance", geometry, element: P::TYPE, window })?;
-    let stage = engine.stage("write distance", 0);
-    stage.voxels(geometry.domain().volume());
-    write_levels::<P>(&stage, engine, image.levels(), &*solved.values, Reduce::Mean)?;
-    stage.finish();
-    if settings.labels {
-        let nearest = NearestLabels { sources: &*solved.sources, sets };
-        write_label_field(engine, geometry, sets, "nearest", &nearest, store)?;
+/// What is written beside the distance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Wanted {
+    /// The label of each voxel's nearest data set.
+    pub(crate) labels: bool,
+    /// Labels of the voxels that have a face neighbour of another one, 0 elsewhere.
+    pub(crate) borders: bool,
+    /// Where the nearest source is closest.
+    pub(crate) closest_point: bool,
+}
+
+/// The images of a distance on their way into a store.
+pub(super) struct Images<'a, P: Element> {
+    store: &'a StoreWriter,
+    geometry: &'a Geometry,
+    distance: Pyramid<P>,
+    labels: Option<Box<dyn LabelImage>>,
+    borders: Option<Box<dyn LabelImage>>,
+    closest: Option<Closest>,
+}
+
+/// An image for each coordinate; single precision would move places that are far from zero.
+enum Closest {
+    Single([Pyramid<f32>; 3]),
+    Double([Pyramid<f64>; 3]),
+}
+
+/// Buffers of one thread.
+#[derive(Default)]
+pub(super) struct Buffers<P> {
+    values: Vec<P>,
+    labels: LabelBuffers,
+    single: ([Vec<f32>; 3], Vec<f32>),
+    double: ([Vec<f64>; 3], Vec<f64>),
+}
+
+impl<'a, P: Precision> Images<'a, P> {
+    /// Begins all images that are wanted.
+    pub(super) fn new(
+        engine: &Engine,
+        geometry: &'a Geometry,
+        sets: &DataSets,
+        wanted: Wanted,
+        store: &'a StoreWriter,
+    ) -> Result<Self> {
+        let image = store.image("", &distance_spec::<P>(geometry, None))?;
+        let labels = |name, is_wanted: bool| is_wanted.then(|| label_image(engine, geometry, sets, name, store));
+        let closest = wanted.closest_point.then(|| {
+            Ok(if geometry.fits_single() {
+                Closest::Single(coordinates(engine, geometry, store)?)
+            } else {
+                Closest::Double(coordinates(engine, geometry, store)?)
+            })
+        });
+        Ok(Self {
+            store,
+            geometry,
+            distance: Pyramid::new(engine, image, Reduce::Mean)?,
+            labels: labels("nearest", wanted.labels).transpose()?,
+            borders: labels("border", wanted.borders).transpose()?,
+            closest: closest.transpose()?,
+        })
     }
-    if settings.closest_point {
-        // Single precision would move places that are far from zero.
-        if geometry.fits_single() {
-            write_closest_points::<f32, P>(engine, geometry, sets, solved, store)?;
-        } else {
-            write_closest_points::<f64, P>(engine, geometry, sets, solved, store)?;
+
+    /// The finest level of each image.
+    pub(super) fn finest(&self) -> Vec<&LevelWriter> {
+        let labels = self.labels.iter().chain(&self.borders).map(|image| image.finest());
+        let closest = match &self.closest {
+            None => None,
+            Some(Closest::Single([x, ..])) => Some(x.finest()),
+            Some(Closest::Double([x, ..])) => Some(x.finest()),
+        };
+        std::iter::once(self.distance.finest()).chain(labels).chain(closest).collect()
+    }
+
+    /// Takes what was read of a chunk.
+    pub(super) fn put(&self, tile: &Tile<'_, P>, buffers: &mut Buffers<P>) -> Result<()> {
+        self.distance.put(tile.part, tile.values, &mut buffers.values)?;
+        for (image, labels) in [(&self.labels, tile.labels), (&self.borders, tile.borders)] {
+            if let Some(image) = image {
+                image.put(tile.part, labels, &mut buffers.labels)?;
+            }
+        }
+        match &self.closest {
+            None => Ok(()),
+            Some(Closest::Single(images)) => put_coordinates(images, tile, &mut buffers.single),
+            Some(Closest::Double(images)) => put_coordinates(images, tile, &mut buffers.double),
         }
     }
-    Ok(())
+
+    /// Writes the coarser levels, and the range of distances.
+    pub(super) fn finish(self, stage: &Stage<'_>, engine: &Engine, range: [f64; 2]) -> Result<()> {
+        self.distance.finish(stage, engine)?;
+        for image in [self.labels, self.borders].into_iter().flatten() {
+            image.finish(stage, engine)?;
+        }
+        match self.closest {
+            None => {}
+            Some(Closest::Single(images)) => finish_all(images, stage, engine)?,
+            Some(Closest::Double(images)) => finish_all(images, stage, engine)?,
+        }
+        self.store.describe("", &distance_spec::<P>(self.geometry, Some(range)))
+    }
 }
 
-/// Writes the place on the nearest source, an image for each coordinate, as `T`.
-fn write_closest_points<T: Element, P: Precision>(
-    engine: &Engine,
-    geometry: &Geometry,
-    sets: &DataSets,
-    solved: &Solved<'_, P>,
-    store: &StoreWriter,
-) -> Result<()> {
-    let triangles: Vec<_> = (0..sets.mesh.len()).map(|n| Triangle::new(sets.mesh.corners(n))).collect();
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+fn distance_spec<P: Element>(geometry: &Geometry, window: Option<[f64; 2]>) -> ImageSpec<'_> {
+    ImageSpec { name: "distance", geometry, element: P::TYPE, window }
+}
+
+fn coordinates<T: Element>(engine: &Engine, geometry: &Geometry, store: &StoreWriter) -> Result<[Pyramid<T>; 3]> {
+    let image = |name: &str| {
         let group = format!("closest-point/{name}");
         let spec = ImageSpec { name: &group, geometry, element: T::TYPE, window: None };
-        let closest = ClosestPoint { solved, sets, triangles: &triangles, geometry, axis };
-        let stage = engine.stage(&format!("write closest {name}"), 0);
-        stage.voxels(geometry.domain().volume());
-        write_levels::<T>(&stage, engine, store.image(&group, &spec)?.levels(), &closest, Reduce::Mean)?;
-        stage.finish();
-    }
-    Ok(())
+        Pyramid::new(engine, store.image(&group, &spec)?, Reduce::Mean)
+    };
+    Ok([image("x")?, image("y")?, image("z")?])
 }
 
-/// Writes a label volume of that name, in the smallest type that holds all labels.
-///
-/// # Errors
-/// When the output cannot be written or the run is interrupted.
-pub fn write_label_field<L>(
-    engine: &Engine,
-    geometry: &Geometry,
-    sets: &DataSets,
-    name: &str,
-    labels: &L,
-    store: &StoreWriter,
-) -> Result<()>
-where
-    L: BoxSource<u8> + BoxSource<u16> + BoxSource<u32>,
-{
-    match sets.last_label() {
-        0..=0xff => write_labels::<u8>(engine, geometry, sets, name, labels, store),
-        0x100..=0xffff => write_labels::<u16>(engine, geometry, sets, name, labels, store),
-        _ => write_labels::<u32>(engine, geometry, sets, name, labels, store),
-    }
-}
-
-fn write_labels<T: Element>(
-    engine: &Engine,
-    geometry: &Geometry,
-    sets: &DataSets,
-    name: &str,
-    labels: &dyn BoxSource<T>,
-    store: &StoreWriter,
+fn put_coordinates<T: Element, P>(
+    images: &[Pyramid<T>; 3],
+    tile: &Tile<'_, P>,
+    (coordinates, buffer): &mut ([Vec<T>; 3], Vec<T>),
 ) -> Result<()> {
+    tile.closest.of(tile.part, tile.sources, coordinates);
+    images.iter().zip(coordinates).try_for_each(|(image, values)| image.put(tile.part, values, buffer))
+}
+
+fn finish_all<T: Element>(images: [Pyramid<T>; 3], stage: &Stage<'_>, engine: &Engine) -> Result<()> {
+    images.into_iter().try_for_each(|image| image.finish(stage, engine))
+}
+
+/// An image of labels, whatever its type.
+trait LabelImage: Send + Sync {
+    fn finest(&self) -> &LevelWriter;
+    fn put(&self, chunk: &Box3, labels: &[u32], buffers: &mut LabelBuffers) -> Result<()>;
+    fn finish(self: Box<Self>, stage: &Stage<'_>, engine: &Engine) -> Result<()>;
+}
+
+/// Labels in the types that they may be written in.
+#[derive(Default)]
+struct LabelBuffers {
+    u8: [Vec<u8>; 2],
+    u16: [Vec<u16>; 2],
+    u32: [Vec<u32>; 2],
+}
+
+macro_rules! label_image {
+    ($type:ty, $buffers:ident) => {
+        impl LabelImage for Pyramid<$type> {
+            fn finest(&self) -> &LevelWriter {
+                Pyramid::finest(self)
+            }
+
+            fn put(&self, chunk: &Box3, labels: &[u32], buffers: &mut LabelBuffers) -> Result<()> {
+                let [values, buffer] = &mut buffers.$buffers;
+                values.clear();
+                values.extend(labels.iter().map(|&label| label as $type));
+                Pyramid::put(self, chunk, values, buffer)
+            }
+
+            fn finish(self: Box<Self>, stage: &Stage<'_>, engine: &Engine) -> Result<()> {
+                Pyramid::finish(*self, stage, engine)
+            }
+        }
+    };
+}
+
+label_image!(u8, u8);
+label_image!(u16, u16);
+label_image!(u32, u32);
+
+/// Begins an image of labels, in the smallest type that holds all of them.
+fn label_image(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    name: &str,
+    store: &StoreWriter,
+) -> Result<Box<dyn LabelImage>> {
     let color = |label: u32| {
         let [red, green, blue] = label_color(label);
         LabelColor { label, rgba: [red, green, blue, 255] }
     };
     let colors: Vec<LabelColor> = sets.labels().iter().copied().map(color).collect();
-    let image = store.labels(&LabelSpec { name, geometry, element: T::TYPE, colors: &colors })?;
-    let stage = engine.stage(&format!("write {name}"), 0);
-    stage.voxels(geometry.domain().volume());
-    write_levels::<T>(&stage, engine, image.levels(), labels, Reduce::Mode)?;
-    stage.finish();
-    Ok(())
-}
-
-/// The label of each voxel's nearest data set; 0 where no source is known.
-pub struct NearestLabels<'a> {
-    /// The nearest source of each voxel.
-    pub sources: &'a dyn BoxSource<u32>,
-    /// What the sources belong to.
-    pub sets: &'a DataSets,
-}
-
-impl<T: Element> BoxSource<T> for NearestLabels<'_> {
-    fn shape(&self) -> [i64; 3] {
-        self.sources.shape()
-    }
-
-    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
-        let mut sources = vec![NO_SOURCE; part.len()];
-        self.sources.read_box(part, &mut sources)?;
-        let label = |&source: &u32| T::from_f64(f64::from(self.sets.label(source)));
-        out.iter_mut().zip(&sources).for_each(|(out, source)| *out = label(source));
-        Ok(())
-    }
-}
-
-/// One coordinate of the point of the nearest source that is closest to the voxel; NaN where no source is known.
-struct ClosestPoint<'a, 'b, P> {
-    solved: &'a Solved<'b, P>,
-    sets: &'a DataSets,
-    triangles: &'a [Triangle],
-    geometry: &'a Geometry,
-    axis: usize,
-}
-
-impl<P: Precision, T: Element> BoxSource<T> for ClosestPoint<'_, '_, P> {
-    fn shape(&self) -> [i64; 3] {
-        self.geometry.shape
-    }
-
-    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
-        let mut sources = vec![NO_SOURCE; part.len()];
-        self.solved.sources.read_box(part, &mut sources)?;
-        let points = &self.sets.positions;
-        for (y, z) in part.rows() {
-            for x in part.lo[0]..part.hi[0] {
-                let at = part.offset_of([x, y, z]);
-                let source = sources[at] as usize;
-                let triangle = || self.triangles.get(source.checked_sub(points.len())?);
-                out[at] = T::from_f64(match points.get(source) {
-                    Some(point) => point[self.axis],
-                    None => triangle().map_or(f64::NAN, |triangle| {
-                        triangle.closest_point(self.geometry.position([x, y, z]))[self.axis]
-                    }),
-                });
-            }
-        }
-        Ok(())
-    }
+    let image = |element| store.labels(&LabelSpec { name, geometry, element, colors: &colors });
+    Ok(match sets.last_label() {
+        0..=0xff => Box::new(Pyramid::<u8>::new(engine, image(u8::TYPE)?, Reduce::Mode)?),
+        0x100..=0xffff => Box::new(Pyramid::<u16>::new(engine, image(u16::TYPE)?, Reduce::Mode)?),
+        _ => Box::new(Pyramid::<u32>::new(engine, image(u32::TYPE)?, Reduce::Mode)?),
+    })
 }

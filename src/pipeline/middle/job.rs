@@ -1,7 +1,6 @@
 //! The whole job of `middle`: solve with source tracking, make labels exact where that was asked for, draw the surfaces
 //! between them, measure and write.
 
-use super::border::Border;
 use super::exact::with_exact_labels;
 use super::surface::{Labelled, draw, held};
 use super::table::csv;
@@ -15,10 +14,7 @@ use crate::kernel::distance::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::source_trees::SourceTrees;
 use crate::kernel::surface::{Measures, Pair};
-use crate::pipeline::distance::{
-    DistanceFound, DistanceSettings, NearestLabels, Needs, measure, solve_sets, tree_bytes, write_fields,
-    write_label_field,
-};
+use crate::pipeline::distance::{DistanceFound, DistanceSettings, Needs, ReadOut, Wanted, solve_sets, tree_bytes};
 use crate::store::NoMesh;
 
 /// Which surface is drawn.
@@ -99,7 +95,6 @@ pub fn middle<P: Precision>(
             solved = with_exact_labels(&stage, &exact, set.grid(), solved)?;
             stage.finish();
         }
-        let found = measure(engine, geometry, sets, &distance, &solved, set)?;
         let stage = engine.stage("surface", 0);
         stage.voxels(geometry.domain().volume());
         let first_labels = std::array::from_fn(|n| sets.labels().get(n).copied().unwrap_or(0));
@@ -114,10 +109,10 @@ pub fn middle<P: Precision>(
             None => draw(&stage, &labelled, settings.surface, &mut NoMesh)?,
         };
         stage.finish();
+        let wanted = Wanted { labels: true, borders: store.is_some(), closest_point: distance.closest_point };
+        let read_out = ReadOut { geometry, sets, solved: &solved, is_signed: distance.signed, wanted };
+        let found = read_out.run(engine, store)?;
         if let Some(store) = store {
-            write_fields(engine, geometry, sets, &distance, &solved, found.max, store)?;
-            let border = Border { labels: NearestLabels { sources: &*solved.sources, sets } };
-            write_label_field(engine, geometry, sets, "border", &border, store)?;
             let path = store.file("meshes/pairs.csv")?;
             std::fs::write(&path, csv(&pairs)).map_err(|e| Error::from_io("cannot write the table", &e).at(&path))?;
         }

@@ -5,7 +5,6 @@
 //! sources -> distance with tracking -> labels -> surfaces between them -> mesh, measures of each pair
 //! ```
 
-mod border;
 mod exact;
 mod job;
 mod surface;

@@ -152,7 +152,7 @@ fn write_fields(
         stage.voxels(geometry.domain().volume());
         let on_grid = window.map(|window| OnGrid { field, window, shape: geometry.shape, beyond });
         let source: &dyn BoxSource<f32> = on_grid.as_ref().map_or(field as _, |on_grid| on_grid as _);
-        write_levels::<f32>(&stage, engine, store.image(group, &spec)?.levels(), source, Reduce::Mean)?;
+        write_levels::<f32>(&stage, engine, store.image(group, &spec)?, source, Reduce::Mean)?;
         stage.finish();
     }
     Ok(())

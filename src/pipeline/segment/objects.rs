@@ -181,7 +181,7 @@ fn draw(
             let group = if several { format!("{name}/object-{label}") } else { name.into() };
             let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
             let stage = engine.stage(&format!("write {name} {label}"), 0);
-            write_levels::<f32>(&stage, engine, store.image(&group, &spec)?.levels(), field, Reduce::Mean)?;
+            write_levels::<f32>(&stage, engine, store.image(&group, &spec)?, field, Reduce::Mean)?;
             stage.finish();
         }
     }

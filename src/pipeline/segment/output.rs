@@ -160,7 +160,7 @@ fn write_labels_as<T: Element>(
             .collect();
         let spec = LabelSpec { name: "segmentation", geometry, element: T::TYPE, colors: &colors };
         let image = store.labels(&spec)?;
-        write_levels::<T>(stage, engine, image.levels(), volume, Reduce::Mode)?;
+        write_levels::<T>(stage, engine, image, volume, Reduce::Mode)?;
     }
     count_labels(stage, geometry, volume)
 }
@@ -187,8 +187,8 @@ fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>
     let stage = engine.stage("write image", 0);
     stage.voxels(geometry.domain().volume());
     let window = Some([image.range.low, image.range.high]);
-    let levels = store.image("", &ImageSpec { name: "image", geometry, element: T::TYPE, window })?;
-    write_levels::<T>(&stage, engine, levels.levels(), &image.bricks, Reduce::Mean)?;
+    let written = store.image("", &ImageSpec { name: "image", geometry, element: T::TYPE, window })?;
+    write_levels::<T>(&stage, engine, written, &image.bricks, Reduce::Mean)?;
     stage.finish();
     Ok(())
 }
