@@ -16,6 +16,7 @@ use strandline::grid::Geometry;
 use strandline::pipeline::distance::Method;
 use strandline::pipeline::motion::Motion;
 use strandline::pipeline::reconstruct::{ReconstructSettings, reconstruct};
+use strandline::store::NoMesh;
 
 fn main() {
     let largest: i64 = std::env::args().skip(1).find_map(|a| a.parse().ok()).unwrap_or(80);
@@ -28,7 +29,7 @@ fn main() {
         let motion = Motion { delta: Some(0.1 * h), ..ReconstructSettings::default().motion };
         let settings = ReconstructSettings { motion, method: Method::FSM, ..ReconstructSettings::default() };
         let started = Instant::now();
-        let ours = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface");
+        let ours = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, &mut NoMesh).expect("a surface");
         let seconds = started.elapsed().as_secs_f64();
         let beta = 1.1 * 0.5 * ours.hole.expect("a hole between points").width;
         let full = PlainSettings {

@@ -14,12 +14,11 @@ use common::clouds::scan;
 use common::lab::Lab;
 use common::plain_reconstruction::{PlainSettings, reconstruct_plainly};
 use strandline::grid::{Geometry, TriangleMesh};
-use strandline::io::ome_zarr::StoreWriter;
-use strandline::io::sources::{Source, read_source};
 use strandline::kernel::surface::PatchIndex;
 use strandline::pipeline::distance::Method;
 use strandline::pipeline::motion::Motion;
 use strandline::pipeline::reconstruct::{ReconstructSettings, reconstruct};
+use strandline::store::NoMesh;
 
 const REPEATS: usize = 3;
 /// In the unit of the cloud, whose body is about two across, like the papers'.
@@ -28,14 +27,9 @@ const SPACING: f64 = 2.0 / 330.0;
 /// Our surface, of a run that is not timed.
 fn our_mesh(grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructSettings) -> TriangleMesh {
     let lab = Lab::new(2);
-    let folder = tempfile::tempdir().expect("a folder");
-    let store = StoreWriter::create(&folder.path().join("out.zarr"), false).expect("a store");
-    reconstruct(&lab.engine, grid, cloud, settings, Some(&store)).expect("a surface");
-    store.finish().expect("a store");
-    match read_source(&folder.path().join("out.zarr/meshes/surface.ply")).expect("a mesh") {
-        Source::Mesh(mesh) => mesh,
-        Source::Cloud(_) => panic!("a surface has triangles"),
-    }
+    let mut mesh = TriangleMesh::default();
+    reconstruct(&lab.engine, grid, cloud, settings, &mut mesh).expect("a surface");
+    mesh
 }
 
 fn main() {
@@ -56,7 +50,7 @@ fn main() {
         for _ in 0..REPEATS {
             let lab = Lab::new(threads);
             let started = Instant::now();
-            let found = reconstruct(&lab.engine, &grid, &cloud, &settings, None).expect("a surface");
+            let found = reconstruct(&lab.engine, &grid, &cloud, &settings, &mut NoMesh).expect("a surface");
             let seconds = started.elapsed().as_secs_f64();
             hole = found.hole.expect("a hole between points").width;
             if seconds < best {

@@ -12,7 +12,8 @@ use super::disk::Disk;
 use super::distance_args::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
 use super::distance_report::{Found, Settings, describe_found};
 use super::distance_sources::{Read, read_sets};
-use super::files::{export_mesh, mesh_format, tell_of_anchor};
+use super::drawing::Drawing;
+use super::files::{mesh_format, tell_of_anchor};
 use super::outputs::Outputs;
 use super::report::{Ran, Report};
 use super::text::{bytes, duration, grouped, number, place, triple};
@@ -20,13 +21,14 @@ use super::{grid, print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
+use crate::io::mesh_ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::distance::Neighbours;
 use crate::kernel::distance::outside::count_outside;
 use crate::kernel::distance::precision::Precision;
 use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, Textbook, distance};
 use crate::pipeline::middle::{LabelMode, MiddleSettings, SurfaceKind, middle};
-use crate::store::Unfinished;
+use crate::store::{MeshSink, Unfinished};
 
 /// A distance that is ready to be computed: all inputs are read and checked.
 struct Job {
@@ -113,6 +115,7 @@ impl Job {
             Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks),
             None => self.settings.needs::<P>(&self.geometry, &self.sets, threads, ranks),
         };
+        let needs = Needs { held: needs.held.saturating_add(self.written_held::<P>()), ..needs };
         let plan = self.plan(&needs);
         if self.args.job.output.dry_run {
             print(&format!("{plan}\n"))?;
@@ -140,25 +143,22 @@ impl Job {
     fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {
         let output = &self.args.job.output;
         let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
-        // A mesh comes out of a store, if only for a while.
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
         let _passes = Unfinished::new(passing.path());
-        let target: Option<PathBuf> = match output.output.path() {
-            Some(path) => Some(path.to_path_buf()),
-            None => mesh.map(|_| passing.path().join("passing.zarr")),
-        };
-        let store = target.as_deref().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
-        let found = self.solve::<P>(engine, store.as_ref())?;
+        let store = output.output.path().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let has_surface = self.middle.is_some();
+        let drawing = Drawing::new(store.as_ref().filter(|_| has_surface), mesh, passing.path())?;
+        let mut ply = drawing.start(|path| PlyWriter::tagged_on_grid(path, &self.geometry))?;
+        let found = self.solve::<P>(engine, store.as_ref(), ply.sink())?;
+        ply.finish()?;
         tell_of_anchor(mesh, &self.geometry, &self.console);
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;
             store.finish()?;
         }
-        if let (Some(mesh), Some(folder)) = (mesh, &target) {
-            export_mesh(&folder.join("meshes/surface.ply"), &self.geometry, mesh)?;
-        }
+        drawing.export(output.output.path(), &self.geometry)?;
         match &output.report {
             Some(path) => self.report(engine, &found).write(path)?,
             None => engine.check()?,
@@ -166,11 +166,16 @@ impl Job {
         Ok(found)
     }
 
-    fn solve<P: Precision>(&self, engine: &Engine, store: Option<&StoreWriter>) -> Result<Found> {
+    fn solve<P: Precision>(
+        &self,
+        engine: &Engine,
+        store: Option<&StoreWriter>,
+        mesh: &mut dyn MeshSink,
+    ) -> Result<Found> {
         let (geometry, sets) = (&self.geometry, &self.sets);
         match self.middle_settings() {
             Some(settings) => {
-                Ok(Found::of_middle(&middle::<P>(engine, geometry, sets, &settings, store)?, sets.count()))
+                Ok(Found::of_middle(&middle::<P>(engine, geometry, sets, &settings, store, mesh)?, sets.count()))
             }
             None => Ok(Found::new(&distance::<P>(engine, geometry, sets, &self.settings, store)?)),
         }
@@ -200,8 +205,7 @@ impl Job {
             ))
         })?;
         let output = self.args.job.output.output.path();
-        let mesh = self.middle.as_ref().is_some_and(|choice| choice.mesh.is_some());
-        let written = if output.is_some() || mesh { self.written() } else { 0 };
+        let written = if output.is_some() { self.written() } else { 0 };
         Disk {
             what: format!("a grid of {} voxels", grouped(self.geometry.domain().volume())),
             scratch: &self.resources.scratch,
@@ -212,6 +216,15 @@ impl Job {
         }
         .check(&self.console)?;
         Ok(window)
+    }
+
+    /// Bytes that are held while the output is written.
+    fn written_held<P: Precision>(&self) -> u64 {
+        if self.args.job.output.output.path().is_none() {
+            return 0;
+        }
+        let settings = DistanceSettings { labels: self.settings.labels || self.middle.is_some(), ..self.settings };
+        settings.written_held::<P>(&self.geometry, &self.sets, self.middle.is_some(), self.resources.threads)
     }
 
     /// Bytes of the output, if nothing of it could be compressed.

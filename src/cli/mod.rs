@@ -12,6 +12,7 @@ mod distance;
 mod distance_args;
 mod distance_report;
 mod distance_sources;
+mod drawing;
 mod files;
 mod grid;
 mod info;

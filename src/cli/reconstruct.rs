@@ -11,7 +11,8 @@ use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::disk::Disk;
 use super::distance_args::GridArgs;
-use super::files::{export_mesh, mesh_format, tell_of_anchor};
+use super::drawing::Drawing;
+use super::files::{mesh_format, tell_of_anchor};
 use super::grid::{asked_grid, check_counts};
 use super::outputs::Outputs;
 use super::reconstruct_args::{CloudGridArgs, ReconstructArgs};
@@ -22,6 +23,7 @@ use super::{print, signals, table};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
+use crate::io::mesh_ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::sources::Source;
 use crate::pipeline::reconstruct::{
@@ -53,7 +55,7 @@ struct Job {
 pub(super) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
     let job = Job::new(args.clone(), typed)?;
     let threads = job.resources.threads as u64;
-    let estimate = estimate(&job.grid, &job.cloud, &job.settings, threads, job.needs_store());
+    let estimate = estimate(&job.grid, &job.cloud, &job.settings, threads, job.writes_fields());
     let plan = job.plan(&estimate);
     if args.output.dry_run {
         print(&format!("{plan}\n"))?;
@@ -151,8 +153,8 @@ impl Job {
     }
 
     /// Fields are written out, or needed for the mesh.
-    fn needs_store(&self) -> bool {
-        self.args.output.output.path().is_some() || self.args.mesh.is_some()
+    fn writes_fields(&self) -> bool {
+        self.args.output.output.path().is_some()
     }
 
     /// Refuses a run that cannot fit memory or disk.
@@ -160,7 +162,7 @@ impl Job {
         let window = Budget { total: self.resources.memory }.window(estimate.held)?;
         // Two fields of the whole box, their coarser levels an eighth each of the one before; far from the points they are
         // constant and take nothing.
-        let written = if self.needs_store() { 8 * estimate.near_voxels.saturating_mul(8) / 7 } else { 0 };
+        let written = if self.writes_fields() { 8 * estimate.near_voxels.saturating_mul(8) / 7 } else { 0 };
         Disk {
             what: format!("a grid with {} voxels near the points", grouped(estimate.near_voxels)),
             scratch: &self.resources.scratch,
@@ -205,17 +207,18 @@ impl Job {
 
     fn solve_and_write(&self, engine: &Engine) -> Result<Reconstruction> {
         let output = &self.args.output;
-        // The mesh comes out of a store, if only for a while.
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
         let _passes = Unfinished::new(passing.path());
-        let target: Option<PathBuf> = match output.output.path() {
-            Some(path) => Some(path.to_path_buf()),
-            None => self.needs_store().then(|| passing.path().join("passing.zarr")),
-        };
-        let store = target.as_deref().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
-        let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, store.as_ref())
+        let store = output.output.path().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let mesh = Drawing::new(store.as_ref(), self.args.mesh.as_deref(), passing.path())?;
+        let mut ply = mesh.start(|path| PlyWriter::on_grid(path, &self.grid))?;
+        let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, ply.sink())
             .map_err(|error| error.at(&self.args.cloud))?;
+        ply.finish()?;
+        if let Some(store) = &store {
+            found.write(engine, store)?;
+        }
         self.tell_lost(&found);
         tell_of_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
         if let Some(store) = store {
@@ -224,9 +227,7 @@ impl Job {
             store.finish()?;
         }
         engine.check()?;
-        if let (Some(mesh), Some(folder)) = (&self.args.mesh, &target) {
-            export_mesh(&folder.join("meshes/surface.ply"), &found.geometry, mesh)?;
-        }
+        mesh.export(output.output.path(), &found.geometry)?;
         if let Some(path) = &output.report {
             self.report(engine, &found).write(path)?;
         }

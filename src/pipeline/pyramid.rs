@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
-use crate::grid::{Box3, BrickGrid, BrickSet};
-use crate::io::ome_zarr::{ImageWriter, LevelWriter};
+use crate::grid::{Box3, BrickGrid, BrickSet, Geometry};
+use crate::io::ome_zarr::{ImageWriter, LevelWriter, shard_bytes};
 use crate::kernel::image::downsample::{self, coarse_box};
-use crate::store::{BoxSink, BoxSource, BrickArray, Element};
+use crate::store::{BoxSink, BoxSource, BrickArray, Element, ElementType};
 
 /// How several voxels become one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,6 +144,18 @@ pub(crate) fn visits_of(domain: Box3, mut edges: Vec<[i64; 3]>, threads: usize) 
 /// Visits for each thread that keep all of them busy to the end.
 const VISITS_PER_THREAD: usize = 8;
 
+/// Bytes that images of these types hold while all of them are written in one visit: chunks that wait for the last of their
+/// shard, and of each thread a chunk as voxels, reduced, as bytes and compressed.
+pub(crate) fn held(geometry: &Geometry, elements: &[ElementType], threads: u64) -> u64 {
+    let chunk = COARSE_EDGE.pow(3) as u64 * 8;
+    let bytes = |element: &ElementType| {
+        let (shard, size) = (shard_bytes(geometry.shape, *element), element.size() as u64);
+        let waiting = threads.saturating_mul(shard).min(geometry.domain().volume().saturating_mul(size));
+        waiting.saturating_add(threads * 4 * chunk * size)
+    };
+    elements.iter().map(bytes).fold(0, u64::saturating_add)
+}
+
 /// Fills all levels of an image from `source`.
 ///
 /// # Errors
@@ -174,9 +186,7 @@ pub fn write_levels<T: Element>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Geometry;
     use crate::io::ome_zarr::{ImageSpec, StoreWriter};
-    use crate::store::ElementType;
 
     #[test]
     fn visits_take_each_chunk_once_shard_by_shard() {

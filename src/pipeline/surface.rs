@@ -1,16 +1,14 @@
 //! The surface u = 1/2 of a solved band as a mesh, with its measures: brick by brick, welded in grid order.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
-use crate::io::mesh_ply::PlyWriter;
 use crate::kernel::surface::{
     Hausdorff, MarchingCubes, Measures, Patch, SurfaceMeasure, Triangle, Welder, cells_of_brick,
 };
-use crate::store::{BoxSource, BrickArray, MeshSink, NoMesh};
+use crate::store::{BoxSource, BrickArray, MeshSink};
 
 /// Bricks whose patches are made in parallel before they are welded in order.
 const BATCH: usize = 256;
@@ -26,27 +24,18 @@ pub struct Drawn {
     pub lost_points: u64,
 }
 
-/// Draws the closed surface of `u`, as a PLY file where `mesh` names one; measures it, and how far `points` lie from
-/// it.
+/// Sends the closed surface of `u` to `mesh`; measures it, and how far `points` lie from it.
 ///
 /// # Errors
-/// When the file cannot be written or the run is interrupted.
+/// When the sink fails or the run is interrupted.
 pub fn draw(
     stage: &Stage<'_>,
     u: &BrickArray<f32>,
     geometry: &Geometry,
     points: &[[f64; 3]],
-    mesh: Option<&Path>,
+    mesh: &mut dyn MeshSink,
 ) -> Result<Drawn> {
-    let measures = match mesh {
-        Some(path) => {
-            let mut mesh = PlyWriter::on_grid(path, geometry)?;
-            let measures = extract(stage, u, geometry, &mut mesh)?;
-            mesh.finish()?;
-            measures
-        }
-        None => extract(stage, u, geometry, &mut NoMesh)?,
-    };
+    let measures = extract(stage, u, geometry, mesh)?;
     let distances = distances_to(stage, u, geometry, points)?;
     let lost_points = distances.iter().flatten().filter(|&&d| d > geometry.max_spacing()).count() as u64;
     Ok(Drawn { measures, hausdorff: Hausdorff::of(distances.into_iter().flatten()), lost_points })

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Element, ElementType, Sample, SamplesMut};
 use crate::error::Result;
-use crate::grid::Box3;
+use crate::grid::{Box3, TriangleMesh};
 
 /// Something from which any box of a volume can be read, from any thread.
 pub trait BoxSource<T: Element>: Sync {
@@ -201,6 +201,18 @@ pub struct MeshBuffer {
 impl MeshSink for MeshBuffer {
     fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
         self.vertices.push(position.map(|v| v as f32));
+        Ok(())
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
+        self.triangles.push(corners);
+        Ok(())
+    }
+}
+
+impl MeshSink for TriangleMesh {
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
+        self.vertices.push(position);
         Ok(())
     }
 

@@ -7,10 +7,12 @@ use std::f64::consts::PI;
 use std::fs;
 
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
+use strandline::io::mesh_ply::PlyWriter;
 use strandline::io::ome_zarr::StoreWriter;
 use strandline::kernel::distance::Neighbours::{All, Faces};
 use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule};
 use strandline::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle};
+use strandline::store::NoMesh;
 
 use crate::common::ball::Bench;
 use crate::common::clouds::{random_cloud, sphere, sphere_by_angles};
@@ -43,7 +45,7 @@ fn settings(method: Method, surface: SurfaceKind, labels: LabelMode, brick: i64)
 /// By VDT, the surface where both distances are equal.
 fn exact(geometry: &Geometry, sets: &DataSets) -> MiddleFound {
     let settings = settings(Method::VDT, SurfaceKind::Exact, LabelMode::Tracked, 32);
-    middle::<f32>(&Lab::new(2).engine, geometry, sets, &settings, None).unwrap()
+    middle::<f32>(&Lab::new(2).engine, geometry, sets, &settings, None, &mut NoMesh).unwrap()
 }
 
 fn cube_and_sphere(steps: u32) -> DataSets {
@@ -133,7 +135,9 @@ fn the_isosurface_of_labels_has_the_figures_of_table_11() {
             let settings = settings(method, SurfaceKind::Labels, LabelMode::Tracked, 32);
             let distance = DistanceSettings { schedule, ..settings.distance };
             let settings = MiddleSettings { distance, ..settings };
-            let found = middle::<f64>(&Lab::new(2).engine, &cube_grid(-0.4, 1.4, h), &sets, &settings, None).unwrap();
+            let found =
+                middle::<f64>(&Lab::new(2).engine, &cube_grid(-0.4, 1.4, h), &sets, &settings, None, &mut NoMesh)
+                    .unwrap();
             assert_eq!(found.distance.unlabelled_voxels, 0, "{}", method.name());
             assert!(found.measures.is_closed() && found.measures.components == 1, "{}", method.name());
             let ours = [found.measures.volume.abs(), found.measures.area];
@@ -166,8 +170,11 @@ fn mesh_of(
 ) -> (TriangleMesh, Vec<[u32; 2]>) {
     let folder = tempfile::tempdir().unwrap();
     let store = StoreWriter::create(&folder.path().join("out.zarr"), false).unwrap();
-    middle::<f32>(&Lab::new(threads).engine, geometry, sets, settings, Some(&store)).unwrap();
-    let bytes = fs::read(store.file("meshes/surface.ply").unwrap()).unwrap();
+    let path = store.file("meshes/surface.ply").unwrap();
+    let mut mesh = PlyWriter::tagged_on_grid(&path, geometry).unwrap();
+    middle::<f32>(&Lab::new(threads).engine, geometry, sets, settings, Some(&store), &mut mesh).unwrap();
+    mesh.finish().unwrap();
+    let bytes = fs::read(path).unwrap();
     tagged(&bytes)
 }
 
@@ -381,7 +388,7 @@ fn fields_of(geometry: &Geometry, sets: &DataSets, settings: &MiddleSettings) ->
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.zarr");
     let store = StoreWriter::create(&path, false).unwrap();
-    middle::<f32>(&Lab::new(2).engine, geometry, sets, settings, Some(&store)).unwrap();
+    middle::<f32>(&Lab::new(2).engine, geometry, sets, settings, Some(&store), &mut NoMesh).unwrap();
     store.finish().unwrap();
     [path.clone(), path.join("labels/nearest"), path.join("labels/border")].map(|path| volume(&path))
 }
@@ -432,7 +439,7 @@ fn check_ties(h: f64, [x, y, z]: [f64; 3], modes: impl Fn(Method) -> Vec<LabelMo
                 let settings = settings(method, SurfaceKind::Exact, labels, 16);
                 let distance = DistanceSettings { schedule, init: Init::Cell, ..settings.distance };
                 let settings = MiddleSettings { distance, ..settings };
-                let found = middle::<f64>(&Lab::new(2).engine, &geometry, &sets, &settings, None).unwrap();
+                let found = middle::<f64>(&Lab::new(2).engine, &geometry, &sets, &settings, None, &mut NoMesh).unwrap();
                 let counts: Vec<(u32, u64)> = found.distance.label_voxels.into_iter().collect();
                 let wanted = [(1, (half + 1) * plane), (2, half * plane)];
                 assert_eq!(counts, wanted, "{} {schedule:?} {order:?} {h}", method.name());

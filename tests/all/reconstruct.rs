@@ -5,13 +5,12 @@ use std::f64::consts::PI;
 
 use strandline::error::Result;
 use strandline::grid::{Geometry, TriangleMesh};
-use strandline::io::ome_zarr::StoreWriter;
-use strandline::io::sources::{Source, read_source};
 use strandline::kernel::surface::PatchIndex;
 use strandline::pipeline::distance::Method;
 use strandline::pipeline::evolve::Stop;
 use strandline::pipeline::motion::Motion;
 use strandline::pipeline::reconstruct::{ReconstructSettings, Reconstruction, grid_for, reconstruct};
+use strandline::store::{BoxSource, NoMesh};
 
 use crate::common::clouds::{grid_around, scan, sphere, sponge};
 use crate::common::lab::Lab;
@@ -21,7 +20,7 @@ use crate::common::random::Random;
 /// With nothing but the cloud given.
 fn by_defaults(cloud: &[[f64; 3]]) -> Result<Reconstruction> {
     let grid = grid_for(cloud, None).expect("more than one place");
-    reconstruct(&Lab::new(2).engine, &grid, cloud, &ReconstructSettings::default(), None)
+    reconstruct(&Lab::new(2).engine, &grid, cloud, &ReconstructSettings::default(), &mut NoMesh)
 }
 
 /// The papers' settings for a spacing (docs/algorithms.md, "Readings and figures").
@@ -52,7 +51,7 @@ fn the_sponge_measures_what_the_papers_scheme_gives() {
     let grid = grid_around(&cloud, h);
     for (delta, volume, mean) in [(0.0, 2.195, 0.0076), (0.025, 1.939, 0.0213), (0.05, 1.839, 0.0359)] {
         let settings = ReconstructSettings { method: Method::FSM, ..as_printed(h, delta) };
-        let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface");
+        let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, &mut NoMesh).expect("a surface");
         let (measures, off) = (found.measures, found.hausdorff.expect("points").mean);
         println!("delta {delta}: volume {} ({volume}), mean {off} ({mean})", measures.volume);
         assert!(measures.is_closed() && measures.components == 1);
@@ -68,7 +67,7 @@ fn the_band_gives_what_the_full_domain_gives() {
     let (cloud, h, delta) = (places(&sponge()), 0.05, 0.025);
     let grid = grid_around(&cloud, h);
     let settings = ReconstructSettings { method: Method::FSM, ..as_printed(h, delta) };
-    let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface");
+    let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, &mut NoMesh).expect("a surface");
     let everywhere = PlainSettings {
         beta: 0.25,
         gamma: f64::INFINITY,
@@ -99,7 +98,8 @@ fn the_sponge_does_not_vanish() {
     let (cloud, h) = (sponge(), 0.05);
     let motion = Motion { delta: Some(0.1), ..ReconstructSettings::default().motion };
     let settings = ReconstructSettings { motion, ..ReconstructSettings::default() };
-    let found = reconstruct(&Lab::new(2).engine, &grid_around(&cloud, h), &cloud, &settings, None).expect("a surface");
+    let found =
+        reconstruct(&Lab::new(2).engine, &grid_around(&cloud, h), &cloud, &settings, &mut NoMesh).expect("a surface");
     println!("{:?}, {:?}", found.measures, found.evolution);
     assert!(found.measures.is_closed() && found.measures.volume > 1.0, "{:?}", found.measures);
 }
@@ -182,16 +182,11 @@ fn a_sheet_stays_as_a_shell() {
     assert!(found.lost_points < cloud.len() as u64 / 100, "{} of {} points", found.lost_points, cloud.len());
 }
 
-/// The surface of a cloud by defaults, as the mesh that is written.
+/// The surface of a cloud by defaults.
 fn mesh_of(grid: &Geometry, cloud: &[[f64; 3]]) -> TriangleMesh {
-    let folder = tempfile::tempdir().expect("a folder");
-    let store = StoreWriter::create(&folder.path().join("out.zarr"), false).expect("a store");
-    reconstruct(&Lab::new(2).engine, grid, cloud, &ReconstructSettings::default(), Some(&store)).expect("a surface");
-    store.finish().expect("a store");
-    match read_source(&folder.path().join("out.zarr/meshes/surface.ply")).expect("a mesh") {
-        Source::Mesh(mesh) => mesh,
-        Source::Cloud(_) => panic!("a surface has triangles"),
-    }
+    let mut mesh = TriangleMesh::default();
+    reconstruct(&Lab::new(2).engine, grid, cloud, &ReconstructSettings::default(), &mut mesh).expect("a surface");
+    mesh
 }
 
 /// A tenth of the points can be missing, and of 100 points moved anywhere in the box none has an effect: the surface
@@ -248,7 +243,7 @@ fn any_method_gives_the_surface() {
     let grid = grid_for(&cloud, None).expect("a spacing");
     for method in Method::all() {
         let settings = ReconstructSettings { method, ..ReconstructSettings::default() };
-        let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface");
+        let found = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, &mut NoMesh).expect("a surface");
         let off = found.hausdorff.expect("points");
         println!("{}: {:?}, {off:?}", method.name(), found.measures);
         assert!((found.measures.volume / (4.0 / 3.0 * PI * 8.0) - 1.0).abs() < 0.02, "{}", method.name());
@@ -261,7 +256,7 @@ fn a_beta_that_leaks_is_named() {
     let cloud = sphere([0.0; 3], 2.0, 400, |_| true);
     let grid = grid_for(&cloud, Some([0.1; 3])).expect("a spacing");
     let settings = ReconstructSettings { beta: Some(0.05), ..ReconstructSettings::default() };
-    let error = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect_err("leaks");
+    let error = reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, &mut NoMesh).expect_err("leaks");
     assert!(error.to_string().contains("--beta 0.05 the start leaks"), "{error}");
 }
 
@@ -272,7 +267,7 @@ fn a_given_beta_finds_the_same_space_and_hole() {
     let grid = grid_around(&cloud, 0.05);
     let found = |beta| {
         let settings = ReconstructSettings { beta, ..ReconstructSettings::default() };
-        reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, None).expect("a surface")
+        reconstruct(&Lab::new(2).engine, &grid, &cloud, &settings, &mut NoMesh).expect("a surface")
     };
     let (automatic, given) = (found(None), found(Some(0.25)));
     // The Sponge has equal gaps on all its sides: any of them is the largest.
@@ -286,13 +281,12 @@ fn threads_ranks_and_memory_change_no_bit() {
     let cloud = sponge();
     let grid = grid_around(&cloud, 0.04);
     let run = |lab: &Lab| {
-        let folder = tempfile::tempdir().expect("a folder");
-        let store = StoreWriter::create(&folder.path().join("out.zarr"), false).expect("a store");
-        let settings = ReconstructSettings::default();
-        reconstruct(&lab.engine, &grid, &cloud, &settings, Some(&store)).expect("a surface");
-        store.finish().expect("a store");
-        let read = |name: &str| std::fs::read(folder.path().join("out.zarr").join(name)).expect("written");
-        (read("meshes/surface.ply"), read("0/c/0/0/0"))
+        let (mut mesh, settings) = (TriangleMesh::default(), ReconstructSettings::default());
+        let found = reconstruct(&lab.engine, &grid, &cloud, &settings, &mut mesh).expect("a surface");
+        let part = found.geometry.domain();
+        let mut u = vec![0.0_f32; part.len()];
+        found.level_set().read_box(&part, &mut u).expect("u");
+        (mesh, u.into_iter().map(f32::to_bits).collect::<Vec<u32>>())
     };
     let first = run(&Lab::new(1));
     let with_ranks = |ranks| {

@@ -158,7 +158,6 @@ mod tests {
     use zarrs::filesystem::FilesystemStore;
 
     use super::*;
-    use crate::error::Error;
 
     fn level(folder: &Path, shape: [i64; 3], element: ElementType) -> LevelWriter {
         let geometry = Geometry { shape, spacing: [1.0; 3], origin: [0.0; 3], unit: None };

@@ -19,4 +19,5 @@ pub use level::LevelWriter;
 pub use metadata::{ImageSpec, LabelColor, LabelSpec};
 pub use pyramid::{LevelPlan, plan_levels};
 pub use read::{ImageReader, StoredLevel};
+pub use shard::shard_bytes;
 pub use store::{ImageWriter, StoreWriter, is_store};

@@ -1,6 +1,6 @@
 //! What a distance will take: memory that must be held, temporary fields, time.
 
-use super::{DistanceSettings, Schedule, Textbook};
+use super::{DistanceSettings, Schedule, Textbook, Wanted};
 use crate::grid::{BrickGrid, DataSets, Geometry};
 use crate::kernel::distance::beside_sources::remembered_bytes;
 use crate::kernel::distance::outside::count_outside;
@@ -67,6 +67,20 @@ impl DistanceSettings {
         let scratch = grid.len().saturating_mul((brick + faces) * element + faces * swept).saturating_add(ghosts);
         let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
         Needs { held, scratch, seconds }
+    }
+
+    /// Bytes that are held while the images are written, beside what the distance takes; `borders` says whether those of
+    /// labels are too.
+    #[must_use]
+    pub fn written_held<P: Precision>(
+        &self,
+        geometry: &Geometry,
+        sets: &DataSets,
+        borders: bool,
+        threads: usize,
+    ) -> u64 {
+        let wanted = Wanted { labels: self.labels, borders, closest_point: self.closest_point };
+        wanted.held::<P>(geometry, sets, threads)
     }
 
     /// What one heap over the whole volume takes, where these settings call for one.

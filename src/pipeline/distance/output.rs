@@ -8,8 +8,8 @@ use crate::grid::{Box3, DataSets, Geometry};
 use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, LevelWriter, StoreWriter};
 use crate::kernel::distance::precision::Precision;
 use crate::kernel::image::palette::label_color;
-use crate::pipeline::pyramid::{Pyramid, Reduce};
-use crate::store::Element;
+use crate::pipeline::pyramid::{Pyramid, Reduce, held};
+use crate::store::{Element, ElementType};
 
 /// What is written beside the distance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,6 +20,27 @@ pub(crate) struct Wanted {
     pub(crate) borders: bool,
     /// Where the nearest source is closest.
     pub(crate) closest_point: bool,
+}
+
+impl Wanted {
+    /// Bytes that are held while these images are written, on so many threads.
+    pub(super) fn held<P: Element>(self, geometry: &Geometry, sets: &DataSets, threads: usize) -> u64 {
+        let coordinate = if geometry.fits_single() { f32::TYPE } else { f64::TYPE };
+        let labels = u64::from(self.labels) + u64::from(self.borders);
+        let mut elements = vec![P::TYPE];
+        elements.extend((0..labels).map(|_| label_type(sets)));
+        elements.extend((0..3 * u64::from(self.closest_point)).map(|_| coordinate));
+        held(geometry, &elements, threads as u64)
+    }
+}
+
+/// The smallest type that holds all labels.
+fn label_type(sets: &DataSets) -> ElementType {
+    match sets.last_label() {
+        0..=0xff => ElementType::U8,
+        0x100..=0xffff => ElementType::U16,
+        _ => ElementType::U32,
+    }
 }
 
 /// The images of a distance on their way into a store.
@@ -195,10 +216,11 @@ fn label_image(
         LabelColor { label, rgba: [red, green, blue, 255] }
     };
     let colors: Vec<LabelColor> = sets.labels().iter().copied().map(color).collect();
-    let image = |element| store.labels(&LabelSpec { name, geometry, element, colors: &colors });
-    Ok(match sets.last_label() {
-        0..=0xff => Box::new(Pyramid::<u8>::new(engine, image(u8::TYPE)?, Reduce::Mode)?),
-        0x100..=0xffff => Box::new(Pyramid::<u16>::new(engine, image(u16::TYPE)?, Reduce::Mode)?),
-        _ => Box::new(Pyramid::<u32>::new(engine, image(u32::TYPE)?, Reduce::Mode)?),
+    let element = label_type(sets);
+    let image = store.labels(&LabelSpec { name, geometry, element, colors: &colors })?;
+    Ok(match element {
+        ElementType::U8 => Box::new(Pyramid::<u8>::new(engine, image, Reduce::Mode)?),
+        ElementType::U16 => Box::new(Pyramid::<u16>::new(engine, image, Reduce::Mode)?),
+        _ => Box::new(Pyramid::<u32>::new(engine, image, Reduce::Mode)?),
     })
 }

@@ -7,7 +7,6 @@ use super::table::csv;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::{DataSets, Geometry};
-use crate::io::mesh_ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::distance::exact_labels::ExactLabels;
 use crate::kernel::distance::labelled_shapes::LabelledShapes;
@@ -15,7 +14,7 @@ use crate::kernel::distance::precision::Precision;
 use crate::kernel::distance::source_trees::SourceTrees;
 use crate::kernel::surface::{Measures, Pair};
 use crate::pipeline::distance::{DistanceFound, DistanceSettings, Needs, ReadOut, Wanted, solve_sets, tree_bytes};
-use crate::store::NoMesh;
+use crate::store::MeshSink;
 
 /// Which surface is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,17 +70,19 @@ pub struct MiddleFound {
     pub pairs: Vec<Pair>,
 }
 
-/// Computes the middle surfaces of `sets` on a grid, distances stored as `P`; `store` gets the fields, the mesh and the
-/// measures, none when it is absent.
+/// Computes the middle surfaces of `sets` on a grid, distances stored as `P`; `mesh` gets the surfaces, `store` the fields
+/// and a table of the measures, none when it is absent.
 ///
 /// # Errors
-/// When there are fewer than two sets, the output cannot be written, scratch runs out, or the run is interrupted.
+/// When there are fewer than two sets, the mesh is not taken, the output cannot be written, scratch runs out, or the run is
+/// interrupted.
 pub fn middle<P: Precision>(
     engine: &Engine,
     geometry: &Geometry,
     sets: &DataSets,
     settings: &MiddleSettings,
     store: Option<&StoreWriter>,
+    mesh: &mut dyn MeshSink,
 ) -> Result<MiddleFound> {
     refuse(sets, settings.surface)?;
     let distance = DistanceSettings { labels: true, ..settings.distance };
@@ -99,15 +100,7 @@ pub fn middle<P: Precision>(
         stage.voxels(geometry.domain().volume());
         let first_labels = std::array::from_fn(|n| sets.labels().get(n).copied().unwrap_or(0));
         let labelled = Labelled { geometry, shapes: &shapes, trees: &trees, sources: &*solved.sources, first_labels };
-        let (measures, pairs) = match store {
-            Some(store) => {
-                let mut mesh = PlyWriter::tagged_on_grid(&store.file("meshes/surface.ply")?, geometry)?;
-                let drawn = draw(&stage, &labelled, settings.surface, &mut mesh)?;
-                mesh.finish()?;
-                drawn
-            }
-            None => draw(&stage, &labelled, settings.surface, &mut NoMesh)?,
-        };
+        let (measures, pairs) = draw(&stage, &labelled, settings.surface, mesh)?;
         stage.finish();
         let wanted = Wanted { labels: true, borders: store.is_some(), closest_point: distance.closest_point };
         let read_out = ReadOut { geometry, sets, solved: &solved, is_signed: distance.signed, wanted };

@@ -1,5 +1,7 @@
 //! The whole job: search what the cloud encloses, move the surface, draw, measure and write it.
 
+use std::fmt;
+
 use super::flat::flat;
 use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
@@ -15,7 +17,7 @@ use crate::pipeline::evolve_ranks::evolve_on_ranks;
 use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::sheets::{Company, hold_sheets};
 use crate::pipeline::surface::{self, Drawn};
-use crate::store::{BoxSource, ElementType};
+use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 
 /// Points farther from the solved surface than so many largest spacings have been left by it.
 const LEFT_VOXELS: f64 = 0.6;
@@ -24,7 +26,6 @@ const LEFT_VOXELS: f64 = 0.6;
 const FLAT_VOXELS: f64 = 0.1;
 
 /// What a reconstruction found.
-#[derive(Clone, Debug)]
 pub struct Reconstruction {
     /// The grid that u is written on.
     pub geometry: Geometry,
@@ -46,20 +47,73 @@ pub struct Reconstruction {
     pub hausdorff: Option<Hausdorff>,
     /// Points farther from the surface than the largest spacing.
     pub lost_points: u64,
+    /// The solved fields.
+    band: Band,
+    /// Where the box that they were solved on lies in the grid, where these are not the same.
+    window: Option<Box3>,
 }
 
-/// Reconstructs the surface of a cloud on a grid, on a box of it that grows as far around the cloud as is needed; `store`
-/// gets the results, none of them when it is absent. Distance and level set are solved by all ranks of the engine, whose
-/// number changes no bit.
+impl fmt::Debug for Reconstruction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { geometry, measures, hausdorff, .. } = self;
+        let mut told = f.debug_struct("Reconstruction");
+        told.field("geometry", geometry)
+            .field("measures", measures)
+            .field("hausdorff", hausdorff)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Reconstruction {
+    /// The segmentation function on the grid: 1 inside, 0 outside, the surface at 1/2.
+    #[must_use]
+    pub fn level_set(&self) -> impl BoxSource<f32> {
+        self.field(&self.band.u, 0.0)
+    }
+
+    /// The distance to the cloud on the grid, physical units, as far as the level set had to know it.
+    #[must_use]
+    pub fn distance(&self) -> impl BoxSource<f32> {
+        self.field(&self.band.distance, self.band.distance.absent(0))
+    }
+
+    fn field<'a>(&self, field: &'a BrickArray<f32>, beyond: f32) -> OnGrid<'a> {
+        let window = self.window.unwrap_or(self.geometry.domain());
+        OnGrid { field, window, shape: self.geometry.shape, beyond }
+    }
+
+    /// Writes the fields.
+    ///
+    /// # Errors
+    /// When the output cannot be written, scratch runs out, or the run is interrupted.
+    pub fn write(&self, engine: &Engine, store: &StoreWriter) -> Result<()> {
+        let geometry = &self.geometry;
+        let farthest = f64::from(self.band.distance.absent(0));
+        let fields: [(&str, &str, &dyn BoxSource<f32>, f64); 2] =
+            [("", "levelset", &self.level_set(), 1.0), ("distance", "distance", &self.distance(), farthest)];
+        for (group, name, field, high) in fields {
+            let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
+            let stage = engine.stage(&format!("write {name}"), 0);
+            stage.voxels(geometry.domain().volume());
+            write_levels::<f32>(&stage, engine, store.image(group, &spec)?, field, Reduce::Mean)?;
+            stage.finish();
+        }
+        Ok(())
+    }
+}
+
+/// Reconstructs the surface of a cloud on a grid, on a box of it that grows as far around the cloud as is needed; `mesh` gets
+/// the surface. Distance and level set are solved by all ranks of the engine, whose number changes no bit.
 ///
 /// # Errors
-/// When the cloud encloses nothing, the surface vanishes, the output cannot be written, scratch runs out, or the run is interrupted.
+/// When the cloud encloses nothing, the surface vanishes, the mesh is not taken, scratch runs out, or the run is
+/// interrupted.
 pub fn reconstruct(
     engine: &Engine,
     grid: &Geometry,
     cloud: &[[f64; 3]],
     settings: &ReconstructSettings,
-    store: Option<&StoreWriter>,
+    mesh: &mut dyn MeshSink,
 ) -> Result<Reconstruction> {
     let search = Search {
         grid,
@@ -101,19 +155,13 @@ pub fn reconstruct(
     stage.finish();
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
-    let mesh = store.map(|store| store.file("meshes/surface.ply")).transpose()?;
-    let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh.as_deref())?;
+    let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh)?;
     stage.finish();
     if measures.triangles == 0 || lost_points == cloud.len() as u64 {
         return Err(vanished(settings, grid, larger_beta));
     }
-    let written = if settings.keeps_grid { grid.clone() } else { geometry };
-    if let Some(store) = store {
-        let window = settings.keeps_grid.then_some(window);
-        write_fields(engine, &written, window, &band, store)?;
-    }
     Ok(Reconstruction {
-        geometry: written,
+        geometry: if settings.keeps_grid { grid.clone() } else { geometry },
         beta,
         hole,
         spaces,
@@ -123,6 +171,8 @@ pub fn reconstruct(
         measures,
         hausdorff,
         lost_points,
+        band,
+        window: settings.keeps_grid.then_some(window),
     })
 }
 
@@ -132,30 +182,6 @@ fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]]
     let is_lost = |(_, off): &(u32, &Option<f64>)| off.is_some_and(|off| off > LEFT_VOXELS * geometry.max_spacing());
     let lost: Vec<u32> = (0..).zip(&off).filter(is_lost).map(|(point, _)| point).collect();
     Ok(hold_sheets(geometry, cloud, &lost, Company::AT_THE_END, band))
-}
-
-/// Writes the fields on a grid: that of the band, or with a window one in which the band has that box.
-fn write_fields(
-    engine: &Engine,
-    geometry: &Geometry,
-    window: Option<Box3>,
-    band: &Band,
-    store: &StoreWriter,
-) -> Result<()> {
-    let farthest = f64::from(band.distance.absent(0));
-    for (group, name, field, high, beyond) in [
-        ("", "levelset", &band.u, 1.0, 0.0),
-        ("distance", "distance", &band.distance, farthest, band.distance.absent(0)),
-    ] {
-        let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
-        let stage = engine.stage(&format!("write {name}"), 0);
-        stage.voxels(geometry.domain().volume());
-        let on_grid = window.map(|window| OnGrid { field, window, shape: geometry.shape, beyond });
-        let source: &dyn BoxSource<f32> = on_grid.as_ref().map_or(field as _, |on_grid| on_grid as _);
-        write_levels::<f32>(&stage, engine, store.image(group, &spec)?, source, Reduce::Mean)?;
-        stage.finish();
-    }
-    Ok(())
 }
 
 /// What is said of a cloud that no setting gives an inside.

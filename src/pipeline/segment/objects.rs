@@ -9,6 +9,7 @@ use super::survey::{Looking, Outlined, Trust, left_out_of, trust};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
 use crate::grid::{Geometry, digits};
+use crate::io::mesh_ply::PlyWriter;
 use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::Hausdorff;
 use crate::pipeline::cell_needs::SOLVE_BYTES;
@@ -16,7 +17,7 @@ use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
 use crate::pipeline::vicinity::voxel_bounds;
-use crate::store::{Element, ElementType};
+use crate::store::{Element, ElementType, NoMesh};
 
 /// An object that could not be solved.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -165,8 +166,16 @@ fn draw(
     let stage = engine.stage(&format!("surface {label}"), 0);
     let name = if several { format!("meshes/object-{label}.ply") } else { "meshes/surface.ply".into() };
     let mesh = store.map(|store| store.file(&name)).transpose()?;
-    let Drawn { measures, hausdorff, lost_points } =
-        surface::draw(&stage, u, geometry, &marks.contours.concat(), mesh.as_deref())?;
+    let points = marks.contours.concat();
+    let Drawn { measures, hausdorff, lost_points } = match &mesh {
+        Some(path) => {
+            let mut ply = PlyWriter::on_grid(path, geometry)?;
+            let drawn = surface::draw(&stage, u, geometry, &points, &mut ply)?;
+            ply.finish()?;
+            drawn
+        }
+        None => surface::draw(&stage, u, geometry, &points, &mut NoMesh)?,
+    };
     stage.voxels(solution.band_voxels);
     stage.finish();
     let left = check_left(marks, solution, measures.triangles, settings);
