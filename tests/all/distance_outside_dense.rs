@@ -58,8 +58,12 @@ fn scenes() -> Vec<(&'static str, DataSets, bool)> {
     let random = &mut Random(11);
     let scene = |parts: &[&[[f64; 3]]], meshes: &[TriangleMesh]| {
         let mut sets = DataSets::default();
-        parts.iter().for_each(|points| sets.add_cloud(points));
-        meshes.iter().for_each(|mesh| sets.add_mesh(mesh));
+        for points in parts {
+            sets.add_cloud(points);
+        }
+        for mesh in meshes {
+            sets.add_mesh(mesh);
+        }
         sets
     };
     let dense = points_beside(random, 50, 0.3);

@@ -145,7 +145,8 @@ fn shapes_that_single_precision_has_rounded_are_told() {
         for n in 0..8 {
             let place: [f64; 3] = std::array::from_fn(|a| corner(n)[a] + FAR[0][a]);
             let [x, y, z] = if kind == "float" { place.map(|x| f64::from(x as f32)) } else { place };
-            text += &format!("{x} {y} {z}\n");
+            text.extend([x, y, z].map(|v| format!("{v} ")));
+            text.push('\n');
         }
         text + quads
     };
@@ -166,7 +167,8 @@ fn narrow_bodies_are_measured_in_full() {
     let corners = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 4], [0, 4]];
     let vertices =
         |z: f64| corners.map(|[x, y]| format!("v {} {} {z}\n", 1e-9 * f64::from(x), 1e-9 * f64::from(y))).concat();
-    let sides: String = (1..7).map(|n| format!("f {n} {} {} {}\n", n % 6 + 1, n % 6 + 7, n + 6)).collect();
+    let sides: Vec<String> = (1..7).map(|n| format!("f {n} {} {} {}\n", n % 6 + 1, n % 6 + 7, n + 6)).collect();
+    let sides = sides.concat();
     bench.write("l.obj", &format!("{}{}f 6 5 4 3 2 1\nf 7 8 9 10 11 12\n{sides}", vertices(0.0), vertices(2.0)));
     // Area 7 and circumference 16 of the L, times its height.
     assert!(alike(measured(&bench, "l.obj"), [14e-18, 32e-9 + 14e-18], 1e-9), "{:?}", measured(&bench, "l.obj"));

@@ -32,13 +32,13 @@ fn outlines_that_leave_much_open_are_told() {
     let marks = ball.marks(1);
     let whole = said(&marks);
     assert!(!whole.contains("are open") && !whole.contains("one outline"), "{whole}");
-    let first: String = marks.lines().take(24).map(|line| format!("{line}\n")).collect();
+    let first = marks.lines().take(24).collect::<Vec<_>>().join("\n") + "\n";
     assert!(said(&first).contains("object 1 has one outline"));
     // Half of the marks of slices 6 and 8: 13 of 24 around each, whose ends are a diameter apart.
     let of = |line: &str, slice: &str| line.split(',').nth(1) == Some(slice);
     let half = |slice| marks.lines().filter(move |line| of(line, slice)).take(13);
     let rest = marks.lines().filter(|line| !of(line, "6") && !of(line, "8"));
-    let halves: String = rest.chain(half("6")).chain(half("8")).map(|line| format!("{line}\n")).collect();
+    let halves = rest.chain(half("6")).chain(half("8")).collect::<Vec<_>>().join("\n") + "\n";
     let open = said(&halves);
     assert!(open.contains("outlines of object 1 are open (6, 8)"), "{open}");
 }

@@ -244,7 +244,9 @@ impl Rows {
         let mut form = columns.form;
         if form == Form::ImageJ && times.iter().min().is_some_and(|&first| first < 0) {
             // ImageJ counts frames from 1: a table with a frame 0 is another program's.
-            times.iter_mut().for_each(|time| *time += 1);
+            for time in &mut times {
+                *time += 1;
+            }
             form = Form::Named;
         }
         if columns.form == Form::NapariShapes {

@@ -41,24 +41,22 @@ pub(super) fn read(
         }
         number += 1;
     }
-    match counted.filter(|&counted| (rows.len() as u64) < counted) {
-        Some(counted) => Err(Error::input(format!(
+    if let Some(counted) = counted.filter(|&counted| (rows.len() as u64) < counted) {
+        return Err(Error::input(format!(
             "says that it has {counted} points and ends after {}: is it cut off?",
             rows.len()
-        ))),
-        None => {
-            let lines = rows.len() as u64;
-            let mut file = rows.finish();
-            let all_counted = |[vertices, faces]: &[u64; 2]| vertices.saturating_add(*faces).saturating_add(1) == lines;
-            if let Some([vertices, faces]) = counts.filter(all_counted) {
-                file.notes.push(format!(
-                    "all of its {lines} lines are taken as points, the first one too, though it counts the others as OFF \
-                     does, {vertices} vertices and {faces} faces; if it is such a file, write OFF above it"
-                ));
-            }
-            Ok(file)
-        }
+        )));
     }
+    let lines = rows.len() as u64;
+    let mut file = rows.finish();
+    let all_counted = |[vertices, faces]: &[u64; 2]| vertices.saturating_add(*faces).saturating_add(1) == lines;
+    if let Some([vertices, faces]) = counts.filter(all_counted) {
+        file.notes.push(format!(
+            "all of its {lines} lines are taken as points, the first one too, though it counts the others as OFF does, \
+             {vertices} vertices and {faces} faces; if it is such a file, write OFF above it"
+        ));
+    }
+    Ok(file)
 }
 
 /// The fewest vertices that are taken for a count of lines: of fewer points the first one may happen to tell how many

@@ -138,7 +138,7 @@ const LONGEST: f64 = 100.0;
 
 /// The unit of a size along z that names none, beside those of x and y in a unit that the tags of a file name: the same,
 /// but for a size that only micrometres, in which microscopes count, bring anywhere near them.
-pub(super) fn of_bare_size<'a>(z: f64, xy: [Option<f64>; 2], unit: &'a str) -> &'a str {
+pub(super) fn of_bare_size(z: f64, xy: [Option<f64>; 2], unit: &str) -> &str {
     let (Unit::Length(_, metres), Some(across)) = (parse(unit), xy[0].or(xy[1])) else { return unit };
     let is_near = |one: f64| {
         let ratio = (z * one / (across * metres)).abs();

@@ -143,7 +143,9 @@ mod tests {
 
     fn all(parts: &[TriangleMesh]) -> TriangleMesh {
         let mut sets = DataSets::default();
-        parts.iter().for_each(|part| sets.add_mesh(part));
+        for part in parts {
+            sets.add_mesh(part);
+        }
         sets.mesh
     }
 

@@ -168,7 +168,7 @@ fn values<T: Sample>(stack: &dyn Stack, part: &Box3) -> Result<()> {
 
 /// Reads an image of Zarr as `info`, `segment` and `middle` do.
 fn image(folder: &Path) -> Result<()> {
-    let described = zarr_image::describe(folder).map(drop);
+    let described = zarr_image::describe(folder, None).map(drop);
     worst([described, volume(folder), labels_of(folder).and_then(|(path, _)| labels(&path))])
 }
 
