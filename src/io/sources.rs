@@ -135,8 +135,16 @@ pub fn describe(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>)>
 /// As [`read_source`].
 pub fn read_parts(path: &Path) -> Result<(Source, Option<PointFile>, Vec<String>)> {
     let read_parts = || {
-        let mut input = Input::open(path, &format!("points or a mesh ({})", names()))?;
-        let source = read(&mut input)?;
+        let open = || Input::open(path, &format!("points or a mesh ({})", names()));
+        let mut input = open()?;
+        let is_counted = off::starts_with_counts(input.head()?) && path.is_file();
+        let source = read(&mut input).or_else(|error| {
+            // What tells a mesh without its first word from points may lie beyond the bytes that are looked at.
+            let mut again = if is_counted { open()? } else { return Err(error) };
+            let mesh = off::read(&mut again).map_err(|_| error)?;
+            input = again;
+            Ok::<_, Error>(mesh)
+        })?;
         let positions = match &source {
             Source::Cloud(cloud) => &cloud.positions,
             Source::Mesh(mesh) => &mesh.vertices,

@@ -4,7 +4,7 @@
 //! is left aside as colours of faces are. Comments start at `#`. One vertex or face a line; the counts may stand on the
 //! first line, also without a blank before them (as in `ModelNet`). Coordinates are f64. Four or n dimensions and the
 //! binary form are refused. The word may be missing, as the manual has it: then counts, vertices and faces must follow each
-//! other as they do in no table of points, within the bytes that are looked at, and it is told.
+//! other as they do in no table of points, and it is told.
 
 use std::io::BufRead;
 
@@ -28,6 +28,13 @@ fn has_keyword(head: &[u8]) -> bool {
     let text = &head[..head.iter().position(|&byte| byte == 0).unwrap_or(head.len())];
     let line = first_line(text).or_else(|| first_line(text.split(|&byte| byte == b'\n').next()?));
     line.is_some_and(|line| line.split_whitespace().next().is_some_and(|word| keyword(word).is_some()))
+}
+
+/// True for what starts with a line of two or three counts, as OFF without its first word does.
+pub(in crate::io) fn starts_with_counts(head: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(head);
+    let mut lines = text.split('\n').map(|line| line.split('#').next().unwrap_or_default().trim());
+    lines.find(|line| !line.is_empty()).and_then(numbers_of).is_some_and(|counts| !counts.contains(&0))
 }
 
 /// True for two or three counts, as many lines of three numbers or more as the first says, and nothing but faces after

@@ -159,6 +159,9 @@ impl Block {
 
     /// Looks a tree's sources up, none farther than `farthest`. Each source has a label.
     pub(super) fn look<T: Source>(&mut self, tree: &RTree<T>, farthest: f64, label: impl Fn(u32) -> u32) {
+        if self.within.iter().all(|within| *within < 0.0) {
+            return;
+        }
         for within in &mut self.within {
             *within = within.min(farthest * farthest * ROUNDING);
         }

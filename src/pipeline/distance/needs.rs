@@ -30,8 +30,9 @@ const BRICK_BYTES: u64 = 96;
 const RANK_BYTES: u64 = 16;
 /// Bytes kept of each source: its position, twice, its place in a brick's list, its corners.
 const SOURCE_BYTES: u64 = 160;
-/// Bytes of a point and of a triangle in their trees.
-const TREE_BYTES: [u64; 2] = [48, 240];
+/// Bytes of a point and of a triangle in their trees: a node is as large as what a parent keeps of itself, 72 bytes, or as
+/// its triangle, and there are six to a parent.
+const TREE_BYTES: [u64; 2] = [96, 240];
 /// Seconds for a voxel on one thread.
 const VOXEL_SECONDS: f64 = 30e-9;
 
