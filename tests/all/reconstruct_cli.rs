@@ -5,6 +5,8 @@
 use std::fs;
 
 use serde_json::json;
+use strandline::io::sources::{Source, read_source};
+use strandline::kernel::distance::winding_number::WindingTree;
 
 use crate::common::ball::Bench;
 use crate::common::clouds::sphere;
@@ -153,9 +155,18 @@ fn fields_lie_on_the_grid_that_is_asked_for() {
         [&json!([31, 30, 29]), &json!([-0.5, -1.5, -2.5]), &json!([0.25, 0.25, 0.25])]
     );
     assert_eq!(whole.len(), 29 * 30 * 31);
-    let inside = whole.iter().filter(|&&u| u > 0.5).count() as f64 / 64.0;
+    // The surface is where u is 1/2: voxels above that lie inside of it and no others do, up to the rounding of its vertices.
     let told = report["result"]["volume"].as_f64().unwrap();
-    assert!((inside / told - 1.0).abs() < 0.03 && (told / 33.51 - 1.0).abs() < 0.05, "{inside}, {told}");
+    let Source::Mesh(surface) = read_source(&bench.path("out/whole.zarr/meshes/surface.ply")).unwrap() else {
+        panic!("no mesh")
+    };
+    let tree = WindingTree::new(&surface);
+    let at = |n: usize| [n % 29, n / 29 % 30, n / 29 / 30];
+    for (n, &u) in whole.iter().enumerate().filter(|(_, u)| (*u - 0.5).abs() > 1e-3) {
+        let [x, y, z] = at(n).map(|v| 0.25 * v as f64);
+        let is_inside = tree.winding_number([x - 2.5, y - 1.5, z - 0.5]) > 0.5;
+        assert_eq!(u > 0.5, is_inside, "{:?}: {u}", at(n));
+    }
     assert!(report["notes"].as_array().unwrap().is_empty(), "{}", report["notes"]);
     // The surface is the same, whatever of it the fields show; they are the same where both grids have a voxel.
     let (half, report) = run("half", "--origin -2.5,-1.5,-0.5 --shape 14,60,31");
@@ -168,8 +179,10 @@ fn fields_lie_on_the_grid_that_is_asked_for() {
     // The papers' grid: room on every side, one voxel more than it needs.
     let (_, report) = run("padded", "--padding 1");
     assert_eq!(report["grid"]["shape_zyx"], json!([25, 25, 25]));
+    // The lowest of 1500 points lies a 1500th part of the radius above the pole (`clouds::sphere`).
     let origin = report["grid"]["origin_zyx"][0].as_f64().unwrap();
-    assert!((origin - 0.0).abs() < 0.01, "{origin}");
+    let lowest = 3.0 - 2.0 * (1.0 - 1.0 / 1500.0);
+    assert!((origin - (lowest - 1.0)).abs() < 1e-12, "{origin}");
     for (flags, word) in [("--origin 0,0,0", "--shape"), ("--padding -1", "--padding is -1")] {
         let text = bench.run(&format!("reconstruct ball.xyz -o none {flags}"));
         let said = String::from_utf8_lossy(&text.stderr).into_owned();
