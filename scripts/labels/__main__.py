@@ -89,8 +89,8 @@ def main():
         other = sum(median[beside].get(stage, 0.0) for stage in stages)
         return [name, *(f"{part:.2f}" if part else "" for part in parts), f"{sum(parts):.2f}", f"{sum(parts) / other:.2f}"]
 
-    solve = ("distance", "measure")
-    label = ("distance", "exact labels", "measure")
+    solve = ("distance", "read out")
+    label = ("distance", "exact labels", "read out")
     costs = [
         row(f"{method} {name}", (method, name), solve, (method, "distance"))
         for method in ("vdt", "fsm")
@@ -106,16 +106,16 @@ def main():
     text = (
         f"## Labels: five clouds of {POINTS:,} points, {n}^3\n\n"
         f"{page.circumstances(program)}\n\n"
-        f"Medians of {settings.rounds} rounds in which all take turns, seconds, two threads (scipy has one, and one round). `measure` looks\n"
+        f"Medians of {settings.rounds} rounds in which all take turns, seconds, two threads (scipy has one, and one round). `read out` looks\n"
         "at every voxel once more: second look, largest distance, voxels of each label. No field is written. The others take\n"
         "the points rounded to voxels, rounding not timed.\n\n"
-        + page.table(["", "distance", "measure", "both", "beside the first"], costs[:2])
+        + page.table(["", "distance", "read out", "both", "beside the first"], costs[:2])
         + "\n\n"
-        + page.table(["", "distance", "measure", "both", "beside the first"], costs[2:])
+        + page.table(["", "distance", "read out", "both", "beside the first"], costs[2:])
         + "\n\n"
-        + page.table(["middle", "distance", "exact labels", "measure", "all", "beside the first"], modes)
+        + page.table(["middle", "distance", "exact labels", "read out", "all", "beside the first"], modes)
         + "\n\n"
-        + page.table(["", "distance", "measure", "both", "beside the first"], peers)
+        + page.table(["", "distance", "read out", "both", "beside the first"], peers)
     )
     page.write_part(page.ROOT / "docs" / "performance.md", "scripts/bench_labels", text)
     print(text)

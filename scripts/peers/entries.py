@@ -137,7 +137,7 @@ class OwnEntry:
 
     def remark_reading(self, run):
         if self.key in TRACKING:
-            reading = run.stage("measure")["seconds"]
+            reading = run.stage("read out")["seconds"]
             self.note = f"keeps the nearest source; reading all distances out of it took {reading:.2g} s more"
 
     def at_rest(self, case):

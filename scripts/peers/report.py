@@ -19,7 +19,7 @@ than 20 s in all is not run again). Each run is a process of its own, held on on
 its turn before any has its second. Before each call as much memory as most of them take is touched and freed, so that
 none waits for the host of a virtual machine to hand it out. Ours is everything from the sources in memory to the finished field,
 initialisation included: the stages `sort sources` and `distance` of the report; where that field is the nearest
-source, the remarks say how long reading the distances takes (the stage `measure`). The others' is the call, after
+source, the remarks say how long reading the distances takes (the stage `read out`). The others' is the call, after
 imports and a first call on a small input, with the input in memory in the form that the program wants; of calls
 shorter than a second or so the best of three in the process (ours has one). B/voxel is the largest resident set
 during the call less that before the input was read: input and result count. ns/voxel is that of the faster column.

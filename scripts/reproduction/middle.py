@@ -54,7 +54,7 @@ def costs(setting):
             printed.append(f"{plain:.3f} {labelled:.3f} ({100 * (labelled / plain - 1):+.0f} %)")
             init = ["--init", "contiguous" if method == "fsm" else "cell"]
             times = [setting.run(method, files, grid, [*init, *flags, *DEFAULT]) for flags in ([], ["--labels"])]
-            plain, labelled = (time.seconds + time.stage("measure")["seconds"] for time in times)
+            plain, labelled = (time.seconds + time.stage("read out")["seconds"] for time in times)
             ours.append(f"{plain:.3f} {labelled:.3f} ({100 * (labelled / plain - 1):+.0f} %)")
         rows += [[grid, f"{grid.spacing:g}", "paper", *printed], [None, None, "ours", *ours]]
     return (
