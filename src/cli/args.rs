@@ -1,12 +1,12 @@
 //! What was typed: the flags, in groups that commands share. What they mean together is decided in `config`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::distance_args::DistanceJobArgs;
 use super::middle_args::MiddleArgs;
-use super::pages_args::PagesArgs;
+use super::pages_args::{PagesArgs, VolumeArgs};
 use super::reconstruct_args::ReconstructArgs;
 use super::values::{
     Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
@@ -85,23 +85,16 @@ pub(super) struct SegmentArgs {
     pub(super) resources: ResourceArgs,
     #[command(flatten)]
     pub(super) output: OutputArgs,
+    #[command(flatten)]
+    pub(super) drawn: DrawnArgs,
 }
 
 /// Where the image lies and which part of it counts.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Image")]
 pub(super) struct ImageArgs {
-    /// Channel of the file, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) channel: u32,
-    /// Time point of the file, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) time: u32,
-    /// Resolution of an OME-Zarr image or of a TIFF with smaller copies of its pages, 0 the finest
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) level: u32,
     #[command(flatten)]
-    pub(super) pages: PagesArgs,
+    pub(super) volume: VolumeArgs,
     /// Part of the image in voxels, ends excluded; an end left out is the image's [default: all of it]
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = parse_crop, allow_hyphen_values = true)]
     pub(super) crop: Option<Crop>,
@@ -231,13 +224,6 @@ pub(super) struct OutputArgs {
     /// Write the report once more, as a file of its own
     #[arg(long, value_name = "FILE.json")]
     pub(super) report: Option<PathBuf>,
-    /// Write the surface once more, in a file of its own, in the format of its name; with several objects FILE-1.ply,
-    /// FILE-2.ply, ...
-    #[arg(long, value_name = "FILE.ply|obj|stl|vtp")]
-    pub(super) mesh: Option<PathBuf>,
-    /// Draw three slices through the objects with their outlines
-    #[arg(long, value_name = "FILE.png")]
-    pub(super) picture: Option<PathBuf>,
     /// Read the inputs, print what a run would take, and stop
     #[arg(long)]
     pub(super) dry_run: bool,
@@ -247,6 +233,26 @@ pub(super) struct OutputArgs {
     /// Print settings and each stage as it ends
     #[arg(short, long)]
     pub(super) verbose: bool,
+}
+
+impl OutputArgs {
+    /// The store's path, where there is to be one.
+    pub(super) fn store(&self) -> Option<&Path> {
+        self.output.path()
+    }
+}
+
+/// What is drawn of the objects beside the store.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(super) struct DrawnArgs {
+    /// Write the surface once more, in a file of its own, in the format of its name; with several objects FILE-1.ply,
+    /// FILE-2.ply, ...
+    #[arg(long, value_name = "FILE.ply|obj|stl|vtp")]
+    pub(super) mesh: Option<PathBuf>,
+    /// Draw three slices through the objects with their outlines
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) picture: Option<PathBuf>,
 }
 
 /// Segment the built-in stack of an early Arabidopsis embryo with default settings.

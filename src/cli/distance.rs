@@ -71,12 +71,12 @@ impl Job {
         let output = &args.job.output;
         let outputs = Outputs {
             inputs: args.sources.iter().chain(&args.job.grid.like).map(PathBuf::as_path).collect(),
-            store: output.output.path(),
+            store: output.store(),
             files: [&output.report, mesh].into_iter().flatten().map(PathBuf::as_path).collect(),
             overwrite: output.overwrite,
         };
         outputs.check()?;
-        let resources = config::resources(&args.job.resources, args.job.output.output.path())?;
+        let resources = config::resources(&args.job.resources, args.job.output.store())?;
         let console = Arc::new(Console::new(Voice::of(args.job.output.quiet, args.job.output.verbose)));
         let mut notes = Vec::new();
         let given = grid::given(&args.job.grid, &mut notes)?;
@@ -133,7 +133,7 @@ impl Job {
         if !self.args.job.output.quiet {
             let output = &self.args.job.output;
             let [labels_in, pairs_in] = ["", "meshes/pairs.csv"]
-                .map(|table| table::whole_in(output.output.path().is_some(), output.report.is_some(), table));
+                .map(|table| table::whole_in(output.store().is_some(), output.report.is_some(), table));
             let told = describe_found(&found, &labels_in, &pairs_in);
             print(&format!("{}\n{told}", table::stages(&engine.reports())))?;
         }
@@ -146,7 +146,7 @@ impl Job {
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
         let _passes = Unfinished::new(passing.path());
-        let store = output.output.path().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let store = output.store().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
         let has_surface = self.middle.is_some();
         let drawing = Drawing::new(store.as_ref().filter(|_| has_surface), mesh, passing.path())?;
         let mut ply = drawing.start(|path| PlyWriter::tagged_on_grid(path, &self.geometry))?;
@@ -158,7 +158,7 @@ impl Job {
             engine.check()?;
             store.finish()?;
         }
-        drawing.export(output.output.path(), &self.geometry)?;
+        drawing.export(output.store(), &self.geometry)?;
         match &output.report {
             Some(path) => self.report(engine, &found).write(path)?,
             None => engine.check()?,
@@ -204,7 +204,7 @@ impl Job {
                 bytes(needs.scratch)
             ))
         })?;
-        let output = self.args.job.output.output.path();
+        let output = self.args.job.output.store();
         let written = if output.is_some() { self.written() } else { 0 };
         Disk {
             what: format!("a grid of {} voxels", grouped(self.geometry.domain().volume())),
@@ -220,7 +220,7 @@ impl Job {
 
     /// Bytes that are held while the output is written.
     fn written_held<P: Precision>(&self) -> u64 {
-        if self.args.job.output.output.path().is_none() {
+        if self.args.job.output.store().is_none() {
             return 0;
         }
         let settings = DistanceSettings { labels: self.settings.labels || self.middle.is_some(), ..self.settings };
@@ -261,7 +261,7 @@ impl Job {
         format!(
             "{} points and {} triangles in {} data sets, {}\n\
              grid {x} x {y} x {z} (x, y, z), {} voxels, spacing {}, origin {}\n\
-             about {}; memory up to {}, of which {} must be held; {} of temporary fields, in memory or in {}",
+             about {}; memory up to {}, at least {}; {} of temporary fields, in memory or in {}",
             grouped(self.sets.positions.len() as u64),
             grouped(self.sets.mesh.len() as u64),
             self.sets.count(),
@@ -271,7 +271,7 @@ impl Job {
             place(g.origin, g.min_spacing()),
             duration(needs.seconds),
             bytes(self.resources.memory),
-            bytes(needs.held),
+            bytes(Budget::least(needs.held)),
             bytes(needs.scratch),
             self.resources.scratch.display()
         )

@@ -4,11 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::args::{PointsIn, ResourceArgs};
-use super::pages_args::PagesArgs;
-use super::values::{
-    Output, parse_method, parse_neighbours, parse_spacing, parse_triple, parse_whole_triple, solvers_help,
-};
+use super::args::{OutputArgs, ResourceArgs};
+use super::grid_args::GridArgs;
+use super::values::{parse_method, parse_neighbours, solvers_help};
 use crate::kernel::distance::Neighbours;
 use crate::pipeline::distance::Method;
 
@@ -36,47 +34,7 @@ pub(super) struct FieldJobArgs {
     #[arg(long, value_name = "N", default_value_t = 1, hide = true)]
     pub(super) ranks: usize,
     #[command(flatten)]
-    pub(super) output: FieldOutputArgs,
-}
-
-/// Where the grid lies.
-#[derive(Clone, Debug, Default, Args)]
-#[command(next_help_heading = "Grid")]
-pub(super) struct GridArgs {
-    /// Distance between voxel centres, one for all axes or three [default: 1/256 of the longest side]
-    #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
-    pub(super) spacing: Option<[f64; 3]>,
-    /// Room around the sources, a length [default: 1/6 of their largest extent]
-    #[arg(long, value_name = "D", allow_hyphen_values = true, conflicts_with_all = ["origin", "shape", "like"])]
-    pub(super) padding: Option<f64>,
-    /// Centre of the first voxel; with --shape
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_triple, allow_hyphen_values = true, requires = "shape")]
-    pub(super) origin: Option<[f64; 3]>,
-    /// Voxels along each axis; with --origin and --spacing
-    #[arg(long, value_name = "NX,NY,NZ", value_parser = parse_whole_triple, allow_hyphen_values = true,
-          requires_all = ["origin", "spacing"])]
-    pub(super) shape: Option<[i64; 3]>,
-    /// The grid of this image: TIFF stack, folder of slices or OME-Zarr; that of a label volume is taken without being asked for
-    #[arg(long, value_name = "IMAGE", conflicts_with_all = ["spacing", "origin", "shape"])]
-    pub(super) like: Option<PathBuf>,
-    /// Distance between voxel centres of label volumes and of --like, in place of what the file says
-    #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
-    pub(super) image_spacing: Option<[f64; 3]>,
-    /// Channel of label volumes, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) channel: u32,
-    /// Time point of label volumes, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) time: u32,
-    /// Resolution of label volumes and of --like (OME-Zarr, TIFF with smaller copies of its pages), 0 the finest
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) level: u32,
-    #[command(flatten)]
-    pub(super) pages: PagesArgs,
-    /// What the numbers of points are: voxel indices of the grid of --like (or of --origin, --shape and --spacing), the
-    /// first one 0, or lengths [default: with --like as the file's form says: voxels of napari and of ROIs, else lengths]
-    #[arg(long, value_enum)]
-    pub(super) points_in: Option<PointsIn>,
+    pub(super) output: OutputArgs,
 }
 
 /// How distance is computed.
@@ -120,31 +78,6 @@ pub(super) struct ChoiceArgs {
     /// Also write the position of the nearest source
     #[arg(long)]
     pub(super) closest_point: bool,
-}
-
-/// Where results go.
-#[derive(Clone, Debug, Args)]
-#[command(next_help_heading = "Output")]
-#[allow(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
-pub(super) struct FieldOutputArgs {
-    /// OME-Zarr store to write; none computes and reports, and writes no field
-    #[arg(short, long = "output", value_name = "OUT.zarr|none", required = true)]
-    pub(super) output: Output,
-    /// Replace outputs that are there already
-    #[arg(long)]
-    pub(super) overwrite: bool,
-    /// Write the report once more, as a file of its own
-    #[arg(long, value_name = "FILE.json")]
-    pub(super) report: Option<PathBuf>,
-    /// Read the sources, print what a run would take, and stop
-    #[arg(long)]
-    pub(super) dry_run: bool,
-    /// Print nothing but errors
-    #[arg(short, long, conflicts_with = "verbose")]
-    pub(super) quiet: bool,
-    /// Print settings and each stage as it ends
-    #[arg(short, long)]
-    pub(super) verbose: bool,
 }
 
 /// In which order bricks are computed.

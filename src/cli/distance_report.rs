@@ -91,7 +91,7 @@ impl Settings {
         };
         Self {
             sources: args.sources.iter().map(|path| path.display().to_string()).collect(),
-            output: args.job.output.output.path().map(|path| path.display().to_string()),
+            output: args.job.output.store().map(|path| path.display().to_string()),
             method: settings.method.name(),
             schedule,
             neighbours: match settings.neighbours {

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::args::PointsIn;
 use super::console::Console;
-use super::distance_args::{DistanceJobArgs, GridArgs};
+use super::distance_args::DistanceJobArgs;
 use super::grid::check_spacing;
+use super::grid_args::GridArgs;
 use super::input::{chosen_notes, open_stack};
 use super::marks::{Reading, placed};
 use super::sources::read_in_unit;
@@ -98,7 +99,7 @@ fn read_placed(
             for text in &file.notes {
                 noted(text);
             }
-            let reading = Reading { image, points_in: args.points_in, time: args.time };
+            let reading = Reading { image, points_in: args.points_in, time: args.volume.time };
             let cloud = placed(PointFile { cloud, ..file }, &reading, noted).map_err(|error| error.at(path))?;
             Ok(Source::Cloud(cloud))
         }
@@ -130,8 +131,9 @@ fn without_inside(what: &str) -> Error {
 
 fn open_volume(path: &Path, args: &GridArgs, console: &Console) -> Result<LabelVolume> {
     let (path, note) = labels_of(path)?;
-    let stack = open_stack(&path, args.select(), args.image_spacing)?;
-    let chosen = chosen_notes(&path, stack.stack.info(), args.select());
+    let select = args.volume.select();
+    let stack = open_stack(&path, select, args.image_spacing)?;
+    let chosen = chosen_notes(&path, stack.stack.info(), select);
     for note in note.iter().chain(&stack.notes).chain(&chosen) {
         console.note(note);
     }

@@ -1,10 +1,9 @@
 //! The grid of a distance: as typed, like an image, or around the sources.
 
-use super::distance_args::GridArgs;
+use super::grid_args::GridArgs;
 use super::input::open_stack;
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
-use crate::io::stacks::Select;
 
 /// Voxels along the longest side where no spacing is given.
 const DEFAULT_VOXELS: f64 = 256.0;
@@ -16,12 +15,12 @@ const DEFAULT_PADDING: f64 = 1.0 / 6.0;
 /// user should know to `notes`.
 pub(super) fn given(args: &GridArgs, notes: &mut Vec<String>) -> Result<Option<Geometry>> {
     if let Some(image) = &args.like {
-        let stack = open_stack(image, args.select(), args.image_spacing)?;
+        let stack = open_stack(image, args.volume.select(), args.image_spacing)?;
         notes.extend(stack.notes);
         return Ok(Some(stack.geometry));
     }
     check_spacing("--spacing", args.spacing)?;
-    match (args.shape, args.origin, args.spacing) {
+    match (args.filled.shape, args.filled.origin, args.spacing) {
         (Some(shape), Some(origin), Some(spacing)) => exact(shape, origin, spacing).map(Some),
         _ => Ok(None),
     }
@@ -34,7 +33,8 @@ pub(super) fn asked_grid(args: &GridArgs, bounds: ([f64; 3], [f64; 3]), notes: &
 
 /// The grid around sources, of which `bounds` is the box.
 pub(super) fn around(args: &GridArgs, (low, high): ([f64; 3], [f64; 3])) -> Result<Geometry> {
-    if let Some(padding) = args.padding.filter(|p| !(p.is_finite() && *p >= 0.0)) {
+    let padding = args.filled.padding;
+    if let Some(padding) = padding.filter(|p| !(p.is_finite() && *p >= 0.0)) {
         return Err(Error::usage(format!("--padding is {padding}; give a length, 0 or more")));
     }
     let extent: [f64; 3] = std::array::from_fn(|a| high[a] - low[a]);
@@ -42,12 +42,12 @@ pub(super) fn around(args: &GridArgs, (low, high): ([f64; 3], [f64; 3])) -> Resu
     if !largest.is_finite() {
         return Err(Error::input("the coordinates reach farther than numbers do; scale them down"));
     }
-    if largest == 0.0 && (args.spacing.is_none() || args.padding.is_none()) {
+    if largest == 0.0 && (args.spacing.is_none() || padding.is_none()) {
         return Err(Error::input(
             "all sources lie in one point, which tells no scale; give --spacing and --padding, or --origin and --shape",
         ));
     }
-    let padding = args.padding.unwrap_or(DEFAULT_PADDING * largest);
+    let padding = padding.unwrap_or(DEFAULT_PADDING * largest);
     let spacing = args.spacing.unwrap_or([(largest + 2.0 * padding) / DEFAULT_VOXELS; 3]);
     // One voxel more than the room needs, as the papers' grids have it.
     let count = |a: usize| ((extent[a] + 2.0 * padding) / spacing[a]).floor() + 2.0;
@@ -71,14 +71,9 @@ fn exact(shape: [i64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Geometr
 }
 
 impl GridArgs {
-    /// Which part of label volumes and of the image of --like is read.
-    pub(super) fn select(&self) -> Select {
-        self.pages.select(self.channel, self.time, self.level)
-    }
-
     /// Whether anything was said of where the grid lies.
     pub(super) fn is_asked_for(&self) -> bool {
-        self.spacing.is_some() || self.padding.is_some() || self.origin.is_some() || self.like.is_some()
+        self.spacing.is_some() || self.filled.is_given() || self.like.is_some()
     }
 }
 
@@ -107,21 +102,7 @@ pub(super) fn check_counts(counts: [f64; 3]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::pages_args::PagesArgs;
-
-    const NOTHING: GridArgs = GridArgs {
-        spacing: None,
-        padding: None,
-        origin: None,
-        shape: None,
-        like: None,
-        image_spacing: None,
-        channel: 0,
-        time: 0,
-        level: 0,
-        pages: PagesArgs::NOTHING,
-        points_in: None,
-    };
+    use crate::cli::grid_args::GridBoxArgs;
 
     fn laid(args: &GridArgs, low: [f64; 3], high: [f64; 3]) -> Result<Geometry> {
         asked_grid(args, (low, high), &mut Vec::new())
@@ -129,24 +110,28 @@ mod tests {
 
     #[test]
     fn the_papers_grid_around_sources() {
-        let args = GridArgs { spacing: Some([0.1; 3]), ..NOTHING };
+        let args = GridArgs { spacing: Some([0.1; 3]), ..GridArgs::default() };
         let found = laid(&args, [0.0; 3], [3.0, 1.0, 0.0]).unwrap();
         assert_eq!(found.shape, [42, 22, 12]);
         assert_eq!(found.origin, [-0.5; 3]);
-        assert_eq!(laid(&NOTHING, [0.0; 3], [1.0; 3]).unwrap().shape, [258; 3]);
+        assert_eq!(laid(&GridArgs::default(), [0.0; 3], [1.0; 3]).unwrap().shape, [258; 3]);
     }
 
     #[test]
     fn senseless_grids_are_refused() {
-        let with = |spacing| GridArgs { spacing: Some(spacing), ..NOTHING };
+        let with = |spacing| GridArgs { spacing: Some(spacing), ..GridArgs::default() };
         for spacing in [[0.0; 3], [-1.0; 3], [f64::NAN, 1.0, 1.0], [f64::INFINITY; 3], [1e-12; 3]] {
             assert_eq!(laid(&with(spacing), [0.0; 3], [1.0; 3]).unwrap_err().exit_code(), 2, "{spacing:?}");
         }
-        assert!(laid(&NOTHING, [1.0; 3], [1.0; 3]).unwrap_err().to_string().contains("one point"));
-        assert!(laid(&NOTHING, [-1e308; 3], [1e308; 3]).is_err());
-        let shape = GridArgs { shape: Some([5, 0, 5]), origin: Some([0.0; 3]), ..with([1.0; 3]) };
+        assert!(laid(&GridArgs::default(), [1.0; 3], [1.0; 3]).unwrap_err().to_string().contains("one point"));
+        assert!(laid(&GridArgs::default(), [-1e308; 3], [1e308; 3]).is_err());
+        let shape = GridArgs {
+            filled: GridBoxArgs { shape: Some([5, 0, 5]), origin: Some([0.0; 3]), padding: None },
+            ..with([1.0; 3])
+        };
         assert!(laid(&shape, [0.0; 3], [1.0; 3]).unwrap_err().to_string().contains("--shape"));
-        let padding = GridArgs { padding: Some(-1.0), ..NOTHING };
+        let padding =
+            GridArgs { filled: GridBoxArgs { padding: Some(-1.0), ..GridBoxArgs::default() }, ..GridArgs::default() };
         assert!(laid(&padding, [0.0; 3], [1.0; 3]).unwrap_err().to_string().contains("--padding"));
     }
 }

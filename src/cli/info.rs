@@ -33,7 +33,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
         }
         store(path, args.pages.image_index)?
     } else if let Some(format) = stacks::format_of(path) {
-        stack(path, format, args.pages.select(0, 0, 0))?
+        stack(path, format, args.pages.select())?
     } else {
         let (source, points_of, notes) = describe(path)?;
         match source {

@@ -10,8 +10,8 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Progress;
 use crate::grid::{Geometry, PointCloud};
 use crate::io::points::{LengthUnit, PointFile, Scale, read_points};
-use crate::pipeline::marks::{ObjectMarks, split};
-use crate::pipeline::segment::{Grids, check_marks, crossed, doubts, open_outlines, same_place, spans_slices};
+use crate::pipeline::marks::{ObjectMarks, Seed, split_and_seed};
+use crate::pipeline::segment::{Grids, Refused, check_marks, crossed, doubts, open_outlines, same_place, spans_slices};
 
 /// What decides how the numbers of a file are read.
 pub(super) struct Reading<'a> {
@@ -175,18 +175,38 @@ impl Marks {
     }
 }
 
-/// Says what is odd about the marks; refuses them where no object's fit the image. Whether there are several objects.
-pub(super) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: usize, console: &Console) -> Result<bool> {
-    let objects = split(&marks.cloud);
-    let (mut bad, several) = (Vec::new(), objects.len() + seeds > 1);
-    for object in &objects {
+/// The objects that marks and seeds stand for.
+pub(super) struct Objects {
+    /// Those whose marks can be those of the image, and those of seeds.
+    pub(super) fit: Vec<ObjectMarks>,
+    /// Those whose marks cannot.
+    pub(super) refused: Vec<Refused>,
+}
+
+impl Objects {
+    /// The numbers of all.
+    pub(super) fn numbers(&self) -> Vec<u32> {
+        self.fit.iter().map(|marks| marks.object).chain(self.refused.iter().map(|refused| refused.label)).collect()
+    }
+}
+
+/// Checks the marks of each object, and says what is odd about them; refuses all where no object's fit the image.
+pub(super) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: &[Seed], console: &Console) -> Result<Objects> {
+    let (seeded, marked): (Vec<_>, Vec<_>) =
+        split_and_seed(&marks.cloud, seeds).into_iter().partition(|object| object.seed.is_some());
+    let (mut fit, mut refused, mut first_error) = (Vec::new(), Vec::new(), None);
+    for object in &marked {
         let label = object.object;
         match check_marks(object, grids) {
             Ok(notes) => {
                 let doubts = if marks.unsure.contains(&label) { doubts(object, grids.whole) } else { Vec::new() };
                 notes.iter().chain(&doubts).for_each(|note| console.note(note));
+                fit.push(object.clone());
             }
-            Err(error) => bad.push(error.at(&marks.files[&label])),
+            Err(error) => {
+                refused.push(Refused { label, reason: error.to_string() });
+                first_error.get_or_insert(error.at(&marks.files[&label]));
+            }
         }
         for number in crossed(object, grids.part) {
             console.note(&format!("outline {number} of object {label} crosses itself: are its marks in order?"));
@@ -211,12 +231,13 @@ pub(super) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: usize, cons
             ));
         }
     }
-    tell_twice_marked(&objects, marks, grids.whole, console);
+    tell_twice_marked(&marked, marks, grids.whole, console);
+    fit.extend(seeded);
     // One of several that does not fit is refused by itself.
-    if seeds == 0 && bad.len() == objects.len() && !bad.is_empty() {
-        return Err(bad.swap_remove(0));
+    match first_error {
+        Some(error) if fit.is_empty() => Err(error),
+        _ => Ok(Objects { fit, refused }),
     }
-    Ok(several)
 }
 
 /// Outlines that a note names, at most.

@@ -15,6 +15,7 @@ mod distance_sources;
 mod drawing;
 mod files;
 mod grid;
+mod grid_args;
 mod info;
 mod info_store;
 mod input;

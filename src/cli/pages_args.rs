@@ -1,4 +1,5 @@
-//! What was typed of the pages of TIFF files: which image of a file with several, and what its pages are.
+//! What was typed of the volume in a file: channel, time and resolution; of TIFF files which image of several, and what
+//! its pages are.
 
 use clap::Args;
 
@@ -19,17 +20,36 @@ pub(super) struct PagesArgs {
 }
 
 impl PagesArgs {
-    /// The files' own pages.
-    #[cfg(test)]
-    pub(super) const NOTHING: Self = Self { axes: None, image_index: None };
-
-    /// What to read: a channel at a time, at a level of a multiscale image.
-    pub(super) fn select(&self, channel: u32, time: u32, level: u32) -> Select {
-        Select { channel, time, level, image: self.image_index, axes: self.axes }
-    }
-
     /// Whether anything was said.
     pub(super) fn is_given(&self) -> bool {
         self.axes.is_some() || self.image_index.is_some()
+    }
+
+    /// The first channel and time of what was chosen.
+    pub(super) fn select(&self) -> Select {
+        Select { image: self.image_index, axes: self.axes, ..Select::default() }
+    }
+}
+
+/// Which of the volumes in a file is read.
+#[derive(Clone, Debug, Default, Args)]
+pub(super) struct VolumeArgs {
+    /// Channel of the image, or of label volumes, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) channel: u32,
+    /// Time point of the image, or of label volumes, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) time: u32,
+    /// Resolution of an OME-Zarr image or of a TIFF with smaller copies of its pages, 0 the finest
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) level: u32,
+    #[command(flatten)]
+    pub(super) pages: PagesArgs,
+}
+
+impl VolumeArgs {
+    /// What to read: a channel at a time, at a level of a multiscale image.
+    pub(super) fn select(&self) -> Select {
+        Select { channel: self.channel, time: self.time, level: self.level, ..self.pages.select() }
     }
 }

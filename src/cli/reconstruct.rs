@@ -10,10 +10,10 @@ use serde::Serialize;
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::disk::Disk;
-use super::distance_args::GridArgs;
 use super::drawing::Drawing;
 use super::files::{mesh_format, tell_of_anchor};
 use super::grid::{asked_grid, check_counts};
+use super::grid_args::GridArgs;
 use super::outputs::Outputs;
 use super::reconstruct_args::{CloudGridArgs, ReconstructArgs};
 use super::report::{Hausdorff, Hole, Moves, Ran, Report};
@@ -89,12 +89,10 @@ fn laid_grid(
     cloud: &[[f64; 3]],
     console: &Console,
 ) -> Result<Option<Geometry>> {
-    let (padding, origin, shape) = (args.padding, args.origin, args.shape);
-    if padding.is_none() && origin.is_none() {
+    if !args.filled.is_given() {
         return Ok(None);
     }
-    let spacing = Some(around.spacing);
-    let asked = GridArgs { spacing, padding, origin, shape, ..GridArgs::default() };
+    let asked = GridArgs { spacing: Some(around.spacing), filled: args.filled.clone(), ..GridArgs::default() };
     let high = |a: usize| cloud.iter().map(|p| p[a]).fold(f64::NEG_INFINITY, f64::max);
     let laid = asked_grid(&asked, (around.origin, [high(0), high(1), high(2)]), &mut Vec::new())?;
     let outside =
@@ -118,13 +116,13 @@ impl Job {
         config::check_ranks(args.ranks)?;
         let outputs = Outputs {
             inputs: vec![&args.cloud],
-            store: args.output.output.path(),
+            store: args.output.store(),
             files: [&args.output.report, &args.mesh].into_iter().flatten().map(PathBuf::as_path).collect(),
             overwrite: args.output.overwrite,
         };
         outputs.check()?;
         args.mesh.as_deref().map(mesh_format).transpose()?;
-        let resources = config::resources(&args.resources, args.output.output.path())?;
+        let resources = config::resources(&args.resources, args.output.store())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
         let cloud = match read_told(&args.cloud, &|text| console.note(text))? {
             Source::Cloud(cloud) => cloud.positions,
@@ -154,7 +152,7 @@ impl Job {
 
     /// Fields are written out, or needed for the mesh.
     fn writes_fields(&self) -> bool {
-        self.args.output.output.path().is_some()
+        self.args.output.store().is_some()
     }
 
     /// Refuses a run that cannot fit memory or disk.
@@ -167,7 +165,7 @@ impl Job {
             what: format!("a grid with {} voxels near the points", grouped(estimate.near_voxels)),
             scratch: &self.resources.scratch,
             needed: estimate.scratch.saturating_sub(window / 2),
-            output: self.args.output.output.path().unwrap_or(&self.resources.scratch),
+            output: self.args.output.store().unwrap_or(&self.resources.scratch),
             written,
             coarser: "a larger --spacing",
         }
@@ -180,14 +178,14 @@ impl Job {
         let [x, y, z] = self.grid.shape;
         format!(
             "{}: {} points, spacing {}, {x} x {y} x {z} voxels (x, y, z), {} of them near the points\n\
-             about {}; memory up to {}, of which {} must be held; {} of temporary fields, in memory or in {}",
+             about {}; memory up to {}, at least {}; {} of temporary fields, in memory or in {}",
             self.args.cloud.display(),
             grouped(self.cloud.len() as u64),
             triple(self.grid.spacing),
             grouped(estimate.near_voxels),
             duration(estimate.seconds),
             bytes(self.resources.memory),
-            bytes(estimate.held),
+            bytes(Budget::least(estimate.held)),
             bytes(estimate.scratch),
             self.resources.scratch.display()
         )
@@ -210,7 +208,7 @@ impl Job {
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
         let _passes = Unfinished::new(passing.path());
-        let store = output.output.path().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let store = output.store().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
         let mesh = Drawing::new(store.as_ref(), self.args.mesh.as_deref(), passing.path())?;
         let mut ply = mesh.start(|path| PlyWriter::on_grid(path, &self.grid))?;
         let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, ply.sink())
@@ -227,7 +225,7 @@ impl Job {
             store.finish()?;
         }
         engine.check()?;
-        mesh.export(output.output.path(), &found.geometry)?;
+        mesh.export(output.store(), &found.geometry)?;
         if let Some(path) = &output.report {
             self.report(engine, &found).write(path)?;
         }
@@ -342,7 +340,7 @@ impl Settings {
     fn new(job: &Job, found: &Reconstruction) -> Self {
         Self {
             cloud: job.args.cloud.display().to_string(),
-            output: job.args.output.output.path().map(|path| path.display().to_string()),
+            output: job.args.output.store().map(|path| path.display().to_string()),
             method: job.settings.method.name(),
             motion: Moves::new(&job.settings.motion, &found.geometry),
             beta: job.settings.beta,

@@ -1,5 +1,8 @@
 //! `strandline segment`: opens the inputs, says what it will take, runs, writes, tells what was found.
 
+mod notes;
+mod plan;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -7,25 +10,23 @@ use std::time::Instant;
 use super::args::SegmentArgs;
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
-use super::disk::Disk;
 use super::files::{export_mesh, mesh_format, tell_of_anchor};
 use super::input::{chosen_notes, crop_box, open_stack};
-use super::marks::{Marks, Reading, look_at_marks, read_marks};
+use super::marks::{Marks, Objects, Reading, look_at_marks, read_marks};
 use super::outputs::{Outputs, numbered};
 use super::report::{Found, Ran, Report, Settings, Solver, crop_xyz};
-use super::text::{bytes, duration, grouped, number, place, triple};
+use super::text::{bytes, duration};
 use super::{picture, print, signals, table};
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Engine, Progress};
+use crate::exec::{Cancel, Engine, Progress};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stacks::Stack;
-use crate::pipeline::marks::{split, split_and_seed};
 use crate::pipeline::segment::{
-    Estimate, Grids, Guides, ImageModel, LARGEST_WHOLE, ObjectReport, Outcome, Refused, SegmentSettings, check_lengths,
-    check_seed, check_smoothing, estimate, segment,
+    Estimate, Grids, Guides, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing, segment,
 };
 use crate::store::Unfinished;
+use notes::refusal;
 
 /// A segmentation that is ready to start: all inputs are open and checked.
 pub(super) struct Job {
@@ -40,6 +41,7 @@ pub(super) struct Job {
     geometry: Geometry,
     crop: Box3,
     marks: Marks,
+    objects: Objects,
     console: Arc<Console>,
     cancel: Cancel,
     started: Instant,
@@ -75,7 +77,7 @@ impl Job {
         let outputs = Outputs {
             inputs: std::iter::once(&args.image).chain(&args.points).map(PathBuf::as_path).collect(),
             store: output.store(),
-            files: [&output.report, &output.mesh, &output.picture]
+            files: [&output.report, &args.drawn.mesh, &args.drawn.picture]
                 .into_iter()
                 .flatten()
                 .map(PathBuf::as_path)
@@ -83,12 +85,12 @@ impl Job {
             overwrite: output.overwrite,
         };
         outputs.check()?;
-        args.output.mesh.as_deref().map(mesh_format).transpose()?;
-        args.output.picture.as_deref().map(picture::check_name).transpose()?;
+        args.drawn.mesh.as_deref().map(mesh_format).transpose()?;
+        args.drawn.picture.as_deref().map(picture::check_name).transpose()?;
         let resources = config::resources(&args.resources, args.output.store())?;
         let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
         let picture = &args.picture;
-        let select = picture.pages.select(picture.channel, picture.time, picture.level);
+        let select = picture.volume.select();
         let opened = open_stack(&args.image, select, spacing)?;
         let chosen = chosen_notes(&args.image, opened.stack.info(), select);
         opened.notes.iter().chain(&chosen).for_each(|note| console.note(note));
@@ -98,11 +100,11 @@ impl Job {
         let geometry = opened.geometry.crop(&crop);
         check_lengths(&settings, &geometry)?;
         let grids = Grids { whole: &opened.geometry, part: &geometry, guessed: opened.guessed };
-        let several = look_at_marks(&marks, &grids, args.seed.len(), &console)?;
-        if let Some(path) = args.output.mesh.as_deref().filter(|_| several) {
-            let objects = split_and_seed(&marks.cloud, &args.seed);
-            let meshes: Vec<PathBuf> = objects.iter().map(|object| numbered(path, object.object)).collect();
-            let others = [&output.report, &output.picture].into_iter().flatten();
+        let objects = look_at_marks(&marks, &grids, &args.seed, &console)?;
+        let numbers = objects.numbers();
+        if let Some(path) = args.drawn.mesh.as_deref().filter(|_| numbers.len() > 1) {
+            let meshes: Vec<PathBuf> = numbers.iter().map(|&object| numbered(path, object)).collect();
+            let others = [&output.report, &args.drawn.picture].into_iter().flatten();
             let files = meshes.iter().chain(others).map(PathBuf::as_path).collect();
             Outputs { store: None, files, ..outputs }.check()?;
         }
@@ -110,39 +112,31 @@ impl Job {
         args.seed.iter().try_for_each(|seed| check_seed(seed, &geometry))?;
         let typed = typed.to_vec();
         let stack = opened.stack;
-        Ok(Self { names, typed, args, settings, resources, stack, geometry, crop, marks, console, cancel, started })
+        Ok(Self {
+            names,
+            typed,
+            args,
+            settings,
+            resources,
+            stack,
+            geometry,
+            crop,
+            marks,
+            objects,
+            console,
+            cancel,
+            started,
+        })
     }
 
     fn guides(&self) -> Guides<'_> {
-        Guides { geometry: &self.geometry, cloud: &self.marks.cloud, seeds: &self.args.seed }
-    }
-
-    /// What the run will take.
-    pub(super) fn estimate(&self) -> Estimate {
-        let guides = self.guides();
-        let threads = self.resources.threads as u64;
-        estimate(self.stack.as_ref(), &self.crop, &guides, &self.settings, threads, self.needs_store())
+        Guides { geometry: &self.geometry, objects: &self.objects.fit, refused: &self.objects.refused }
     }
 
     /// Fields are written out, or needed for what is drawn from them.
     fn needs_store(&self) -> bool {
-        let output = &self.args.output;
-        output.store().is_some() || output.mesh.is_some() || output.picture.is_some()
-    }
-
-    /// Refuses a run that cannot fit memory or disk.
-    pub(super) fn fits(&self, estimate: &Estimate) -> Result<u64> {
-        let window = Budget { total: self.resources.memory }.window(estimate.held)?;
-        Disk {
-            what: format!("an image with {} voxels near the marks", grouped(estimate.near_voxels)),
-            scratch: &self.resources.scratch,
-            needed: estimate.scratch.saturating_sub(window / 2),
-            output: self.args.output.store().unwrap_or(&self.resources.scratch),
-            written: estimate.output,
-            coarser: "a part of the image with --crop; a spacing of the image that is wrong is put right with --image-spacing",
-        }
-        .check(&self.console)?;
-        Ok(window)
+        let drawn = &self.args.drawn;
+        self.args.output.store().is_some() || drawn.mesh.is_some() || drawn.picture.is_some()
     }
 
     /// Runs the segmentation and writes all that was asked for; returns what was found.
@@ -151,7 +145,7 @@ impl Job {
         self.console.say(&format!(
             "{}: {}, about {}; memory up to {}, {} of temporary fields in {}",
             self.names.image,
-            match self.marks.files.len() + self.args.seed.len() {
+            match self.objects.numbers().len() {
                 1 => "1 object".into(),
                 objects => format!("{objects} objects"),
             },
@@ -196,7 +190,7 @@ impl Job {
         let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())
             .map_err(|error| self.marks.named_in(error))?;
         self.tell(&outcome);
-        tell_of_anchor(output.mesh.as_deref(), &self.geometry, &self.console);
+        tell_of_anchor(self.args.drawn.mesh.as_deref(), &self.geometry, &self.console);
         if let Some(store) = &store {
             if self.names.command == "demo" {
                 picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;
@@ -220,67 +214,9 @@ impl Job {
         Ok(outcome)
     }
 
-    /// Says what deserves a second look.
-    fn tell(&self, outcome: &Outcome) {
-        self.tell_rounded(outcome.extremes);
-        for object in outcome.objects.iter().filter(|object| object.marks_off > 0) {
-            let verb = if object.marks_off == 1 { "mark lies" } else { "marks lie" };
-            let (label, off) = (object.label, object.marks_off);
-            self.console.note(&format!("object {label}: {off} {verb} more than a voxel from the surface"));
-        }
-        for object in &outcome.objects {
-            self.tell_odd(object, outcome.label_voxels.get(&object.label).copied().unwrap_or(0));
-            if self.settings.cross_validate && object.cross_validation.is_none() {
-                let label = object.label;
-                self.console.note(&format!("object {label}: --cross-validate needs three outlines in parallel planes"));
-            }
-            let Some(found) = object.cross_validation else { continue };
-            let next = found.next_slice.map_or(String::new(), |(axis, slice)| {
-                format!("; the next outline helps most on slice {slice} across {}", ["x", "y", "z"][axis])
-            });
-            let (label, mean, p90) = (object.label, number(found.mean), number(found.p90));
-            self.console.say(&format!(
-                "object {label}: marks of an outline that is left out lie {mean} off in the mean, nine of ten within \
-                 {p90}{next}"
-            ));
-        }
-    }
-
-    /// Says that grey values are not those of the file: 64-bit integers are read as doubles, which do not hold all of them.
-    fn tell_rounded(&self, extremes: [f64; 2]) {
-        let file_type = &self.stack.info().file_type;
-        if ["int64", "uint64"].contains(&file_type.as_str()) && extremes.iter().any(|v| v.abs() >= LARGEST_WHOLE) {
-            self.console.note(&format!(
-                "{}: grey values of type {file_type} reach from {:.0} to {:.0}; those beyond 2^53 are rounded to doubles, which \
-                 have 53 bits, in the output too",
-                self.args.image.display(),
-                extremes[0],
-                extremes[1]
-            ));
-        }
-    }
-
-    /// What a good result would not show.
-    fn tell_odd(&self, object: &ObjectReport, voxels: u64) {
-        let (label, pieces) = (object.label, object.measures.components);
-        if voxels == 0 {
-            self.console.note(&format!("object {label}: all of its voxels went to others that lie where it does"));
-        }
-        if pieces > 1 {
-            self.console.note(&format!("object {label}: its surface is in {pieces} pieces"));
-        }
-        if self.settings.image == ImageModel::Auto && self.settings.uses_image() && object.image_model == "none" {
-            self.console.note(&format!(
-                "object {label}: the image shows no border at its outlines, which alone decide; are they where they were \
-                 drawn (--image-spacing, --channel, the order of x, y, z)?"
-            ));
-        }
-    }
-
     /// The files beside the store.
     fn write_copies(&self, engine: &Engine, outcome: &Outcome, folder: &Path) -> Result<()> {
-        let output = &self.args.output;
-        if let Some(path) = &output.mesh {
+        if let Some(path) = &self.args.drawn.mesh {
             for object in &outcome.objects {
                 let several = outcome.objects.len() + outcome.refused.len() > 1;
                 let name = if several { format!("object-{}.ply", object.label) } else { "surface.ply".into() };
@@ -288,10 +224,10 @@ impl Job {
                 export_mesh(&folder.join("meshes").join(name), &self.geometry, &target)?;
             }
         }
-        if let Some(path) = &output.picture {
+        if let Some(path) = &self.args.drawn.picture {
             picture::draw(folder, self.centre(), path)?;
         }
-        match &output.report {
+        match &self.args.output.report {
             Some(path) => self.report(engine, outcome).write(path),
             None => Ok(()),
         }
@@ -305,17 +241,17 @@ impl Job {
     }
 
     fn report(&self, engine: &Engine, outcome: &Outcome) -> Report<Settings, Found> {
-        let (picture, output) = (&self.args.picture, &self.args.output);
+        let (volume, output) = (&self.args.picture.volume, &self.args.output);
         let settings = Settings {
             image: self.names.image.clone(),
             points: self.names.points.clone(),
             seeds: self.args.seed.iter().map(|s| [s.centre[0], s.centre[1], s.centre[2], s.radius]).collect(),
             output: output.store().map(|path| path.display().to_string()),
-            channel: picture.channel,
-            axes: picture.pages.axes.map(|axes| axes.to_string()),
-            image_index: picture.pages.image_index,
-            time: picture.time,
-            level: picture.level,
+            channel: volume.channel,
+            axes: volume.pages.axes.map(|axes| axes.to_string()),
+            image_index: volume.pages.image_index,
+            time: volume.time,
+            level: volume.level,
             crop_xyz: crop_xyz(&self.crop),
             image_type: outcome.element.name(),
             solver: Solver::new(&self.settings, &self.geometry),
@@ -331,70 +267,5 @@ impl Job {
             started: self.started,
         };
         Report::new(&ran, settings, &outcome.geometry, Found::new(outcome))
-    }
-
-    /// The image and its settings in a few lines.
-    fn describe(&self) -> String {
-        let (g, s) = (&self.geometry, &self.settings);
-        let unit = g.unit.as_deref().map_or(String::new(), |unit| format!(" {unit}"));
-        let [x, y, z] = g.shape;
-        format!(
-            "image {x} x {y} x {z} (x, y, z) {}, spacing {}{unit}, origin {}\n\
-             theta {} rho {} delta {} k {} sigma {} beta {} tau {} epsilon {} omega {} brick {} threads {}",
-            self.stack.element().name(),
-            triple(g.spacing),
-            place(g.origin, g.min_spacing()),
-            number(s.motion.theta),
-            s.rho.map_or("automatic".into(), number),
-            number(s.motion.delta_on(g)),
-            number(s.k),
-            s.sigma.map_or("automatic".into(), number),
-            s.beta.map_or("automatic".into(), number),
-            number(s.motion.tau_on(g)),
-            number(s.motion.epsilon_on(g)),
-            number(s.motion.omega),
-            s.brick,
-            self.resources.threads
-        )
-    }
-
-    fn print_plan(&self, estimate: &Estimate) -> Result<()> {
-        let (mut lines, mut objects) = (vec![self.describe()], Vec::new());
-        for object in split(&self.marks.cloud) {
-            let points: usize = object.contours.iter().map(Vec::len).sum();
-            let file = self.marks.files[&object.object].display();
-            let contours = if object.drawn { format!(" on {} contours", object.contours.len()) } else { String::new() };
-            objects.push(format!("object {}: {points} marks{contours}, {file}", object.object));
-        }
-        lines.extend(table::cut(objects, "objects", "(info FILE --json has them all)"));
-        for (n, seed) in self.args.seed.iter().enumerate() {
-            let at = place(seed.centre, 0.1 * seed.radius);
-            lines.push(format!("seed {}: a ball of radius {} at {at}", n + 1, number(seed.radius)));
-        }
-        let (held, allowed) = (bytes(estimate.held), bytes(self.resources.memory));
-        let (scratch, folder) = (bytes(estimate.scratch), self.resources.scratch.display());
-        lines.push(format!("{} voxels near the marks", grouped(estimate.near_voxels)));
-        lines.push(format!("memory: {held} must be held, {allowed} are allowed"));
-        lines.push(format!("temporary fields: about {scratch} in {folder}"));
-        if self.needs_store() {
-            lines.push(format!("output: up to {} before compression", bytes(estimate.output)));
-        }
-        lines.push(format!("time: very roughly {}\n", duration(estimate.seconds)));
-        print(&lines.join("\n"))
-    }
-}
-
-/// A line for each object that could not be solved.
-fn refusal(refused: &[Refused], solved: usize, whole_in: &str) -> Error {
-    let all = refused.len() + solved;
-    let reasons = refused.iter().map(|refused| refused.reason.clone()).collect();
-    let reasons = table::cut(reasons, "objects", whole_in);
-    Error::partly(format!("{} of {all} objects could not be solved: {}", refused.len(), reasons.join("\n")))
-}
-
-impl super::args::OutputArgs {
-    /// The store's path, where there is to be one.
-    pub(super) fn store(&self) -> Option<&Path> {
-        self.output.path()
     }
 }

@@ -13,6 +13,7 @@ pub struct Budget {
 const BASE_BYTES: u64 = 48 << 20;
 /// A window smaller than this would thrash.
 const SMALLEST_WINDOW: u64 = 64 << 20;
+const MIB: u64 = 1 << 20;
 
 impl Budget {
     /// What is left for mapped pages when `held` bytes must be in memory at the same time.
@@ -20,19 +21,25 @@ impl Budget {
     /// # Errors
     /// When that is too little: names the smallest budget that would do.
     pub fn window(&self, held: u64) -> Result<u64> {
-        let need = BASE_BYTES + held;
-        if self.total < need + SMALLEST_WINDOW {
-            let smallest = (need + SMALLEST_WINDOW).div_ceil(1 << 20);
+        let least = Self::least(held);
+        if self.total < least {
             return Err(Error::usage(format!(
-                "a memory budget of {} is too small for this run: give at least --memory {smallest}MiB",
+                "a memory budget of {} is too small for this run: give at least --memory {}MiB",
                 if self.total < 1 << 20 {
                     format!("{} bytes", self.total)
                 } else {
                     format!("{} MiB", self.total >> 20)
-                }
+                },
+                least >> 20
             )));
         }
-        Ok(self.total - need)
+        Ok(self.total - BASE_BYTES - held)
+    }
+
+    /// The smallest budget of a run that must hold `held` bytes at the same time, in whole MiB.
+    #[must_use]
+    pub fn least(held: u64) -> u64 {
+        held.saturating_add(BASE_BYTES + SMALLEST_WINDOW).saturating_add(MIB - 1) / MIB * MIB
     }
 }
 

@@ -20,6 +20,7 @@ mod gaussian;
 mod heat;
 mod level_set;
 mod maximum_principle;
+mod memory;
 mod mesh_dialects;
 mod mesh_faults;
 mod mesh_ply;

@@ -1,10 +1,9 @@
 //! All objects: looked at together, solved each for itself, small ones side by side; their surfaces drawn and checked.
 
-use super::check::{Grids, check_marks};
 use super::cross_validate::cross_validate;
 use super::object::{ObjectReport, Picture, Solution, solve};
 use super::outlines::scatter_of;
-use super::settings::{ImageModel, SegmentSettings, Start};
+use super::settings::{Guides, ImageModel, SegmentSettings, Start};
 use super::survey::{Looking, Outlined, Trust, left_out_of, trust};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
@@ -42,13 +41,12 @@ pub(super) struct Objects {
 pub(super) fn solve_all<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
-    objects: &[ObjectMarks],
+    guides: &Guides<'_>,
     settings: &SegmentSettings,
     store: Option<&StoreWriter>,
 ) -> Result<Objects> {
-    let several = objects.len() > 1;
-    let whole = picture.world.whole;
-    let (objects, mut refused) = sifted(objects, &Grids { whole, part: picture.geometry, guessed: [false; 3] })?;
+    let (objects, mut refused) = (guides.objects, guides.refused.to_vec());
+    let several = objects.len() + refused.len() > 1;
     let origin = picture.geometry.origin;
     let grid = Geometry { origin: [0.0; 3], ..picture.geometry.clone() };
     let picture = Picture { geometry: &grid, ..*picture };
@@ -87,21 +85,6 @@ pub(super) fn solve_all<T: Element>(
         return Err(Error::input(reasons.join("; ")));
     }
     Ok(Objects { solved, refused })
-}
-
-/// The objects whose marks can be those of the image, and the others. A single object that cannot is an error.
-fn sifted(objects: &[ObjectMarks], grids: &Grids<'_>) -> Result<(Vec<ObjectMarks>, Vec<Refused>)> {
-    let (mut fit, mut refused) = (Vec::new(), Vec::new());
-    for marks in objects {
-        match check_marks(marks, grids) {
-            Err(error) if marks.seed.is_none() && objects.len() > 1 => {
-                refused.push(Refused { label: marks.object, reason: error.to_string() });
-            }
-            Err(error) if marks.seed.is_none() => return Err(error),
-            _ => fit.push(marks.clone()),
-        }
-    }
-    Ok((fit, refused))
 }
 
 /// Voxels of the largest box around an object that is small: larger ones keep all cores busy.

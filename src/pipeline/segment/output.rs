@@ -16,9 +16,8 @@ use crate::kernel::image::labels;
 use crate::kernel::image::palette::label_color;
 use crate::kernel::surface::Contact;
 use crate::pipeline::ingest::{Image, ingest};
-use crate::pipeline::marks::split_and_seed;
 use crate::pipeline::pyramid::{Reduce, write_levels};
-use crate::store::{BoxSource, Element, ElementType, Sample, VolumeSource};
+use crate::store::{BoxSource, Element, ElementType, Sample, SampleWork, VolumeSource};
 
 /// What a segmentation found.
 #[derive(Clone, Debug)]
@@ -57,24 +56,29 @@ pub fn segment(
     settings: &SegmentSettings,
     store: Option<&StoreWriter>,
 ) -> Result<Outcome> {
-    match stack.element() {
-        ElementType::U8 => run::<u8>(engine, stack, crop, guides, settings, store),
-        ElementType::U16 => run::<u16>(engine, stack, crop, guides, settings, store),
-        ElementType::U32 => run::<u32>(engine, stack, crop, guides, settings, store),
-        ElementType::F64 => run::<f64>(engine, stack, crop, guides, settings, store),
-        ElementType::F32 | ElementType::F16 => run::<f32>(engine, stack, crop, guides, settings, store),
+    stack.element().with_samples(Job { engine, stack, crop, guides, settings, store })
+}
+
+/// What there is to segment, and where it goes.
+struct Job<'a> {
+    engine: &'a Engine,
+    stack: &'a dyn VolumeSource,
+    crop: &'a Box3,
+    guides: &'a Guides<'a>,
+    settings: &'a SegmentSettings,
+    store: Option<&'a StoreWriter>,
+}
+
+impl SampleWork for Job<'_> {
+    type Output = Result<Outcome>;
+
+    fn on<T: Sample>(self) -> Result<Outcome> {
+        run::<T>(&self)
     }
 }
 
-fn run<T: Sample>(
-    engine: &Engine,
-    stack: &dyn VolumeSource,
-    crop: &Box3,
-    guides: &Guides<'_>,
-    settings: &SegmentSettings,
-    store: Option<&StoreWriter>,
-) -> Result<Outcome> {
-    let objects = split_and_seed(guides.cloud, guides.seeds);
+fn run<T: Sample>(job: &Job<'_>) -> Result<Outcome> {
+    let Job { engine, stack, crop, guides, settings, store } = *job;
     let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();
@@ -98,7 +102,7 @@ fn run<T: Sample>(
     let whole = Geometry { shape: stack.shape(), origin, ..guides.geometry.clone() };
     let world = World { whole: &whole, origin: guides.geometry.origin };
     let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry, world };
-    let Objects { solved, refused } = solve_all(engine, &picture, &objects, settings, store)?;
+    let Objects { solved, refused } = solve_all(engine, &picture, guides, settings, store)?;
     let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
     let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, store)?;
     let contacts = match solved.len() {

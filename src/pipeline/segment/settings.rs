@@ -2,10 +2,11 @@
 
 use super::labels::Overlap;
 use super::neighbours::FillGaps;
-use crate::grid::{Geometry, PointCloud};
+use super::objects::Refused;
+use crate::grid::Geometry;
 use crate::pipeline::distance::Method;
 use crate::pipeline::image_terms::{EdgeSettings, Smoothing};
-use crate::pipeline::marks::Seed;
+use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::motion::Motion;
 
 /// What the image shows at the border of the objects.
@@ -144,8 +145,9 @@ impl SegmentSettings {
 pub struct Guides<'a> {
     /// The grid of the part of the image that is segmented.
     pub geometry: &'a Geometry,
-    /// The marks, physical coordinates.
-    pub cloud: &'a PointCloud,
-    /// Balls that further objects start as, which no marks guide.
-    pub seeds: &'a [Seed],
+    /// The objects whose marks can be those of the image, as [`super::check_marks`] told, and seeded ones; physical
+    /// coordinates.
+    pub objects: &'a [ObjectMarks],
+    /// The objects whose marks cannot.
+    pub refused: &'a [Refused],
 }

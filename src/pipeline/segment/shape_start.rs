@@ -28,7 +28,7 @@ const RHO: f64 = 4.0;
 
 /// The band reaches so many deviations of the shape from it, and within these bounds of smallest spacings.
 const BAND_DEVIATIONS: f64 = 3.0;
-const BAND: [f64; 2] = [5.0, 16.0];
+pub(super) const BAND: [f64; 2] = [5.0, 16.0];
 
 /// A shape that is nowhere deeper than so many largest spacings cannot be moved on its grid.
 const THIN: f64 = 1.5;
