@@ -14,6 +14,7 @@ mod layout;
 mod names;
 mod shapes;
 mod units;
+mod words;
 mod xyz;
 
 use std::path::Path;

@@ -56,4 +56,5 @@ mod tiff_hostile;
 mod tiff_levels;
 mod told;
 mod zarr_input;
+mod zarr_odd;
 mod zarr_readers;

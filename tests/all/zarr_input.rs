@@ -21,7 +21,7 @@ use crate::common::zarr_files::{axes, document, group, gzip_array, plain_array_v
 const SHAPE: [i64; 3] = [20, 24, 28];
 
 /// Two bodies that face each other at x = 7 and x = 16, over all of y and z: their middle surface is a plane of 19 x 23.
-fn labels() -> Vec<u16> {
+pub(crate) fn labels() -> Vec<u16> {
     (0..20 * 24 * 28)
         .map(|n| [(0..8, 1), (16..28, 2)].iter().find(|(r, _)| r.contains(&(n % 28))).map_or(0, |l| l.1))
         .collect()
@@ -32,7 +32,7 @@ fn bytes<const N: usize>(values: &[u16], word: impl Fn(u16) -> [u8; N]) -> Vec<u
 }
 
 /// Writes an OME-Zarr 0.5 label image of one level and returns its group.
-fn store(bench: &Bench, name: &str, letters: &str, own: &Value, common: &Value) -> PathBuf {
+pub(crate) fn store(bench: &Bench, name: &str, letters: &str, own: &Value, common: &Value) -> PathBuf {
     let path = bench.path(name);
     group(&path, 3, letters, own, common);
     let shape: Vec<i64> = letters.chars().rev().zip([28, 24, 20, 1, 1]).map(|(_, n)| n).collect();
@@ -42,7 +42,7 @@ fn store(bench: &Bench, name: &str, letters: &str, own: &Value, common: &Value) 
 }
 
 /// The area of the surface between labels 1 and 2.
-fn area(bench: &Bench, arguments: &str) -> f64 {
+pub(crate) fn area(bench: &Bench, arguments: &str) -> f64 {
     bench.succeed(&format!("middle {arguments} -o none --report out/r.json"));
     let report = bench.json("out/r.json");
     fs::remove_file(bench.path("out/r.json")).unwrap();
@@ -50,7 +50,7 @@ fn area(bench: &Bench, arguments: &str) -> f64 {
     report["result"]["pairs"][0]["area"].as_f64().unwrap()
 }
 
-fn near(found: f64, wanted: f64) {
+pub(crate) fn near(found: f64, wanted: f64) {
     assert!((found - wanted).abs() < 1e-4 * wanted, "{found} where {wanted} is due");
 }
 
@@ -168,81 +168,6 @@ fn what_a_user_may_name_by_mistake_is_told() {
     assert!(told.status.success() && notes.contains("image 0 of 1 is read, 0"), "{notes}");
 }
 
-/// Chunks whose names are not those of the metadata are no voxels of the fill value.
-#[test]
-fn chunks_are_found_by_the_names_they_have() {
-    let bench = Bench::bare();
-    let path = bench.path("a.zarr");
-    group(&path, 2, "zyx", &scale(&[1.0; 3]), &Value::Null);
-    plain_array_v2(&path.join("0"), [20, 24, 28], [7, 24, 5], &labels(), "C");
-    // As writers left it that put chunks into folders before there was a word for it.
-    for name in files(&path.join("0")) {
-        let key = name.file_name().unwrap().to_string_lossy().into_owned();
-        let parts: Vec<&str> = key.split('.').collect();
-        let [z, y, x] = parts[..] else { continue };
-        fs::create_dir_all(path.join(format!("0/{z}/{y}"))).unwrap();
-        fs::rename(&name, path.join(format!("0/{z}/{y}/{x}"))).unwrap();
-    }
-    near(area(&bench, "a.zarr"), 437.0);
-    assert!(bench.succeed("info a.zarr").contains("chunks are named with '/'"));
-    for (number, z) in ["0", "1", "2"].iter().enumerate() {
-        let folder = path.join("0").join(z);
-        for chunk in files(&folder) {
-            let x = chunk.file_name().unwrap().to_string_lossy().into_owned();
-            fs::rename(&chunk, path.join(format!("0/c.{number}.0.{x}"))).unwrap();
-        }
-        fs::remove_dir_all(folder).unwrap();
-    }
-    let complaint = bench.fail("middle a.zarr -o none", 2);
-    assert!(complaint.contains("has chunks named like c.") && complaint.contains("like 0.0.0"), "{complaint}");
-    for chunk in files(&path.join("0")).iter().filter(|file| file.to_string_lossy().contains("/c.")) {
-        fs::remove_file(chunk).unwrap();
-    }
-    assert!(bench.succeed("info a.zarr").contains("none of its chunks is there"));
-}
-
-#[test]
-fn metadata_that_lack_or_hold_too_much_are_read() {
-    let bench = Bench::bare();
-    // No axes, as before 0.3, but a scale: the axes are the last of t, c, z, y, x.
-    let path = bench.path("noaxes.zarr");
-    let datasets = json!([{"path": "0", "coordinateTransformations": scale(&[2.0, 0.5, 0.5])}]);
-    document(&path.join(".zgroup"), &json!({"zarr_format": 2}));
-    document(&path.join(".zattrs"), &json!({"multiscales": [{"version": "0.4", "datasets": datasets}]}));
-    plain_array_v2(&path.join("0"), [20, 24, 28], [7, 24, 5], &labels(), "C");
-    near(area(&bench, "noaxes.zarr"), 19.0 * 2.0 * 23.0 * 0.5);
-    let info = bench.succeed("info noaxes.zarr");
-    assert!(info.contains("axes are not named; z, y, x is taken") && info.contains("0.5, 0.5, 2"), "{info}");
-    let datasets = json!([{"path": "0", "coordinateTransformations": scale(&[1.0; 5])}]);
-    document(&path.join(".zattrs"), &json!({"multiscales": [{"version": "0.4", "datasets": datasets}]}));
-    let complaint = bench.fail("middle noaxes.zarr -o none", 2);
-    assert!(complaint.contains("has 3 axes where its transformations have 5 numbers"), "{complaint}");
-    // Python writes NaN, which JSON does not know.
-    store(&bench, "nan.zarr", "zyx", &scale(&[1.0; 3]), &Value::Null);
-    let node = bench.path("nan.zarr/zarr.json");
-    let text = fs::read_to_string(&node).unwrap().replacen("\"ome\"", "\"window\": [NaN, -Infinity], \"ome\"", 1);
-    assert!(text.contains("NaN") && text.contains("\"path\": \"0\"") || text.contains("\"path\":\"0\""), "{text}");
-    let text = text.replace("\"path\": \"0\"", "\"path\": \"./0\"").replace("\"path\":\"0\"", "\"path\":\"./0\"");
-    fs::write(&node, format!("\u{feff}{text}")).unwrap();
-    near(area(&bench, "nan.zarr"), 437.0);
-}
-
-#[test]
-fn an_image_of_several_is_picked() {
-    let bench = Bench::bare();
-    let layout = json!({"zarr_format": 3, "node_type": "group", "attributes": {"ome": {"bioformats2raw.layout": 3}}});
-    document(&bench.path("series.zarr/zarr.json"), &layout);
-    store(&bench, "series.zarr/0", "zyx", &scale(&[3.0; 3]), &Value::Null);
-    store(&bench, "series.zarr/1", "zyx", &scale(&[2.0, 0.5, 0.5]), &Value::Null);
-    near(area(&bench, "series.zarr --image-index 1"), 19.0 * 2.0 * 23.0 * 0.5);
-    let info = bench.succeed("info series.zarr --image-index 1");
-    assert!(info.lines().any(|line| line.starts_with("image, level 0") && line.contains("0.5, 0.5, 2")), "{info}");
-    assert!(bench.fail("info series.zarr --image-index 2", 2).contains("there are 2, counted from 0"));
-    assert!(bench.fail("info series.zarr --axes zyx", 2).contains("names its axes itself"));
-    let complaint = bench.fail("segment series.zarr/zarr.json --seed 1,1,1,1 -o none", 2);
-    assert!(complaint.contains("is a file of a Zarr store; name its folder, series.zarr"), "{complaint}");
-}
-
 /// The same stack in TIFF, in chunks of planes and in chunks of cubes: the same bits of everything but the report.
 #[test]
 fn an_image_is_segmented_alike_from_tiff_and_zarr() {
@@ -320,7 +245,7 @@ fn what_zarr_python_writes_is_read_back() {
 }
 
 /// All files below a folder.
-fn files(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

@@ -6,7 +6,8 @@
 //! velocity's, are none.
 
 use super::Scale;
-use super::units::{LengthUnit, Unit, mended};
+use super::units::{LengthUnit, Unit};
+use super::words::{Name, families};
 use crate::error::{Error, Result};
 use crate::io::text::quoted;
 
@@ -210,36 +211,6 @@ impl Columns {
     }
 }
 
-/// Words that say that a position follows, or of what; those that say it best come first.
-const FILLERS: [&str; 25] = [
-    "position",
-    "pos",
-    "coordinate",
-    "coordinates",
-    "coord",
-    "coords",
-    "location",
-    "loc",
-    "point",
-    "points",
-    "centroid",
-    "center",
-    "centre",
-    "of",
-    "mass",
-    "spot",
-    "cell",
-    "nucleus",
-    "world",
-    "marker",
-    "the",
-    "at",
-    "in",
-    // XM, YM and CX, CY, CZ: centres of mass and of volume (ImageJ).
-    "m",
-    "c",
-];
-
 /// Columns that often tell which object a point is of, though that is not what their names say here.
 const LABELS: [&str; 12] = [
     "label",
@@ -255,84 +226,6 @@ const LABELS: [&str; 12] = [
     "segment",
     "nucleus",
 ];
-
-/// The name of a column that holds coordinates.
-struct Name {
-    axis: usize,
-    /// The places of its other words in [`FILLERS`]; columns of one position share them.
-    family: Vec<usize>,
-    unit: Option<Unit>,
-}
-
-impl Name {
-    fn in_voxels(&self) -> bool {
-        self.unit == Some(Unit::Voxels)
-    }
-
-    /// What a name says; none where it is no coordinate's.
-    fn of(name: &str) -> Option<Self> {
-        let name = mended(name.trim().trim_matches('"'));
-        let (mut unit, mut bare) = (None, name.clone());
-        if let Some(open) = name.find(['(', '[']) {
-            let inner = &name[open + 1..];
-            let end = inner.find([')', ']'])?;
-            unit = Unit::of(&inner[..end]);
-            bare = format!("{} {}", &name[..open], &inner[end + 1..]);
-        }
-        let (mut axis, mut family) = (None, Vec::new());
-        let words = words(&bare);
-        for word in &words {
-            if let Some(found) = ["x", "y", "z"].iter().position(|axis| axis == word) {
-                if axis.replace(found).is_some() {
-                    return None;
-                }
-            } else if let Some(filler) = FILLERS.iter().position(|filler| filler == word) {
-                family.push(filler);
-            } else if let Some(said) = Unit::of(word).filter(|_| word.chars().count() > 1) {
-                unit = unit.or(Some(said));
-            } else if let Some(found) = word.parse().ok().filter(|&axis: &usize| axis < 3 && words[0] == "points") {
-                axis = Some(found);
-            } else {
-                return None;
-            }
-        }
-        Some(Self { axis: axis?, family, unit })
-    }
-}
-
-/// The words of a name in lower case: between signs, and where a capital follows a small letter; `xpos` is two.
-fn words(name: &str) -> Vec<String> {
-    let mut spaced = String::new();
-    let mut before = ' ';
-    for letter in name.chars() {
-        if letter.is_uppercase() && before.is_lowercase() {
-            spaced.push(' ');
-        }
-        spaced.push(if letter.is_alphanumeric() { letter } else { ' ' });
-        before = letter;
-    }
-    let mut words = Vec::new();
-    for word in spaced.to_lowercase().split_whitespace() {
-        let glued = |axis: &&str| {
-            let rest = word.strip_prefix(axis).or(word.strip_suffix(axis))?;
-            FILLERS.contains(&rest).then(|| [(*axis).to_owned(), rest.to_owned()])
-        };
-        match ["x", "y", "z"].iter().find_map(glued) {
-            Some(two) => words.extend(two),
-            None => words.push(word.to_owned()),
-        }
-    }
-    words
-}
-
-/// The families of names, first those with the fewest and best words: of each those in lengths, those in voxels, and
-/// both together.
-fn families(read: &[Option<Name>]) -> Vec<(Vec<usize>, Option<bool>)> {
-    let mut families: Vec<Vec<usize>> = read.iter().flatten().map(|name| name.family.clone()).collect();
-    families.sort_by(|a, b| a.len().min(1).cmp(&b.len().min(1)).then(a.cmp(b)));
-    families.dedup();
-    families.into_iter().flat_map(|family| [Some(false), Some(true), None].map(|v| (family.clone(), v))).collect()
-}
 
 /// The column of that name, where there is one.
 fn one_column(names: &[String], name: &str) -> Result<Option<usize>> {
