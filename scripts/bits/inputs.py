@@ -23,7 +23,10 @@ def ball_mesh(path, steps=24):
     azimuth = 2 * np.pi * np.arange(steps) / steps
     rings = [[(np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)) for a in azimuth] for p in polar]
     corners = [(0, 0, 1), *(corner for ring in rings for corner in ring), (0, 0, -1)]
-    at = lambda ring, segment: 1 + ring * steps + segment % steps
+
+    def at(ring, segment):
+        return 1 + ring * steps + segment % steps
+
     faces = [(0, at(0, s), at(0, s + 1)) for s in range(steps)]
     for ring in range(len(rings) - 1):
         for s in range(steps):
@@ -48,10 +51,10 @@ def stack(folder, rng):
         for at in range(cz - 12, cz + 13, 4):
             across = np.sqrt(radius**2 - (at - cz) ** 2)
             angles = 2 * np.pi * np.arange(14) / 14
-            marks += [(cx + across * np.cos(a), cy + across * np.sin(a), at, label) for a in angles]
+            marks += [(label, at, cx + across * np.cos(a), cy + across * np.sin(a), at) for a in angles]
     image += rng.normal(0, 8, image.shape)
     tifffile.imwrite(folder / "stack.tif", np.clip(image, 0, 255).astype(np.uint8))
-    write_points(folder / "marks.csv", marks, "x,y,z,object")
+    write_points(folder / "marks.csv", marks, "object,contour,x,y,z")
 
 
 def make(folder):

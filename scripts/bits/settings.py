@@ -33,7 +33,7 @@ def middles():
         yield f"middle {{made}}/cloud-a.csv {{made}}/cloud-b.csv --spacing 0.06 -o {{out}}/out.zarr --method {method}"
     four = "middle {made}/cloud-a.csv {made}/cloud-b.csv {made}/cloud-c.csv {made}/ball.obj --spacing 0.06 -o {out}/out.zarr"
     yield four
-    yield f"{four} --labels tracked --closest-point"
+    yield f"{four} --labels tracked --threads 1"
     yield "middle {made}/cloud-a.csv {made}/cloud-b.csv --spacing 0.06 -o none --mesh {out}/between.stl --surface labels"
     yield "middle {made}/labels.tif -o {out}/out.zarr"
 
@@ -54,7 +54,7 @@ def segmentations():
     yield f"{plain} --start flood"
     yield f"{plain} --fill-gaps auto"
     yield f"{plain} --edge plain"
-    yield f"{plain} --memory 96MiB"
+    yield f"{plain} --memory 160MiB"
 
 
 def all_settings():
