@@ -1,5 +1,5 @@
 //! Fields on their way into multiscale images. A field is visited once, chunk by chunk of its finest level: what is put
-//! into a [`Pyramid`] goes to the disk and, reduced, to the next coarser level, which waits in bricks until the visit is
+//! into a `Pyramid` goes to the disk and, reduced, to the next coarser level, which waits in bricks until the visit is
 //! over and is then visited likewise.
 
 use std::sync::Arc;

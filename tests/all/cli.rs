@@ -151,7 +151,7 @@ fn unusable_images_are_told_with_code_2() {
     for (image, reason) in [
         ("constant.tif", "constant.tif: the image holds only the value 7"),
         ("flat.tif", "one voxel along z"),
-        ("nan.tif --image-spacing 0.5,0.5,1", "nan.tif: plane 3 holds a value that is no number"),
+        ("nan.tif --image-spacing 0.5,0.5,1", "nan.tif: plane 3 (page 4) holds a value that is no number"),
         ("text.tif", "text.tif"),
         ("missing.tif", "no such file"),
         ("scratch", "no slices"),
