@@ -66,7 +66,7 @@ fn a_value_that_is_no_number_is_told_with_its_file() {
     fs::write(bench.path("a.tif"), tiff_file(&pages, false)).unwrap();
     let said = told(&bench, "segment a.tif --seed 4,4,2,2 --image-spacing 1,1,1 -o none");
     assert!(said.contains("strandline: a.tif: plane 2 (page 3) holds a value that is no number"), "{said}");
-    assert!(said.contains("at voxel 3, 1, 2 (x, y, z)"), "{said}");
+    assert!(said.contains("at voxel 3, 1, 2 (x, y, z, counted from 0)"), "{said}");
 }
 
 #[test]
