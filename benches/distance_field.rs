@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use strandline::exec::{Budget, Cancel, Engine, Silent};
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
-use strandline::kernel::distance::extent::extent;
+use strandline::kernel::distance::features::extent::extent;
 use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources, Textbook};
 use strandline::store::Scratch;
 

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use super::args::{OutputArgs, ResourceArgs};
 use super::grid_args::GridArgs;
 use super::values::{parse_method, parse_neighbours, solvers_help};
-use crate::kernel::distance::Neighbours;
+use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::pipeline::distance::Method;
 
 /// Compute the distance to point clouds and triangle meshes on a grid of any size.

@@ -9,7 +9,7 @@ use super::distance::MiddleChoice;
 use super::distance_args::{DistanceJobArgs, PrecisionArg};
 use super::table::cut;
 use super::text::{grouped, number};
-use crate::kernel::distance::Neighbours;
+use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::surface::Pair;
 use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Schedule};
 use crate::pipeline::middle::{LabelMode, MiddleFound, SurfaceKind};

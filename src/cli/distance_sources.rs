@@ -17,7 +17,7 @@ use crate::grid::{DataSets, Geometry, PointCloud, TriangleMesh, refuse_too_many}
 use crate::io::label_volume::{LabelVolume, is_label_volume, labels_of};
 use crate::io::points::{LengthUnit, PointFile};
 use crate::io::sources::{Source, read_parts};
-use crate::kernel::solid::Solid;
+use crate::kernel::geometry::solid::Solid;
 use crate::pipeline::label_borders::label_borders;
 
 /// Labels that have fewer voxels in the mean are grey values.

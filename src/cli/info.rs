@@ -15,7 +15,7 @@ use crate::io::ome_zarr::is_store;
 use crate::io::points::{PointFile, Scale};
 use crate::io::sources::{Source, describe, is_standard_input};
 use crate::io::stacks::{self, Select};
-use crate::kernel::solid::Solid;
+use crate::kernel::geometry::solid::Solid;
 use crate::pipeline::marks::split;
 
 /// Runs the command.

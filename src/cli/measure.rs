@@ -1,6 +1,6 @@
 //! `strandline measure`: volume, area, closedness and pieces of a triangle mesh, and how far points lie from it.
 //!
-//! What is measured is the mesh as it is meant (`crate::kernel::solid`); notes tell where that is not the mesh as it came.
+//! What is measured is the mesh as it is meant (`crate::kernel::geometry::solid`); notes tell where that is not the mesh as it came.
 
 use std::io::Write;
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::exec::Progress;
 use crate::grid::TriangleMesh;
 use crate::io::sources::Source;
-use crate::kernel::solid::Solid;
+use crate::kernel::geometry::solid::Solid;
 use crate::kernel::surface::{Hausdorff, Measures, PatchIndex};
 
 /// Runs the command.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::kernel::distance::Neighbours;
+use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::pipeline::distance::{Method, SOLVERS};
 use crate::pipeline::marks::Seed;
 use crate::pipeline::segment::FillGaps;

@@ -32,11 +32,9 @@ macro_rules! vectorised {
 }
 
 pub mod distance;
-pub mod forest;
+pub mod geometry;
 pub mod image;
 pub mod level_set;
 pub mod outline;
-pub mod solid;
 pub mod surface;
-pub mod triangle;
-pub(crate) mod vector;
+pub mod topology;

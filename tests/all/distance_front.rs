@@ -5,7 +5,7 @@ use half::f16;
 use proptest::prelude::*;
 use rstar::RTree;
 use strandline::grid::Geometry;
-use strandline::kernel::distance::Neighbours;
+use strandline::kernel::distance::state::neighbours::Neighbours;
 use strandline::pipeline::distance::{Method, Options, Schedule};
 
 use crate::common::clouds::{grid_around, random_cloud, sponge_and_sphere};

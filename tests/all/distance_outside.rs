@@ -5,8 +5,8 @@
 use std::fs;
 
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
-use strandline::kernel::distance::Neighbours;
-use strandline::kernel::distance::source_trees::SourceTrees;
+use strandline::kernel::distance::features::source_trees::SourceTrees;
+use strandline::kernel::distance::state::neighbours::Neighbours;
 use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule, solve_sets};
 
 use crate::common::ball::Bench;

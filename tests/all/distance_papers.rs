@@ -2,8 +2,8 @@
 
 use strandline::error::Result;
 use strandline::grid::{Box3, DataSets, Geometry, PointBins};
-use strandline::kernel::distance::Neighbours;
-use strandline::kernel::distance::initialise::Cube;
+use strandline::kernel::distance::seeding::initialise::Cube;
+use strandline::kernel::distance::state::neighbours::Neighbours;
 use strandline::pipeline::distance::{
     DistanceFound, DistanceSettings, Init, Method, Schedule, Solving, Sources, distance as run_distance,
 };

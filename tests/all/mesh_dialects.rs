@@ -8,7 +8,7 @@ use std::path::Path;
 use serde_json::Value;
 use strandline::grid::TriangleMesh;
 use strandline::io::sources::{Source, read_noted};
-use strandline::kernel::solid::Solid;
+use strandline::kernel::geometry::solid::Solid;
 use strandline::kernel::surface::Measures;
 
 use crate::common::meshes::{self, Form};

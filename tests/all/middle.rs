@@ -9,7 +9,7 @@ use std::fs;
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
 use strandline::io::mesh_ply::PlyWriter;
 use strandline::io::ome_zarr::StoreWriter;
-use strandline::kernel::distance::Neighbours::{All, Faces};
+use strandline::kernel::distance::state::neighbours::Neighbours::{All, Faces};
 use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule};
 use strandline::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle};
 use strandline::store::NoMesh;

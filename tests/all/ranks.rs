@@ -12,8 +12,8 @@ use proptest::prelude::*;
 use strandline::error::{Error, ErrorKind, Result};
 use strandline::exec::{Budget, Cancel, Engine, Progress, Silent, StageReport};
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
-use strandline::kernel::distance::Neighbours;
-use strandline::kernel::distance::precision::Precision;
+use strandline::kernel::distance::state::neighbours::Neighbours;
+use strandline::kernel::distance::state::precision::Precision;
 use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources, solve};
 use strandline::store::{BoxSource, Element, Scratch};
 

@@ -6,7 +6,7 @@ use std::fs;
 
 use serde_json::json;
 use strandline::io::sources::{Source, read_source};
-use strandline::kernel::distance::winding_number::WindingTree;
+use strandline::kernel::distance::features::winding_number::WindingTree;
 
 use crate::common::ball::Bench;
 use crate::common::clouds::sphere;

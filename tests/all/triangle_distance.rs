@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 
 use strandline::grid::{Box3, BrickGrid, Geometry, TriangleBins, TriangleMesh};
 use strandline::io::sources::{Source, read_source};
-use strandline::kernel::distance::initialise::NO_SOURCE;
-use strandline::kernel::distance::triangles::{cut_cells, fix_voxels};
-use strandline::kernel::distance::winding_number::{WindingTree, solid_angle};
+use strandline::kernel::distance::features::winding_number::{WindingTree, solid_angle};
+use strandline::kernel::distance::seeding::triangles::{cut_cells, fix_voxels};
+use strandline::kernel::distance::state::source::NO_SOURCE;
 
 use crate::common::meshes::{cuboid, joined, sphere};
 use crate::common::random::Random;

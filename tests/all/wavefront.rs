@@ -6,9 +6,9 @@ use std::collections::BTreeSet;
 
 use proptest::prelude::*;
 use strandline::grid::{Box3, DataSets, Geometry, PointBins, TriangleBins};
-use strandline::kernel::distance::Neighbours;
-use strandline::kernel::distance::initialise::Cube;
-use strandline::kernel::distance::precision::Precision;
+use strandline::kernel::distance::seeding::initialise::Cube;
+use strandline::kernel::distance::state::neighbours::Neighbours;
+use strandline::kernel::distance::state::precision::Precision;
 use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources};
 
 use crate::common::clouds::{grid_around, random_cloud, sponge};

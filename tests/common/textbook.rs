@@ -6,7 +6,7 @@
 
 use half::f16;
 use strandline::grid::Geometry;
-use strandline::kernel::distance::precision::Precision;
+use strandline::kernel::distance::state::precision::Precision;
 
 use super::lab::PlainGrid;
 

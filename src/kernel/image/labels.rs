@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::grid::{Box3, DataSets, FACES};
-use crate::kernel::distance::initialise::NO_SOURCE;
+use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::store::Element;
 
 /// Sources whose labels are looked up at once.

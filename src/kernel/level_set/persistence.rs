@@ -3,7 +3,7 @@
 //! the order in which pieces are joined.
 
 use super::basins::Piece;
-use crate::kernel::forest::Forest;
+use crate::kernel::topology::union_find::Forest;
 
 /// A basin persists when its depth is at least this many times its saddle; noise stays below 1.5.
 pub const PERSISTENCE: f32 = 2.0;

@@ -12,7 +12,7 @@
 use super::ascent::OUTSIDE;
 use super::contacts::Contact;
 use super::persistence::PERSISTENCE;
-use crate::kernel::forest::Forest;
+use crate::kernel::topology::union_find::Forest;
 
 /// What a region of steepest ascent is like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

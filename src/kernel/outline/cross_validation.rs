@@ -4,7 +4,7 @@ use rstar::RTree;
 
 use super::fitted::Fitted;
 use super::section::Section;
-use crate::kernel::vector::{dot, sub};
+use crate::kernel::geometry::vector::{dot, sub};
 
 /// A shape without a section is fitted to so many of those nearest to it.
 const NEAREST: usize = 6;

@@ -3,7 +3,7 @@
 //! flat, and half way there.
 
 use super::section::{Section, widest_gap};
-use crate::kernel::vector::dot;
+use crate::kernel::geometry::vector::dot;
 
 /// The ends of an object along the normal of its sections.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,7 @@ use super::radial_basis::RadialBasis;
 use super::samples::Samples;
 use super::section::Section;
 use super::windows::{Window, windows};
-use crate::kernel::vector::dot;
+use crate::kernel::geometry::vector::dot;
 
 /// Points beside outlines lie at least so many smallest spacings away.
 pub const LEAST_BESIDE: f64 = 0.75;

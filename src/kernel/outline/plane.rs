@@ -1,6 +1,6 @@
 //! The plane that an outline was drawn in: across an axis where it is flat in one, else through the outline itself.
 
-use crate::kernel::vector::{cross, dot, sub, unit};
+use crate::kernel::geometry::vector::{cross, dot, sub, unit};
 
 /// A plane with coordinates of its own. Lengths are physical.
 #[derive(Clone, Copy, Debug, PartialEq)]

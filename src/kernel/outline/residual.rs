@@ -5,7 +5,7 @@
 
 use super::section::Section;
 use crate::grid::{Box3, Geometry};
-use crate::kernel::vector::dot;
+use crate::kernel::geometry::vector::dot;
 
 /// What is left to a section's own distance counts up to so many smallest spacings.
 pub(super) const MOST_LEFT: f64 = 6.0;

@@ -1,6 +1,6 @@
 //! `Components`: how many connected pieces a mesh has, counted while its triangles pass.
 
-use crate::kernel::forest::Forest;
+use crate::kernel::topology::union_find::Forest;
 
 /// The pieces of a mesh; two vertices are in one when triangles connect them.
 #[derive(Clone, Debug, Default)]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::grid::Geometry;
-use crate::kernel::vector::{cross, dot, sub};
+use crate::kernel::geometry::vector::{cross, dot, sub};
 
 /// The faces between two labels. Lengths physical.
 #[derive(Clone, Copy, Debug, PartialEq)]

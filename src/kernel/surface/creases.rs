@@ -2,7 +2,7 @@
 //! on the straight line between the edges that they cross (after Kobbelt et al. 2001, Feature sensitive surface
 //! extraction).
 
-use crate::kernel::vector::{cross, dot, solved, sub};
+use crate::kernel::geometry::vector::{cross, dot, solved, sub};
 
 /// Two directions whose cosine is less are of different sides of a crease: 26 degrees.
 const SHARP: f64 = 0.9;

@@ -9,9 +9,9 @@
 use super::corner::Corner;
 use super::nearby::Nearby;
 use crate::grid::{Box3, Geometry};
-use crate::kernel::distance::labelled_shapes::LabelledShapes;
-use crate::kernel::distance::source_trees::SourceTrees;
-use crate::kernel::vector::{solved, sub, unit};
+use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
+use crate::kernel::distance::features::source_trees::SourceTrees;
+use crate::kernel::geometry::vector::{solved, sub, unit};
 
 /// How close to a voxel centre a vertex may come, in parts of the edge: triangles keep an area.
 const MARGIN: f64 = 1.0 / 1024.0;

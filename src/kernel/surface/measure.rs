@@ -1,7 +1,7 @@
 //! `SurfaceMeasure`: volume, area, closedness and pieces of a mesh, summed while its triangles pass.
 
 use super::{Components, EdgeTally};
-use crate::kernel::vector::{cross, dot, sub};
+use crate::kernel::geometry::vector::{cross, dot, sub};
 
 /// Running sums over triangles, in f64 and in the order the triangles come.
 #[derive(Clone, Debug)]

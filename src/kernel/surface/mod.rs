@@ -38,4 +38,4 @@ pub use partition::{Partition, REACH as PARTITION_REACH};
 pub use vertex_key::VertexKey;
 pub use weld::Welder;
 
-pub use crate::kernel::triangle::Triangle;
+pub use super::geometry::triangle::Triangle;

@@ -2,15 +2,15 @@
 //! asks a handful of sources instead of a tree of all.
 //!
 //! The box is cut into blocks, and these into smaller ones; a block where voxels of different labels are near keeps, for
-//! each of these labels, the sources that can be nearest to one of its places (`kernel::distance::culling`). Where these
+//! each of these labels, the sources that can be nearest to one of its places (`kernel::distance::features::culling`). Where these
 //! are many, as with meshes much finer than the grid, it keeps none, and its places ask the tree.
 
 use std::ops::Range;
 
 use crate::grid::{Box3, Geometry};
-use crate::kernel::distance::culling::{Around, Candidate, Culling};
-use crate::kernel::distance::labelled_shapes::LabelledShapes;
-use crate::kernel::distance::source_trees::SourceTrees;
+use crate::kernel::distance::features::culling::{Around, Candidate, Culling};
+use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
+use crate::kernel::distance::features::source_trees::SourceTrees;
 
 /// Edges of the blocks, in cells: trees are asked for the first.
 const EDGES: [i64; 2] = [16, 4];

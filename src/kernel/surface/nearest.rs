@@ -4,7 +4,7 @@
 //! go into coarser grids, each twice as wide as the one before. Cells are searched in shells of growing Chebyshev
 //! distance around the query until no triangle of the next shell can be nearer than the one found.
 
-use crate::kernel::triangle::Triangle;
+use crate::kernel::geometry::triangle::Triangle;
 
 /// The triangles of a mesh, sorted for distance queries. About 12 bytes a triangle beside the mesh itself.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::kernel::vector::{cross, dot, sub};
+use crate::kernel::geometry::vector::{cross, dot, sub};
 
 /// The surface between two labels. Lengths physical.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -118,7 +118,7 @@ fn place(part: &Box3, corner: &Corner) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::vector::{cross, dot, sub};
+    use crate::kernel::geometry::vector::{cross, dot, sub};
 
     /// The areas between labels of a volume that `label` tells, which ends within a box of `edge` voxels.
     fn areas(edge: i64, label: impl Fn([f64; 3]) -> u32) -> Vec<([u32; 2], f64)> {

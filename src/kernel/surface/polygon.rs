@@ -3,7 +3,7 @@
 //! A diagonal must not lie in a side of the tetrahedron: the tetrahedron behind it might draw it too. Of the cuts that
 //! are left the best is the one whose triangles are turned like the surface at their vertices: it keeps the crease.
 
-use crate::kernel::vector::{cross, dot, sub, unit};
+use crate::kernel::geometry::vector::{cross, dot, sub, unit};
 
 /// A vertex of the polygon.
 #[derive(Clone, Copy, Debug, PartialEq)]

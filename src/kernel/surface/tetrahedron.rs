@@ -6,7 +6,7 @@
 
 use super::corner::Corner;
 use super::vertex_key::VertexKey;
-use crate::kernel::vector::{cross, dot, sub};
+use crate::kernel::geometry::vector::{cross, dot, sub};
 
 /// Orders in which a way along a cell's edges can take the axes; each is a tetrahedron.
 pub(super) const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];

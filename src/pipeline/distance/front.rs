@@ -11,9 +11,9 @@
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{FACES, Slot};
-use crate::kernel::distance::Neighbours;
-use crate::kernel::distance::leaving::{leaving, leaving_anywhere};
-use crate::kernel::distance::method::DistanceMethod;
+use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::neighbours::Neighbours;
+use crate::kernel::distance::tile_order::arrival::{leaving, leaving_anywhere};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
 

@@ -5,11 +5,11 @@ use super::Sources;
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::Slot;
-use crate::kernel::distance::initialise::fix_voxels;
-use crate::kernel::distance::method::DistanceMethod;
-use crate::kernel::distance::seeds::{Seeds, write_states};
-use crate::kernel::distance::shape_distance::ShapeDistance;
-use crate::kernel::distance::triangles;
+use crate::kernel::distance::methods::shape_distance::ShapeDistance;
+use crate::kernel::distance::seeding::initialise::fix_voxels;
+use crate::kernel::distance::seeding::seeds::{Seeds, write_states};
+use crate::kernel::distance::seeding::triangles;
+use crate::kernel::distance::state::method::DistanceMethod;
 use crate::store::BrickArray;
 
 /// At most so far beyond the voxels that a point fixes others are told of it, in voxels: what that costs grows with it.

@@ -11,11 +11,11 @@ use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::{BrickGrid, BrickSet, DataSets, Geometry, PointBins, TriangleBins};
 use crate::io::ome_zarr::StoreWriter;
-use crate::kernel::distance::Neighbours;
-use crate::kernel::distance::initialise::Cube;
-use crate::kernel::distance::outside::OutsideSources;
-use crate::kernel::distance::precision::Precision;
-use crate::kernel::distance::source_trees::SourceTrees;
+use crate::kernel::distance::features::source_trees::SourceTrees;
+use crate::kernel::distance::seeding::initialise::Cube;
+use crate::kernel::distance::seeding::outside::OutsideSources;
+use crate::kernel::distance::state::neighbours::Neighbours;
+use crate::kernel::distance::state::precision::Precision;
 
 /// Which voxels points fix at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

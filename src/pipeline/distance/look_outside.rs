@@ -6,9 +6,9 @@ use super::Sources;
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::Slot;
-use crate::kernel::distance::initialise::NO_SOURCE;
-use crate::kernel::distance::method::DistanceMethod;
-use crate::kernel::distance::seeds::Seeds;
+use crate::kernel::distance::seeding::seeds::Seeds;
+use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::store::BrickArray;
 
 /// Gives voxels of this rank's bricks the source outside that is nearer than the one they were handed, where there is one,

@@ -39,7 +39,7 @@ pub use sources::Sources;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::BrickSet;
-use crate::kernel::distance::Neighbours;
+use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::store::BrickArray;
 
 /// In which order bricks are computed.

@@ -2,9 +2,9 @@
 
 use super::{DistanceSettings, Schedule, Textbook, Wanted};
 use crate::grid::{BrickGrid, DataSets, Geometry};
-use crate::kernel::distance::beside_sources::remembered_bytes;
-use crate::kernel::distance::outside::count_outside;
-use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::repair::descent::remembered_bytes;
+use crate::kernel::distance::seeding::outside::count_outside;
+use crate::kernel::distance::state::precision::Precision;
 
 /// An estimate; sizes in bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage};
 use crate::grid::{Box3, DataSets, Geometry};
 use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, LevelWriter, StoreWriter};
-use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::image::palette::label_color;
 use crate::pipeline::pyramid::{Pyramid, Reduce, held};
 use crate::store::{Element, ElementType};

@@ -9,7 +9,7 @@ use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;
 use crate::exec::{HaloPlan, Ownership, Reach, Stage};
 use crate::grid::{Box3, BrickGrid, BrickSet};
-use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::state::precision::Precision;
 use crate::store::{BoxSource, Element};
 
 /// Computes the distance to `sources` on the bricks of `set`, by a schedule; on all ranks of the stage's engine, of

@@ -10,11 +10,11 @@ use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::{Box3, DataSets, Geometry};
 use crate::io::ome_zarr::StoreWriter;
-use crate::kernel::distance::closest_point::ClosestPoints;
-use crate::kernel::distance::extent::extent;
-use crate::kernel::distance::initialise::NO_SOURCE;
-use crate::kernel::distance::inside::{Flood, Inside};
-use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::features::closest_point::ClosestPoints;
+use crate::kernel::distance::features::extent::extent;
+use crate::kernel::distance::features::inside::{Flood, Inside};
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::kernel::image::labels;
 use crate::pipeline::pyramid::{visits, visits_of};
 

@@ -1,4 +1,4 @@
-//! What a method leaves, read with a second look at the source of each voxel (`kernel::distance::second_look`): at
+//! What a method leaves, read with a second look at the source of each voxel (`kernel::distance::repair::bends`): at
 //! those that the `front` schedule may have lost where sources are tracked, and at equally near ones of lower labels.
 //! Nothing more is stored, and no brick is visited for it: whoever reads a box reads two voxels more around it.
 
@@ -10,12 +10,12 @@ use super::{Options, Solved, Sources};
 use crate::error::Result;
 use crate::exec::Workers;
 use crate::grid::{Box3, Geometry};
-use crate::kernel::distance::initialise::NO_SOURCE;
-use crate::kernel::distance::precision::Precision;
-use crate::kernel::distance::second_look::{Labels, Look, MARGIN, Seen};
-use crate::kernel::distance::shape_distance::ShapeDistance;
-use crate::kernel::distance::tracked::TrackedSource;
-use crate::kernel::distance::vector_distance::VectorDistance;
+use crate::kernel::distance::methods::shape_distance::ShapeDistance;
+use crate::kernel::distance::methods::tracked::TrackedSource;
+use crate::kernel::distance::methods::vector_distance::VectorDistance;
+use crate::kernel::distance::repair::bends::{Labels, Look, MARGIN, Seen};
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::store::BoxSource;
 
 /// Edge of the pieces that a box is looked at in: some 6 MB of buffers for each thread.

@@ -6,8 +6,8 @@ use super::field::Solved;
 use super::solving::{Solving, dijkstra_pythagoras, fast_marching, fast_sweeping, vector_distance};
 use crate::error::Result;
 use crate::grid::BrickGrid;
-use crate::kernel::distance::precision::Precision;
-use crate::kernel::distance::{dijkstra_heap, marching_heap};
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::distance::whole_volume::{dijkstra_heap, marching_heap};
 
 /// Solves on the bricks of a set, by a schedule.
 pub(super) type Solve<P> = for<'a> fn(&Solving<'_, 'a>, Schedule) -> Result<Solved<'a, P>>;

@@ -1,9 +1,9 @@
 //! Sources on a grid: what every distance method starts from.
 
 use crate::grid::{Box3, BrickId, DataSets, Geometry, PointBins, TriangleBins, TriangleMesh};
-use crate::kernel::distance::initialise::Cube;
-use crate::kernel::distance::outside::OutsideSources;
-use crate::kernel::distance::source_trees::SourceTrees;
+use crate::kernel::distance::features::source_trees::SourceTrees;
+use crate::kernel::distance::seeding::initialise::Cube;
+use crate::kernel::distance::seeding::outside::OutsideSources;
 
 /// Points, and triangles where there are any, sorted by the bricks of a grid.
 #[derive(Clone, Copy, Debug)]

@@ -4,8 +4,8 @@
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers, sweep_waves};
 use crate::grid::{BrickSet, FACES, Slot};
-use crate::kernel::distance::SWEEPS;
-use crate::kernel::distance::method::OrderedSweeps;
+use crate::kernel::distance::state::method::OrderedSweeps;
+use crate::kernel::distance::state::neighbours::SWEEPS;
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
 

@@ -7,11 +7,11 @@
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{FACES, Slot};
-use crate::kernel::distance::SWEEPS;
-use crate::kernel::distance::fast_sweeping::FastSweeping;
-use crate::kernel::distance::initialise::NO_SOURCE;
-use crate::kernel::distance::precision::Precision;
-use crate::kernel::distance::sweep_sources::{Fell, Ghosts, SweepSources};
+use crate::kernel::distance::methods::fast_sweeping::FastSweeping;
+use crate::kernel::distance::methods::sweep_sources::{Fell, Ghosts, SweepSources};
+use crate::kernel::distance::state::neighbours::SWEEPS;
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::store::{BrickArray, Scratch};
 
 use super::sweep::{Companion, Swept, Visit};

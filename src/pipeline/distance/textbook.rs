@@ -5,12 +5,12 @@
 use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::{DataSets, Geometry};
-use crate::kernel::distance::Neighbours;
-use crate::kernel::distance::dijkstra_heap::DijkstraHeap;
-use crate::kernel::distance::initialise::NO_SOURCE;
-use crate::kernel::distance::marching_heap::MarchingHeap;
-use crate::kernel::distance::precision::{Precision, Real};
-use crate::kernel::distance::tracked::TrackedSource;
+use crate::kernel::distance::methods::tracked::TrackedSource;
+use crate::kernel::distance::state::neighbours::Neighbours;
+use crate::kernel::distance::state::precision::{Precision, Real};
+use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::kernel::distance::whole_volume::dijkstra_heap::DijkstraHeap;
+use crate::kernel::distance::whole_volume::marching_heap::MarchingHeap;
 use crate::store::{BoxSink, BoxSource, BrickArray};
 
 /// Voxels frozen between two looks at whether the run was interrupted.

@@ -1,5 +1,5 @@
 //! Sources for methods that keep distances only, in a field of their own: for the `front` schedule found after the
-//! distances (`kernel::distance::trace`), for `sweep` what `sweep_sources` left pending.
+//! distances (`kernel::distance::tracking::trace`), for `sweep` what `sweep_sources` left pending.
 //!
 //! Bricks in which something may be found come first, then those beside bricks in which something was, as long as any
 //! is missing there: of these the nearest to the sources, since chains come from there and the others would wait for
@@ -9,11 +9,11 @@
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{Box3, DataSets, Geometry, NEIGHBOURS_26, Slot};
-use crate::kernel::distance::initialise::NO_SOURCE;
-use crate::kernel::distance::parents::Parents;
-use crate::kernel::distance::precision::Precision;
-use crate::kernel::distance::trace::{Tracer, fill};
-use crate::kernel::distance::vector_distance::FIXED;
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::distance::state::source::FIXED;
+use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::kernel::distance::tracking::parents::Parents;
+use crate::kernel::distance::tracking::trace::{Tracer, fill};
 use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
 

@@ -1,5 +1,5 @@
 //! Labels without a wrong one: where the nearest source belongs to another set than the tracked one
-//! (`kernel::distance::exact_labels`), it is put in its place as voxels are read.
+//! (`kernel::distance::features::exact_labels`), it is put in its place as voxels are read.
 //!
 //! Only voxels whose label changes are remembered. Distances are lowered to those of their new sources.
 
@@ -9,8 +9,8 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId};
-use crate::kernel::distance::exact_labels::ExactLabels;
-use crate::kernel::distance::precision::Precision;
+use crate::kernel::distance::features::exact_labels::ExactLabels;
+use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::{Solved, Together};
 use crate::store::BoxSource;
 

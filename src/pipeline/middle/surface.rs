@@ -4,8 +4,8 @@ use super::job::SurfaceKind;
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
-use crate::kernel::distance::labelled_shapes::LabelledShapes;
-use crate::kernel::distance::source_trees::SourceTrees;
+use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
+use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::image::labels;
 use crate::kernel::surface::{
     Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder,

@@ -1,0 +1,11 @@
+//! What is looked up among sources exactly, by trees and by leaving out what cannot be nearest, and what is read off a
+//! solved field: labels, closest points, insides, extents.
+
+pub mod closest_point;
+pub mod culling;
+pub mod exact_labels;
+pub mod extent;
+pub mod inside;
+pub mod labelled_shapes;
+pub mod source_trees;
+pub mod winding_number;

@@ -1,0 +1,81 @@
+//! What the methods that track sources share: how far a voxel is from one, in which arithmetic, and which source a
+//! state names. A method that carries sources in another order than VDT's is written once for points and for triangles.
+
+use super::shape_distance::ShapeDistance;
+use super::vector_distance::{VectorDistance, squared};
+use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::precision::Real;
+use crate::kernel::distance::state::source::FIXED;
+use crate::kernel::distance::state::source::NO_SOURCE;
+
+/// Sources, and the exact distances to them.
+pub trait TrackedSource: DistanceMethod<State = u32> {
+    /// What distances are compared in.
+    type Number: Real;
+
+    /// The coordinate of a voxel's centre along an axis, as distances are computed from.
+    fn coordinate(&self, axis: usize, index: i64) -> Self::Number;
+
+    /// The squared distance of a place to the source of a state; infinite to none.
+    fn squared(&self, here: [Self::Number; 3], state: u32) -> Self::Number;
+
+    /// Whether the first of two sources, each with a voxel's squared distance to it, is to be kept rather than the
+    /// second. Of equally near ones that is the second, which was there before; unless their labels differ, and their
+    /// numbers do not tell of which label is lower.
+    fn is_nearer(&self, (squared, _): (Self::Number, u32), than: (Self::Number, u32)) -> bool {
+        squared < than.0
+    }
+
+    /// Those of a row of voxels along x, the first at `start`, each to its own source.
+    fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
+        for ((x, out), &source) in (start[0]..).zip(out).zip(sources) {
+            *out = self.distance_squared(source, [x, start[1], start[2]]);
+        }
+    }
+}
+
+/// The source of a state, [`NO_SOURCE`] where it has none.
+#[inline(always)]
+pub(crate) fn source_of(state: u32) -> u32 {
+    state & !FIXED
+}
+
+/// Whether a state has a source.
+#[inline(always)]
+pub(crate) fn has_source(state: u32) -> bool {
+    source_of(state) != NO_SOURCE
+}
+
+impl<A: Real> TrackedSource for VectorDistance<'_, A> {
+    type Number = A;
+
+    fn coordinate(&self, axis: usize, index: i64) -> A {
+        self.coordinate(axis, index)
+    }
+
+    #[inline(always)]
+    fn squared(&self, here: [A; 3], state: u32) -> A {
+        squared(here, self.point(state))
+    }
+
+    fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
+        self.squared_row(sources, start, out);
+    }
+}
+
+impl TrackedSource for ShapeDistance<'_> {
+    type Number = f64;
+
+    fn coordinate(&self, axis: usize, index: i64) -> f64 {
+        self.coordinate(axis, index)
+    }
+
+    fn squared(&self, here: [f64; 3], state: u32) -> f64 {
+        self.squared(here, state)
+    }
+
+    #[inline]
+    fn is_nearer(&self, a: (f64, u32), b: (f64, u32)) -> bool {
+        a.0 < b.0 || (a.0 == b.0 && self.has_lower_label(a.1, b.1))
+    }
+}

@@ -1,0 +1,5 @@
+//! Triples, triangles and closed meshes: geometry in f64, without a grid.
+
+pub mod solid;
+pub mod triangle;
+pub(crate) mod vector;

@@ -1,0 +1,3 @@
+//! What is connected to what.
+
+pub mod union_find;
