@@ -3,9 +3,10 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use strandline::kernel::image::gaussian::{Block, Gaussian, Smoothed};
-use strandline::kernel::level_set::covolume::{Fields, Planes, Velocity, assemble};
+use strandline::kernel::level_set::covolume::{Planes, assemble};
 use strandline::kernel::level_set::mask::CellMask;
 use strandline::kernel::level_set::scheme::SCHEME_LEN;
+use strandline::kernel::level_set::velocity::{Fields, Velocity};
 use strandline::kernel::level_set::{CELL_LEN, sor};
 
 fn level_set(c: &mut Criterion) {

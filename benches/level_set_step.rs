@@ -16,7 +16,7 @@ use std::time::Instant;
 use lab::{Lab, PlainGrid, dense, whole};
 use plain_scheme::{PlainVelocity, coefficients, gradient_norms};
 use strandline::kernel::level_set::CELL;
-use strandline::kernel::level_set::covolume::Velocity;
+use strandline::kernel::level_set::velocity::Velocity;
 use strandline::pipeline::band::{Reaches, make_band};
 use strandline::pipeline::evolve::{Stop, TimeLoop, evolve};
 

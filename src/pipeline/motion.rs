@@ -3,7 +3,7 @@
 
 use super::evolve::{Stop, TimeLoop};
 use crate::grid::Geometry;
-use crate::kernel::level_set::covolume::Velocity;
+use crate::kernel::level_set::velocity::Velocity;
 
 /// What the user may set; `None` leaves a length to the spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]

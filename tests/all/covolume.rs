@@ -2,9 +2,10 @@
 //! f64, one voxel and 24 tetrahedra at a time; gradients also against fields whose gradient is known.
 
 use strandline::kernel::image::edge_detector::edge_detector;
-use strandline::kernel::level_set::covolume::{Fields, Planes, Velocity, assemble, mean_gradient};
+use strandline::kernel::level_set::covolume::{Planes, assemble, mean_gradient};
 use strandline::kernel::level_set::mask::CellMask;
 use strandline::kernel::level_set::scheme::{SCHEME_LEN, scheme_place};
+use strandline::kernel::level_set::velocity::{Fields, Velocity};
 use strandline::kernel::level_set::{CELL, CELL_LEN};
 
 use crate::common::lab::PlainGrid;

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 
 use strandline::grid::{BrickGrid, Geometry, PointBins};
 use strandline::kernel::level_set::CELL;
-use strandline::kernel::level_set::covolume::Velocity;
 use strandline::kernel::level_set::persistence::PERSISTENCE;
+use strandline::kernel::level_set::velocity::Velocity;
 use strandline::kernel::surface::{MarchingCubes, Measures, Patch, PatchIndex, SurfaceMeasure, Welder, cells_of_brick};
 use strandline::pipeline::band::{Reaches, make_band};
 use strandline::pipeline::distance::{Method, Sources, cloud_distance};

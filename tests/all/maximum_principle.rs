@@ -2,10 +2,11 @@
 //! before for any tau and eps, constants stay; and against the linear system of the printed scheme in f64.
 
 use proptest::prelude::*;
-use strandline::kernel::level_set::covolume::{Fields, Planes, Velocity, assemble};
+use strandline::kernel::level_set::covolume::{Planes, assemble};
 use strandline::kernel::level_set::mask::CellMask;
 use strandline::kernel::level_set::scheme::SCHEME_LEN;
 use strandline::kernel::level_set::sor::{Halves, Relaxation, relax};
+use strandline::kernel::level_set::velocity::{Fields, Velocity};
 use strandline::kernel::level_set::{CELL, CELL_LEN};
 use strandline::pipeline::evolve::{Evolution, Stop, TimeLoop, evolve};
 

@@ -2,12 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::grid::{Box3, DataSets, FACES};
-use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::grid::{Box3, FACES};
 use crate::store::Element;
-
-/// Sources whose labels are looked up at once.
-const AT_ONCE: usize = 64;
 
 /// Writes `label` into `out` where u is at least 1/2. `u` is dense `[z][y][x]` over the box `from`, `out` over the box
 /// `to`, which holds `from`.
@@ -19,42 +15,10 @@ pub fn paint<T: Element>(u: &[f32], from: &Box3, label: T, to: &Box3, out: &mut 
     }
 }
 
-/// The labels of voxels by their sources, into `out`; 0 for those without one.
-pub fn of_sources(sets: &DataSets, sources: &[u32], out: &mut Vec<u32>) {
-    out.clear();
-    let mut known = sets.run_of(NO_SOURCE);
-    for few in sources.chunks(AT_ONCE) {
-        // Neighbours mostly have one label: whether they do costs less than to look at each.
-        let (lo, hi) = few.iter().fold((u32::MAX, 0), |(lo, hi), &source| (lo.min(source), hi.max(source)));
-        if known.0.contains(&lo) && known.0.contains(&hi) {
-            out.resize(out.len() + few.len(), known.1);
-            continue;
-        }
-        out.extend(few.iter().map(|source| {
-            if !known.0.contains(source) {
-                known = sets.run_of(*source);
-            }
-            known.1
-        }));
-    }
-}
-
 /// 1 where voxels have a label, else 0.
 #[must_use]
 pub fn mask(labels: &[u32], label: u32) -> Vec<f32> {
     labels.iter().map(|&other| f32::from(u8::from(other == label))).collect()
-}
-
-/// Voxels of each label but 0, by their sources.
-#[must_use]
-pub fn count_sources(sets: &DataSets, sources: &[u32], labels: &mut Vec<u32>) -> BTreeMap<u32, u64> {
-    match sources.first().map(|first| sets.label(*first)) {
-        Some(label) if label > 0 && sets.share_label(sources) => BTreeMap::from([(label, sources.len() as u64)]),
-        _ => {
-            of_sources(sets, sources, labels);
-            count(labels)
-        }
-    }
 }
 
 /// Voxels of each label but 0.
@@ -104,30 +68,18 @@ mod tests {
     }
 
     #[test]
-    fn sources_have_the_labels_of_their_sets() {
-        let mut sets = DataSets::default();
-        sets.add_labelled(4, &[[0.0; 3]; 2]);
-        sets.add_labelled(9, &[[1.0; 3]]);
-        let mut labels = vec![7];
-        of_sources(&sets, &[2, 2, 0, 1, u32::MAX], &mut labels);
-        assert_eq!(labels, [9, 9, 4, 4, 0]);
-        assert_eq!(mask(&labels, 4), [0.0, 0.0, 1.0, 1.0, 0.0]);
-        let part = Box3::new([3, 5, 7], [8, 6, 8]);
-        assert_eq!(labelled(&labels, &part).last(), Some(([6, 5, 7], 4)));
-        assert_eq!(labelled(&labels, &part).count(), 4);
-    }
-
-    #[test]
     fn labels_are_counted_wherever_they_stand() {
         let counts = count(&[0, 2, 2, 0, 1, 2, 70_000, 1, 1]);
         assert_eq!(counts, BTreeMap::from([(1, 3), (2, 3), (70_000, 1)]));
         assert!(count(&[0, 0]).is_empty() && count(&[]).is_empty());
-        let mut sets = DataSets::default();
-        sets.add_labelled(4, &[[0.0; 3]; 2]);
-        sets.add_labelled(9, &[[1.0; 3]]);
-        let of = |sources: &[u32]| count_sources(&sets, sources, &mut Vec::new());
-        assert_eq!(of(&[1, 0, 2, NO_SOURCE]), BTreeMap::from([(4, 2), (9, 1)]));
-        assert_eq!(of(&[1, 0, 1]), BTreeMap::from([(4, 3)]));
-        assert!(of(&[NO_SOURCE; 2]).is_empty() && of(&[]).is_empty());
+    }
+
+    #[test]
+    fn one_label_is_told_from_others() {
+        let labels = [9, 9, 4, 4, 0];
+        assert_eq!(mask(&labels, 4), [0.0, 0.0, 1.0, 1.0, 0.0]);
+        let part = Box3::new([3, 5, 7], [8, 6, 8]);
+        assert_eq!(labelled(&labels, &part).last(), Some(([6, 5, 7], 4)));
+        assert_eq!(labelled(&labels, &part).count(), 4);
     }
 }

@@ -11,9 +11,9 @@
 //! of it. In: grown cells of d and g, planes of norms. Out: seven planes. Cost: about 60 operations and two roots per
 //! voxel.
 
-use super::covolume::{Fields, Velocity};
 use super::gradients::{FaceNorms, Metric, whole_vectors};
 use super::mask::CellMask;
+use super::velocity::{Fields, Velocity};
 use super::{CELL, FLAT, GROWN, PLANE};
 
 /// What one plane of voxels gets, row y from `y * GROWN` on: the coefficients towards the neighbours across -x, +x, -y,

@@ -20,6 +20,7 @@ pub mod scheme;
 pub mod sor;
 pub mod spaces;
 pub mod start;
+pub mod velocity;
 
 /// Voxels along the edge of a cell.
 pub const CELL: usize = 16;

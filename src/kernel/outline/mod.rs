@@ -12,6 +12,7 @@ pub mod curve;
 pub mod ends;
 pub mod fitted;
 pub mod lattice;
+pub mod marked;
 pub mod noise;
 pub mod plane;
 pub mod radial_basis;

@@ -11,7 +11,7 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::curve::{MOST_MARKS, Marked, Scatter};
+use super::marked::{MOST_MARKS, Marked, Scatter};
 
 /// Steps of the search: amplitudes of the radius, and deviations in units of the smallest spacing.
 const AMPLITUDES: [f64; 7] = [0.01, 0.03, 0.07, 0.15, 0.3, 0.6, 1.2];

@@ -6,7 +6,8 @@
 //! was divided into them; rows of buckets know the edges that cross them, which tell a point's side.
 
 use super::chords::chords;
-use super::curve::{Curve, area};
+use super::curve::Curve;
+use super::marked::area;
 use super::plane::Plane;
 
 /// The outlines of an object in one plane.

@@ -1,7 +1,7 @@
 //! Corners of the tetrahedra that a surface between labels is cut from: voxel centres, and places on edges between them
 //! where a surface that crosses an edge twice has its inside.
 
-use super::equidistant::Known;
+use super::known::Known;
 
 /// A place with a label.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,10 +7,8 @@
 //! labels and a tetrahedron of four all of them are made equal by Newton's method.
 
 use super::corner::Corner;
-use super::nearby::Nearby;
-use crate::grid::{Box3, Geometry};
-use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
-use crate::kernel::distance::features::source_trees::SourceTrees;
+use super::known::Known;
+use crate::grid::Box3;
 use crate::kernel::geometry::vector::{solved, sub, unit};
 
 /// How close to a voxel centre a vertex may come, in parts of the edge: triangles keep an area.
@@ -43,25 +41,6 @@ pub struct Between {
     /// The direction across the surface, towards the side of the larger label, of unit length, on an edge; else 0.
     /// Physical.
     pub normal: [f64; 3],
-}
-
-/// Voxels with the sources they track, over a box.
-#[derive(Clone, Copy, Debug)]
-pub struct Known<'a> {
-    /// Where the voxels lie.
-    pub geometry: &'a Geometry,
-    /// What the sources are.
-    pub shapes: &'a LabelledShapes<'a>,
-    /// The nearest source of each label, near borders.
-    pub nearby: &'a Nearby,
-    /// The same anywhere.
-    pub trees: &'a SourceTrees,
-    /// The box.
-    pub part: Box3,
-    /// Source of each voxel, dense `[z][y][x]` over the box.
-    pub sources: &'a [u32],
-    /// Label of each voxel, that of its source.
-    pub labels: &'a [u32],
 }
 
 /// Work buffers: the sources of each label around.
@@ -191,23 +170,6 @@ impl Candidates {
     /// The distance to the nearest collected source of the n-th label.
     fn distance(&self, known: &Known<'_>, n: usize, here: [f64; 3]) -> f64 {
         self.of_label[n].iter().map(|&source| known.shapes.distance(here, source)).fold(f64::INFINITY, f64::min)
-    }
-}
-
-impl Known<'_> {
-    pub(super) fn label(&self, voxel: [i64; 3]) -> u32 {
-        self.labels[self.part.offset_of(voxel)]
-    }
-
-    /// The number of a label's source that is nearest to a place.
-    pub(super) fn nearest(&self, label: u32, place: [f64; 3]) -> u32 {
-        let world = self.world(place);
-        let near = self.nearby.nearest(self.shapes, self.trees, label, place, world);
-        near.unwrap_or_else(|| self.trees.nearest(label, world))
-    }
-
-    pub(super) fn world(&self, place: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|a| self.geometry.origin[a] + place[a] * self.geometry.spacing[a])
     }
 }
 

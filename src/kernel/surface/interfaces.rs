@@ -10,7 +10,8 @@ use std::collections::HashMap;
 
 use super::corner::Corner;
 use super::creases::{self, Crossing};
-use super::equidistant::{Between, Candidates, Known};
+use super::equidistant::{Between, Candidates};
+use super::known::Known;
 use super::marching_cubes::Patch;
 use super::polygon::{self, Point};
 use super::splits::Splits;

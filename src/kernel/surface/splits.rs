@@ -6,7 +6,7 @@
 //! by the nearest source of each label.
 
 use super::corner::Corner;
-use super::equidistant::Known;
+use super::known::Known;
 use crate::grid::{Box3, NEIGHBOURS_26};
 
 /// Other labels that are kept of a voxel, the nearest.

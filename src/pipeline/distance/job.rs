@@ -1,6 +1,6 @@
 //! The whole job of `distance`: solve on a grid of any size, and write what was asked for.
 
-use std::collections::BTreeMap;
+use super::found::DistanceFound;
 use std::sync::Arc;
 
 use super::contiguous::contiguous_margin;
@@ -63,21 +63,6 @@ impl DistanceSettings {
         let is_tracked = self.schedule == Schedule::Front && self.method.solver::<P>().tracks_sources();
         self.labels && sets.count() > 1 && is_tracked
     }
-}
-
-/// What a job found.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DistanceFound {
-    /// The largest distance.
-    pub max: f64,
-    /// Voxels that sources fixed.
-    pub fixed_voxels: u64,
-    /// Voxels that no source reached.
-    pub unlabelled_voxels: u64,
-    /// Distances from a voxel to a triangle that were computed to fix voxels, where there are triangles.
-    pub triangle_distances: Option<u64>,
-    /// Voxels of each label, where labels were asked for; also of labels that are nowhere the nearest.
-    pub label_voxels: BTreeMap<u32, u64>,
 }
 
 /// Computes the distance to `sets` on a grid, stored as `P`; `store` gets the fields, none when it is absent.

@@ -6,6 +6,7 @@
 
 mod contiguous;
 mod field;
+pub(crate) mod found;
 mod front;
 mod initialise;
 mod job;
@@ -13,6 +14,7 @@ mod look_outside;
 mod needs;
 mod output;
 mod ranks;
+pub(crate) mod read_tile;
 mod readout;
 mod second_look;
 mod solvers;
@@ -26,7 +28,8 @@ mod trace;
 use std::sync::Arc;
 
 pub use field::{Solved, Together};
-pub use job::{DistanceFound, DistanceSettings, Init, distance, solve_sets};
+pub use found::DistanceFound;
+pub use job::{DistanceSettings, Init, distance, solve_sets};
 pub use needs::Needs;
 pub(crate) use needs::tree_bytes;
 pub(crate) use output::Wanted;

@@ -1,7 +1,7 @@
 //! The images that a distance is written as: the distance itself, the label of the nearest data set and where it borders
 //! on another, the position of the nearest source.
 
-use super::readout::Tile;
+use super::read_tile::Tile;
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
 use crate::grid::{Box3, DataSets, Geometry};

@@ -1,10 +1,12 @@
 //! The one look at all voxels of a solved distance: chunk by chunk the solved state is read, told from which side of
 //! meshes it is seen, measured for the report, and handed on to the images that are written.
 
+use super::read_tile::Tile;
+use crate::kernel::distance::features::source_labels;
 use std::collections::BTreeMap;
 
 use super::Solved;
-use super::job::DistanceFound;
+use super::found::DistanceFound;
 use super::output::{Buffers, Images, Wanted};
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
@@ -26,16 +28,6 @@ pub(crate) struct ReadOut<'a, 'b, P> {
     /// Distances are negative inside meshes.
     pub(crate) is_signed: bool,
     pub(crate) wanted: Wanted,
-}
-
-/// What is known of the voxels of a chunk, dense `[z][y][x]`; empty where nobody asked for it.
-pub(super) struct Tile<'a, P> {
-    pub(super) part: &'a Box3,
-    pub(super) values: &'a [P],
-    pub(super) sources: &'a [u32],
-    pub(super) labels: &'a [u32],
-    pub(super) borders: &'a [u32],
-    pub(super) closest: &'a ClosestPoints<'a>,
 }
 
 /// What one thread reads into.
@@ -118,7 +110,7 @@ impl<P: Precision> ReadOut<'_, '_, P> {
             let grown = part.grow(1).intersect(&self.geometry.domain());
             let (values_around, sources_around, labels_around) = around;
             self.read_both(&grown, values_around, sources_around)?;
-            labels::of_sources(self.sets, sources_around, labels_around);
+            source_labels::of_sources(self.sets, sources_around, labels_around);
             borders.resize(part.len(), 0);
             labels::border(labels_around, &grown, part, borders);
             grown.cut(values_around, part, values);
@@ -133,7 +125,7 @@ impl<P: Precision> ReadOut<'_, '_, P> {
             self.solved.values.read_box(part, values)?;
         }
         if self.wanted.labels {
-            labels::of_sources(self.sets, sources, labels);
+            source_labels::of_sources(self.sets, sources, labels);
         }
         Ok(())
     }

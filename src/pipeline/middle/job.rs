@@ -2,7 +2,9 @@
 //! between them, measure and write.
 
 use super::exact::with_exact_labels;
-use super::surface::{Labelled, draw, held};
+use super::settings::{LabelMode, MiddleSettings};
+use super::surface::SurfaceKind;
+use super::surface::{Labelled, draw};
 use super::table::csv;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
@@ -13,51 +15,8 @@ use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::surface::{Measures, Pair};
-use crate::pipeline::distance::{DistanceFound, DistanceSettings, Needs, ReadOut, Wanted, solve_sets, tree_bytes};
+use crate::pipeline::distance::{DistanceFound, DistanceSettings, ReadOut, Wanted, solve_sets};
 use crate::store::MeshSink;
-
-/// Which surface is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SurfaceKind {
-    /// Between the voxels, where both distances are equal.
-    Exact,
-    /// The isosurface 0.5 of the labels of two sets, as the papers draw it.
-    Labels,
-}
-
-/// How labels are told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LabelMode {
-    /// By the sources that the method tracks. Of equally near ones the lower label is taken: by VDT and DP where the
-    /// distances to both are equal; by FSM and FMM, which do not know these, where their own distance comes equally by
-    /// way of either, to the bit.
-    Tracked,
-    /// By the nearest source, looked up wherever the tracked one may belong to the wrong set; of equal distances the
-    /// lower label wins.
-    Exact,
-}
-
-/// What is computed and how.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MiddleSettings {
-    /// The distance; with labels.
-    pub distance: DistanceSettings,
-    /// The surface.
-    pub surface: SurfaceKind,
-    /// The labels.
-    pub labels: LabelMode,
-}
-
-impl MiddleSettings {
-    /// What these settings take on a grid, on so many threads that so many ranks share.
-    #[must_use]
-    pub fn needs<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize, ranks: usize) -> Needs {
-        let distance = DistanceSettings { labels: true, ..self.distance };
-        let needs = distance.needs::<P>(geometry, sets, threads, ranks);
-        let trees = if distance.looks_closer::<P>(sets) { 0 } else { tree_bytes(sets) };
-        Needs { held: needs.held + trees + held(geometry), ..needs }
-    }
-}
 
 /// What a job found.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,10 @@
 
 mod exact;
 mod job;
+pub(crate) mod settings;
 mod surface;
 mod table;
 
-pub use job::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle};
+pub use job::{MiddleFound, middle};
+pub use settings::{LabelMode, MiddleSettings};
+pub use surface::SurfaceKind;

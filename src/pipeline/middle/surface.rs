@@ -1,10 +1,11 @@
 //! Draws the surfaces between labels brick by brick, welded in grid order, and measures them.
 
-use super::job::SurfaceKind;
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
-use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
+use crate::grid::Geometry;
+use crate::grid::{Box3, BrickGrid, BrickId};
 use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
+use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::image::labels;
 use crate::kernel::surface::{
@@ -92,7 +93,7 @@ impl Worker {
         let part = Box3::new(cells.lo, cells.hi.map(|v| v + 1)).grow(1).intersect(&geometry.domain());
         self.sources.resize(part.len(), 0);
         labelled.sources.read_box(&part, &mut self.sources)?;
-        labels::of_sources(shapes.sets(), &self.sources, &mut self.labels);
+        source_labels::of_sources(shapes.sets(), &self.sources, &mut self.labels);
         if self.labels.iter().all(|&label| label == self.labels[0]) {
             return Ok(patch);
         }
@@ -124,4 +125,13 @@ impl Worker {
         };
         patch.patch.positions.iter().map(distance).collect()
     }
+}
+
+/// Which surface is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SurfaceKind {
+    /// Between the voxels, where both distances are equal.
+    Exact,
+    /// The isosurface 0.5 of the labels of two sets, as the papers draw it.
+    Labels,
 }

@@ -1,7 +1,7 @@
 //! Leaving out each outline in turn: how far its marks then lie from the shape of the others, and where the next outline
 //! would help most.
 
-use super::object::CrossValidation;
+use super::object_report::CrossValidation;
 use super::survey::Outlined;
 use crate::error::Result;
 use crate::exec::{Engine, Workers};

@@ -6,6 +6,7 @@
 //! u -> surface -> mesh, measures       u of all objects -> neighbours -> one label volume, common faces
 //! ```
 
+pub(crate) mod begun;
 mod check;
 mod cross_validate;
 mod doubts;
@@ -13,9 +14,11 @@ mod estimate;
 mod labels;
 mod neighbours;
 mod object;
+pub(crate) mod object_report;
 mod objects;
 mod outlines;
 mod output;
+pub(crate) mod picture;
 mod reach;
 mod seed;
 mod settings;
@@ -30,8 +33,8 @@ pub use doubts::{doubts, open_outlines, same_place, spans_slices};
 pub use estimate::{Estimate, estimate};
 pub use labels::{Overlap, Placed};
 pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_faces, join};
-pub use object::{CrossValidation, ObjectReport};
-pub use objects::Refused;
+pub use object_report::Refused;
+pub use object_report::{CrossValidation, ObjectReport};
 pub use outlines::crossed;
 pub use output::{LARGEST_WHOLE, Outcome, segment};
 pub use settings::{Guides, ImageModel, SegmentSettings, Start};

@@ -1,8 +1,12 @@
 //! All objects: looked at together, solved each for itself, small ones side by side; their surfaces drawn and checked.
 
+use super::begun::Solution;
 use super::cross_validate::cross_validate;
-use super::object::{ObjectReport, Picture, Solution, solve};
+use super::object::solve;
+use super::object_report::ObjectReport;
+use super::object_report::Refused;
 use super::outlines::scatter_of;
+use super::picture::Picture;
 use super::settings::{Guides, ImageModel, SegmentSettings, Start};
 use super::survey::{Looking, Outlined, Trust, left_out_of, trust};
 use crate::error::{Error, ErrorKind, Result};
@@ -17,15 +21,6 @@ use crate::pipeline::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
 use crate::pipeline::vicinity::voxel_bounds;
 use crate::store::{Element, ElementType, NoMesh};
-
-/// An object that could not be solved.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refused {
-    /// Its number.
-    pub label: u32,
-    /// Why, in one sentence.
-    pub reason: String,
-}
 
 /// What was solved, in order of the labels, and what was not.
 pub(super) struct Objects {

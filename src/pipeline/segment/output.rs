@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use super::begun::Solution;
 use super::labels::Placed;
 use super::neighbours::{Found, Joined};
-use super::object::{ObjectReport, Picture, Solution, World};
-use super::objects::{Objects, Refused, solve_all};
+use super::object_report::ObjectReport;
+use super::object_report::Refused;
+use super::objects::{Objects, solve_all};
+use super::picture::{Picture, World};
 use super::settings::{Guides, SegmentSettings};
 use super::tissue::{join_objects, write_faces};
 use crate::error::{Error, Result};

@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use super::object::{Begun, Forces, Picture, Solution, name};
+use super::begun::Solution;
+use super::begun::{Begun, Forces};
+use super::picture::{Picture, name};
 use super::settings::SegmentSettings;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};

@@ -2,7 +2,7 @@
 
 use super::labels::Overlap;
 use super::neighbours::FillGaps;
-use super::objects::Refused;
+use super::object_report::Refused;
 use crate::grid::Geometry;
 use crate::pipeline::distance::Method;
 use crate::pipeline::image_terms::{EdgeSettings, Smoothing};

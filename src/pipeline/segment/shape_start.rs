@@ -1,7 +1,8 @@
 //! An object that starts as the shape of its outlines: its band, and the speed at which image and shape move it.
 
-use super::object::{Begun, Forces, Picture, name};
+use super::begun::{Begun, Forces};
 use super::outlines::cloud;
+use super::picture::{Picture, name};
 use super::settings::{ImageModel, SegmentSettings};
 use super::shape_field::ShapeField;
 use super::speed::{Pulls, speed};

@@ -1,8 +1,8 @@
 //! What the outlines and the image say before anything is solved: which border the image shows under the marks, how
 //! well it tells where that is, and how sure the shape is between the outlines.
 
-use super::object::{Picture, name};
 use super::outlines;
+use super::picture::{Picture, name};
 use super::settings::ImageModel;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
@@ -11,8 +11,8 @@ use crate::kernel::image::border_model::{BorderModel, Reading, median};
 use crate::kernel::image::carried::Carried;
 use crate::kernel::image::profiles::{LEN, Profile, REACH, STEP, interpolate};
 use crate::kernel::outline::cross_validation::{HeldOut, leave_out};
-use crate::kernel::outline::curve::Scatter;
 use crate::kernel::outline::fitted::{Fit, Fitted, LEAST_BESIDE, MOST_SAMPLES};
+use crate::kernel::outline::marked::Scatter;
 use crate::kernel::outline::section::Section;
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::ObjectMarks;

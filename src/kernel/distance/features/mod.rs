@@ -7,5 +7,6 @@ pub mod exact_labels;
 pub mod extent;
 pub mod inside;
 pub mod labelled_shapes;
+pub mod source_labels;
 pub mod source_trees;
 pub mod winding_number;

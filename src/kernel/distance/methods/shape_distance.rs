@@ -229,3 +229,20 @@ impl OrderedSweeps for ShapeDistance<'_> {
         self.pass(tile, asked, part, upward) & CHANGED != 0
     }
 }
+
+impl TrackedSource for ShapeDistance<'_> {
+    type Number = f64;
+
+    fn coordinate(&self, axis: usize, index: i64) -> f64 {
+        self.coordinate(axis, index)
+    }
+
+    fn squared(&self, here: [f64; 3], state: u32) -> f64 {
+        self.squared(here, state)
+    }
+
+    #[inline]
+    fn is_nearer(&self, a: (f64, u32), b: (f64, u32)) -> bool {
+        a.0 < b.0 || (a.0 == b.0 && self.has_lower_label(a.1, b.1))
+    }
+}

@@ -1,8 +1,6 @@
 //! What the methods that track sources share: how far a voxel is from one, in which arithmetic, and which source a
 //! state names. A method that carries sources in another order than VDT's is written once for points and for triangles.
 
-use super::shape_distance::ShapeDistance;
-use super::vector_distance::{VectorDistance, squared};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::precision::Real;
 use crate::kernel::distance::state::source::FIXED;
@@ -44,38 +42,4 @@ pub(crate) fn source_of(state: u32) -> u32 {
 #[inline(always)]
 pub(crate) fn has_source(state: u32) -> bool {
     source_of(state) != NO_SOURCE
-}
-
-impl<A: Real> TrackedSource for VectorDistance<'_, A> {
-    type Number = A;
-
-    fn coordinate(&self, axis: usize, index: i64) -> A {
-        self.coordinate(axis, index)
-    }
-
-    #[inline(always)]
-    fn squared(&self, here: [A; 3], state: u32) -> A {
-        squared(here, self.point(state))
-    }
-
-    fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
-        self.squared_row(sources, start, out);
-    }
-}
-
-impl TrackedSource for ShapeDistance<'_> {
-    type Number = f64;
-
-    fn coordinate(&self, axis: usize, index: i64) -> f64 {
-        self.coordinate(axis, index)
-    }
-
-    fn squared(&self, here: [f64; 3], state: u32) -> f64 {
-        self.squared(here, state)
-    }
-
-    #[inline]
-    fn is_nearer(&self, a: (f64, u32), b: (f64, u32)) -> bool {
-        a.0 < b.0 || (a.0 == b.0 && self.has_lower_label(a.1, b.1))
-    }
 }

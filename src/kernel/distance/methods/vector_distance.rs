@@ -7,6 +7,7 @@
 //! source indices, the top bit set on voxels that a source fixed. Halo 1, faces. While a tile is worked on every voxel
 //! holds its source's position beside the index, so that sweeps look nothing up.
 
+use super::tracked::TrackedSource;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::state::precision::Real;
@@ -379,5 +380,22 @@ impl<A: Real> OrderedSweeps for VectorDistance<'_, A> {
             work.layout.store(&work.source, tile, |s| s);
         }
         changed
+    }
+}
+
+impl<A: Real> TrackedSource for VectorDistance<'_, A> {
+    type Number = A;
+
+    fn coordinate(&self, axis: usize, index: i64) -> A {
+        self.coordinate(axis, index)
+    }
+
+    #[inline(always)]
+    fn squared(&self, here: [A; 3], state: u32) -> A {
+        squared(here, self.point(state))
+    }
+
+    fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
+        self.squared_row(sources, start, out);
     }
 }

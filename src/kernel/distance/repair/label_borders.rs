@@ -4,10 +4,10 @@
 //! sources are equally near: which of them a method found first hangs on the order in which it visits voxels. Either way
 //! a neighbour's source is hardly farther than the voxel's own.
 
-use super::bends::Look;
+use super::look::Look;
 use crate::grid::{Box3, DataSets, FACES, Face};
+use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::state::source::NO_SOURCE;
-use crate::kernel::image::labels;
 
 /// Finds them.
 #[derive(Clone, Debug, Default)]
@@ -22,7 +22,7 @@ impl LabelBorders {
     /// Calls `tell` with each voxel of the part that has face neighbours of other labels, and with their sources.
     pub(crate) fn each(&mut self, look: &Look<'_>, sets: &DataSets, mut tell: impl FnMut([i64; 3], &[u32])) {
         let Look { part, known, found, .. } = *look;
-        labels::of_sources(sets, found, &mut self.labels);
+        source_labels::of_sources(sets, found, &mut self.labels);
         for (y, z) in part.rows() {
             self.flag(part, known, y, z);
             for (x, _) in (part.lo[0]..).zip(&self.flagged).filter(|(_, flagged)| **flagged != 0) {

@@ -1,7 +1,7 @@
 //! The common faces of all labels, as one mesh: drawn box by box, welded in grid order, each pair measured.
 
 use super::EDGE;
-use super::join::Joined;
+use super::joined::Joined;
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::EDGE;
-use super::join::Joined;
+use super::joined::Joined;
 use super::nesting::Nesting;
 use super::survey::Survey;
 use crate::error::Result;

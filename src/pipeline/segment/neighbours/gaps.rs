@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::fields::{Roots, near_two};
-use super::join::{FillGaps, Joined, Joining};
+use super::joined::{FillGaps, Joined, Joining};
 use super::nesting::Nesting;
 use super::sharing::share;
 use super::survey::Survey;

@@ -13,6 +13,7 @@ mod faces;
 mod fields;
 mod gaps;
 mod join;
+pub(crate) mod joined;
 mod needs;
 mod nesting;
 mod overlaps;
@@ -23,7 +24,8 @@ mod walls;
 mod widths;
 
 pub use faces::draw as draw_faces;
-pub use join::{FillGaps, Found, Joined, Joining, join};
+pub use join::join;
+pub use joined::{FillGaps, Found, Joined, Joining};
 pub(super) use needs::needs;
 pub(super) use table::csv;
 

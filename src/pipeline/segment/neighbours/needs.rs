@@ -1,7 +1,7 @@
 //! What joining objects takes: memory and scratch, told before it starts.
 
 use super::EDGE;
-use super::join::FillGaps;
+use super::joined::FillGaps;
 use super::widths::widest;
 use crate::grid::Geometry;
 use crate::kernel::image::gaps::Gaps;

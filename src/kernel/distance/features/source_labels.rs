@@ -1,0 +1,68 @@
+//! The labels of the sources that voxels have.
+
+use std::collections::BTreeMap;
+
+use crate::grid::DataSets;
+use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::kernel::image::labels::count;
+
+/// Sources whose labels are looked up at once.
+const AT_ONCE: usize = 64;
+
+/// The labels of voxels by their sources, into `out`; 0 for those without one.
+pub(crate) fn of_sources(sets: &DataSets, sources: &[u32], out: &mut Vec<u32>) {
+    out.clear();
+    let mut known = sets.run_of(NO_SOURCE);
+    for few in sources.chunks(AT_ONCE) {
+        // Neighbours mostly have one label: whether they do costs less than to look at each.
+        let (lo, hi) = few.iter().fold((u32::MAX, 0), |(lo, hi), &source| (lo.min(source), hi.max(source)));
+        if known.0.contains(&lo) && known.0.contains(&hi) {
+            out.resize(out.len() + few.len(), known.1);
+            continue;
+        }
+        out.extend(few.iter().map(|source| {
+            if !known.0.contains(source) {
+                known = sets.run_of(*source);
+            }
+            known.1
+        }));
+    }
+}
+
+/// Voxels of each label but 0, by their sources.
+#[must_use]
+pub fn count_sources(sets: &DataSets, sources: &[u32], labels: &mut Vec<u32>) -> BTreeMap<u32, u64> {
+    match sources.first().map(|first| sets.label(*first)) {
+        Some(label) if label > 0 && sets.share_label(sources) => BTreeMap::from([(label, sources.len() as u64)]),
+        _ => {
+            of_sources(sets, sources, labels);
+            count(labels)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sources_have_the_labels_of_their_sets() {
+        let mut sets = DataSets::default();
+        sets.add_labelled(4, &[[0.0; 3]; 2]);
+        sets.add_labelled(9, &[[1.0; 3]]);
+        let mut labels = vec![7];
+        of_sources(&sets, &[2, 2, 0, 1, u32::MAX], &mut labels);
+        assert_eq!(labels, [9, 9, 4, 4, 0]);
+    }
+
+    #[test]
+    fn voxels_are_counted_by_the_labels_of_their_sources() {
+        let mut sets = DataSets::default();
+        sets.add_labelled(4, &[[0.0; 3]; 2]);
+        sets.add_labelled(9, &[[1.0; 3]]);
+        let of = |sources: &[u32]| count_sources(&sets, sources, &mut Vec::new());
+        assert_eq!(of(&[1, 0, 2, NO_SOURCE]), BTreeMap::from([(4, 2), (9, 1)]));
+        assert_eq!(of(&[1, 0, 1]), BTreeMap::from([(4, 3)]));
+        assert!(of(&[NO_SOURCE; 2]).is_empty() && of(&[]).is_empty());
+    }
+}

@@ -1,0 +1,57 @@
+//! What is told of an object when it is solved, or why it was not.
+
+use crate::kernel::surface::Hausdorff;
+use crate::kernel::surface::Measures;
+use crate::pipeline::enclosure::Hole;
+use crate::pipeline::evolve::Evolution;
+
+/// What is reported of a solved object.
+#[derive(Clone, Debug)]
+pub struct ObjectReport {
+    /// The object's number, its label.
+    pub label: u32,
+    /// Points of the cloud that its marks stand for.
+    pub cloud_points: u64,
+    /// Where the start surface lay.
+    pub beta: f64,
+    /// The cloud's largest hole.
+    pub hole: Option<Hole>,
+    /// Number of voxels that were solved.
+    pub band_voxels: u64,
+    /// How the time loop ended.
+    pub evolution: Evolution,
+    /// The surface's measures.
+    pub measures: Measures,
+    /// Distances of the marks from the surface.
+    pub hausdorff: Option<Hausdorff>,
+    /// Marks that are farther from it than the largest spacing.
+    pub marks_off: u64,
+    /// What was taken from the image: `level`, `wall`, `edge`, `none`.
+    pub image_model: &'static str,
+    /// Weight of the pull towards the marks.
+    pub theta: f64,
+    /// Weight of the image.
+    pub rho: f64,
+    /// How far outlines that are left out lie from the shape of the others, where that was asked for.
+    pub cross_validation: Option<CrossValidation>,
+}
+
+/// What leaving out each outline in turn tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CrossValidation {
+    /// Mean distance of the marks that were left out.
+    pub mean: f64,
+    /// Nine of ten are nearer than this.
+    pub p90: f64,
+    /// Where the next outline would help most: the axis that its slice is across, and the slice.
+    pub next_slice: Option<(usize, i64)>,
+}
+
+/// An object that could not be solved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refused {
+    /// Its number.
+    pub label: u32,
+    /// Why, in one sentence.
+    pub reason: String,
+}
