@@ -222,7 +222,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::cli::args::{Cli, Command};
+    use crate::cli::command_line::{Cli, Command};
 
     fn typed(flags: &str) -> Box<SegmentArgs> {
         let words = "strandline segment image.tif --points marks.csv -o none".split(' ');

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 
-use super::args::{Cli, Command, DemoArgs};
+use super::args::DemoArgs;
+use super::command_line::{Cli, Command};
 use super::segment::{Job, Names};
 use super::values::Output;
 use super::{print, signals};

@@ -9,6 +9,7 @@ use half::f16;
 use super::config::{self, Resources};
 use super::console::{Console, Voice};
 use super::disk::Disk;
+use super::distance_args::MiddleChoice;
 use super::distance_args::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
 use super::distance_report::{Found, Settings, describe_found};
 use super::distance_sources::{Read, read_sets};
@@ -27,7 +28,7 @@ use crate::kernel::distance::seeding::outside::count_outside;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, Textbook, distance};
-use crate::pipeline::middle::{LabelMode, MiddleSettings, SurfaceKind, middle};
+use crate::pipeline::middle::{MiddleSettings, middle};
 use crate::store::{MeshSink, Unfinished};
 
 /// A distance that is ready to be computed: all inputs are read and checked.
@@ -53,13 +54,6 @@ pub(super) fn run(args: &DistanceJobArgs, typed: &[String]) -> Result<()> {
 pub(super) fn run_middle(args: DistanceJobArgs, choice: MiddleChoice, typed: &[String]) -> Result<()> {
     choice.mesh.as_deref().map(mesh_format).transpose()?;
     Job::new(args, Some(choice), typed)?.run_precise()
-}
-
-/// What `middle` asks for beside the distance.
-pub(super) struct MiddleChoice {
-    pub(super) surface: SurfaceKind,
-    pub(super) labels: LabelMode,
-    pub(super) mesh: Option<PathBuf>,
 }
 
 impl Job {

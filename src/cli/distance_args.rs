@@ -9,6 +9,7 @@ use super::grid_args::GridArgs;
 use super::values::{parse_method, parse_neighbours, solvers_help};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::pipeline::distance::Method;
+use crate::pipeline::middle::{LabelMode, SurfaceKind};
 
 /// Compute the distance to point clouds and triangle meshes on a grid of any size.
 #[derive(Clone, Debug, Args)]
@@ -118,4 +119,11 @@ pub(super) fn sources_help() -> String {
         "Point clouds and triangle meshes ({}), and label volumes (TIFF, OME-Zarr), told apart by content",
         list.join(", ")
     )
+}
+
+/// What `middle` asks for beside the distance.
+pub(super) struct MiddleChoice {
+    pub(super) surface: SurfaceKind,
+    pub(super) labels: LabelMode,
+    pub(super) mesh: Option<PathBuf>,
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::config::Resources;
-use super::distance::MiddleChoice;
+use super::distance_args::MiddleChoice;
 use super::distance_args::{DistanceJobArgs, PrecisionArg};
 use super::table::cut;
 use super::text::{grouped, number};

@@ -15,8 +15,10 @@ use crate::error::{Error, Result};
 use crate::exec::{Cancel, Progress};
 use crate::grid::{DataSets, Geometry, PointCloud, TriangleMesh, refuse_too_many};
 use crate::io::label_volume::{LabelVolume, is_label_volume, labels_of};
-use crate::io::points::{LengthUnit, PointFile};
-use crate::io::sources::{Source, read_parts};
+use crate::io::point_file::PointFile;
+use crate::io::points::LengthUnit;
+use crate::io::source::Source;
+use crate::io::sources::read_parts;
 use crate::kernel::geometry::solid::Solid;
 use crate::pipeline::label_borders::label_borders;
 

@@ -6,15 +6,17 @@ use serde_json::{Value, json};
 
 use super::args::InfoArgs;
 use super::info_store::store;
+use super::lines::{Lines, line, table};
 use super::print;
-use super::table::cut;
 use super::text::{grouped, number, place};
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
 use crate::io::ome_zarr::is_store;
-use crate::io::points::{PointFile, Scale};
-use crate::io::sources::{Source, describe, is_standard_input};
-use crate::io::stacks::{self, Select};
+use crate::io::point_file::{PointFile, Scale};
+use crate::io::source::Source;
+use crate::io::sources::{describe, is_standard_input};
+use crate::io::stack::Select;
+use crate::io::stacks;
 use crate::kernel::geometry::solid::Solid;
 use crate::pipeline::marks::split;
 
@@ -46,21 +48,6 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     };
     let text = if args.json { format!("{document:#}\n") } else { table(&lines) };
     print(&text)
-}
-
-/// Names and what is told of them.
-pub(super) type Lines = Vec<(String, String)>;
-
-fn table(lines: &Lines) -> String {
-    let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    let told = |(name, value): &(String, String)| one_line(format!("{name:<width$}  {value}"));
-    let (objects, others): (Vec<_>, Vec<_>) = lines.iter().partition(|(name, _)| name.starts_with("object "));
-    let objects = cut(objects.into_iter().map(told).collect(), "objects", "(--json tells all)");
-    others.into_iter().map(told).chain(objects).fold(String::new(), |text, line| text + &line + "\n")
-}
-
-pub(super) fn line(name: &str, value: impl Into<String>) -> (String, String) {
-    (name.into(), value.into())
 }
 
 fn stack(path: &Path, format: &stacks::Format, select: Select) -> Result<(Value, Lines)> {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use super::info::{Lines, line};
+use super::lines::{Lines, line};
 use super::store_contents::{contents, groups, range};
 use super::text::{number, place};
 use crate::error::{Error, Result};

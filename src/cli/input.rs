@@ -7,7 +7,8 @@ use super::values::Crop;
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::is_store;
-use crate::io::stacks::{self, Select, Stack, StackInfo};
+use crate::io::stack::{Select, Stack, StackInfo};
+use crate::io::stacks;
 
 /// A stack and where it lies.
 pub(super) struct OpenStack {

@@ -9,7 +9,8 @@ use super::text::{number, triple};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Progress;
 use crate::grid::{Geometry, PointCloud};
-use crate::io::points::{LengthUnit, PointFile, Scale, read_points};
+use crate::io::point_file::{PointFile, Scale};
+use crate::io::points::{LengthUnit, read_points};
 use crate::pipeline::marks::{ObjectMarks, Seed, split_and_seed};
 use crate::pipeline::segment::{Grids, Refused, check_marks, crossed, doubts, open_outlines, same_place, spans_slices};
 

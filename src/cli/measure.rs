@@ -15,7 +15,7 @@ use super::text::{grouped, number};
 use crate::error::{Error, Result};
 use crate::exec::Progress;
 use crate::grid::TriangleMesh;
-use crate::io::sources::Source;
+use crate::io::source::Source;
 use crate::kernel::geometry::solid::Solid;
 use crate::kernel::surface::{Hausdorff, Measures, PatchIndex};
 

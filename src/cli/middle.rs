@@ -1,6 +1,7 @@
 //! `strandline middle`: the surface between labelled sources. Sources, grid, memory and output are those of `distance`.
 
-use super::distance::{MiddleChoice, run_middle};
+use super::distance::run_middle;
+use super::distance_args::MiddleChoice;
 use super::distance_args::{ChoiceArgs, DistanceJobArgs};
 use super::middle_args::{LabelsArg, MiddleArgs, SurfaceArg};
 use crate::error::{Error, Result};

@@ -4,6 +4,7 @@
 //! input, 130 interrupted, 143 terminated.
 
 mod args;
+pub(crate) mod command_line;
 mod config;
 mod console;
 mod demo;
@@ -19,6 +20,7 @@ mod grid_args;
 mod info;
 mod info_store;
 mod input;
+pub(crate) mod lines;
 mod marks;
 mod measure;
 mod middle;
@@ -46,7 +48,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::error::{Error, Result};
-use args::{Cli, Command};
+use command_line::{Cli, Command};
 
 /// Runs the program with its arguments, the first of which is its own name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {

@@ -4,7 +4,7 @@
 use clap::Args;
 
 use crate::io::page_axes::PageAxes;
-use crate::io::stacks::Select;
+use crate::io::stack::Select;
 
 /// Which pages of a file count, and as what.
 #[derive(Clone, Debug, Default, Args)]

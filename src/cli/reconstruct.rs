@@ -25,7 +25,7 @@ use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
 use crate::io::mesh_ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
-use crate::io::sources::Source;
+use crate::io::source::Source;
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct, typical_spacing,
     without_isolated,

@@ -21,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Cancel, Engine, Progress};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
-use crate::io::stacks::Stack;
+use crate::io::stack::Stack;
 use crate::pipeline::segment::{
     Estimate, Grids, Guides, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing, segment,
 };

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::io::points::LengthUnit;
-use crate::io::sources::{Source, describe};
+use crate::io::source::Source;
+use crate::io::sources::describe;
 
 /// Reads points or a mesh, and tells by `note` what was odd about the file.
 pub(super) fn read_told(path: &Path, note: &dyn Fn(&str)) -> Result<Source> {

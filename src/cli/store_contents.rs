@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::text::{bytes, grouped};
 use crate::error::Result;
 use crate::io::ome_zarr::is_store;
-use crate::io::stacks::Select;
+use crate::io::stack::Select;
 use crate::io::zarr_image::{LevelDescription, ZarrImage};
 use crate::pipeline::value_range::value_range;
 

@@ -6,7 +6,7 @@ use std::io::{self, BufRead, BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
 use super::decoding::{LineFeeds, Utf16};
-use super::points::PointFile;
+use super::point_file::PointFile;
 use super::text::{first_binary_byte, unreadable};
 use crate::error::{Error, Result};
 

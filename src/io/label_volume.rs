@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::ome_zarr::is_store;
-use super::stacks::{Stack, format_of};
+use super::stack::Stack;
+use super::stacks::format_of;
 use super::zarr_image::label_images;
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry};

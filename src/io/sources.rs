@@ -5,24 +5,16 @@
 
 use std::path::Path;
 
+use super::source::Source;
+
 pub use super::input::{Input, is_standard_input};
 
 use super::mesh::{obj, off, stl};
-use super::points::PointFile;
+use super::point_file::PointFile;
 use super::single::rounded_note;
 use super::text::{first_binary_byte, quoted};
 use super::{foreign, ply, points, roi};
 use crate::error::{Error, Result};
-use crate::grid::{PointCloud, TriangleMesh};
-
-/// What distances are measured to; positions are physical.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Source {
-    /// Points, at least one.
-    Cloud(PointCloud),
-    /// Triangles, at least one.
-    Mesh(TriangleMesh),
-}
 
 /// A file format of sources.
 #[derive(Debug)]

@@ -7,7 +7,8 @@ use std::path::Path;
 
 use serde_json::Value;
 use strandline::grid::TriangleMesh;
-use strandline::io::sources::{Source, read_noted};
+use strandline::io::source::Source;
+use strandline::io::sources::read_noted;
 use strandline::kernel::geometry::solid::Solid;
 use strandline::kernel::surface::Measures;
 

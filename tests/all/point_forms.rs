@@ -9,8 +9,10 @@ use std::path::Path;
 use std::process::Stdio;
 
 use serde_json::Value;
-use strandline::io::points::{Scale, read_points};
-use strandline::io::sources::{Source, read_source};
+use strandline::io::point_file::Scale;
+use strandline::io::points::read_points;
+use strandline::io::source::Source;
+use strandline::io::sources::read_source;
 
 use crate::common::ball::{Ball, Bench, HEADER};
 use crate::common::python;

@@ -5,7 +5,8 @@
 use std::fs;
 
 use serde_json::json;
-use strandline::io::sources::{Source, read_source};
+use strandline::io::source::Source;
+use strandline::io::sources::read_source;
 use strandline::kernel::distance::features::winding_number::WindingTree;
 
 use crate::common::ball::Bench;

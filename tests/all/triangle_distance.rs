@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use strandline::grid::{Box3, BrickGrid, Geometry, TriangleBins, TriangleMesh};
-use strandline::io::sources::{Source, read_source};
+use strandline::io::source::Source;
+use strandline::io::sources::read_source;
 use strandline::kernel::distance::features::winding_number::{WindingTree, solid_angle};
 use strandline::kernel::distance::seeding::triangles::{cut_cells, fix_voxels};
 use strandline::kernel::distance::state::source::NO_SOURCE;

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use strandline::io::stacks::{Select, Stack};
+use strandline::io::stack::{Select, Stack};
 use strandline::io::zarr_image::ZarrImage;
 use strandline::store::VolumeSource;
 

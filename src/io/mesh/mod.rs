@@ -17,7 +17,7 @@ pub(super) use numbers::number;
 pub(super) use polygon::Faces;
 
 use super::points::refuse_empty;
-use super::sources::Source;
+use super::source::Source;
 use super::text::{first_binary_byte, quoted};
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};

@@ -10,7 +10,7 @@ use super::{Faces, first_line, mesh_or_cloud, position};
 use crate::error::{Error, Result};
 use crate::grid::refuse_too_many;
 use crate::io::input::Input;
-use crate::io::sources::Source;
+use crate::io::source::Source;
 use crate::io::text::{LONGEST_LINE, Lines, quoted};
 
 /// The words that the first line of an OBJ file may start with.

@@ -12,7 +12,7 @@ use super::{Faces, first_line, mesh_or_cloud, position};
 use crate::error::{Error, Result};
 use crate::grid::refuse_too_many;
 use crate::io::input::{HEAD, Input};
-use crate::io::sources::Source;
+use crate::io::source::Source;
 use crate::io::text::{Lines, quoted};
 
 /// The fewest bytes of a vertex and of a face: `0 0 0`, `0` for a face without corners, and a line end.

@@ -12,7 +12,7 @@ use super::{first_line, stl_text};
 use crate::error::{Error, Result};
 use crate::grid::{MOST_SOURCES, TriangleMesh, refuse_too_many};
 use crate::io::input::{HEAD, Input};
-use crate::io::sources::Source;
+use crate::io::source::Source;
 use crate::io::text::{first_binary_byte, unreadable};
 
 /// Bytes before the first triangle.

@@ -12,7 +12,7 @@ mod vertices;
 use super::input::Input;
 use super::mesh::Faces;
 use super::points::refuse_empty;
-use super::sources::Source;
+use super::source::Source;
 use crate::error::{Error, Result};
 use crate::grid::{PointCloud, TriangleMesh};
 use body::Body;

@@ -2,35 +2,19 @@
 
 use std::collections::HashSet;
 
+use super::corner::{Corner, ShapeKind};
 use super::names::{Columns, Form};
 use super::shapes;
-use super::units::Unit;
-use super::{PointFile, Scale};
 use crate::error::{Error, Result};
 use crate::grid::PointCloud;
+use crate::io::point_file::{PointFile, Scale};
+use crate::io::point_units::Unit;
 use crate::io::text::quoted;
 
 /// Lines of a header after its names, at most: `TrackMate` writes three.
 const MORE_HEADER_LINES: u32 = 4;
 /// First columns that count so many lines are row numbers.
 const COUNTED: usize = 4;
-
-/// What kind of shape a point belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ShapeKind {
-    Closed,
-    /// A path or a line, whose ends are not joined.
-    Open,
-    /// Four corners of the box around an ellipse.
-    Ellipse,
-}
-
-/// What a line says of its point's place in a shape.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Corner {
-    pub(super) vertex: Option<i64>,
-    pub(super) kind: ShapeKind,
-}
 
 /// What stands between the whole and the decimals of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

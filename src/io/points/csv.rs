@@ -6,10 +6,10 @@
 use std::borrow::Cow;
 use std::io::BufRead;
 
-use super::PointFile;
 use super::columns::Rows;
 use super::names::Columns;
 use crate::error::{Error, Result};
+use crate::io::point_file::PointFile;
 use crate::io::text::{next_line, quoted, refuse_bare_returns};
 
 /// Reads the points after the header, which stands in `header_line`, counted from 1.

@@ -5,10 +5,10 @@
 //! counted from 1). Words that only say that a position follows are passed over; columns with any other word, such as a
 //! velocity's, are none.
 
-use super::Scale;
-use super::units::{LengthUnit, Unit};
 use super::words::{Name, families};
 use crate::error::{Error, Result};
+use crate::io::point_file::Scale;
+use crate::io::point_units::{LengthUnit, Unit};
 use crate::io::text::quoted;
 
 /// What wrote a table.

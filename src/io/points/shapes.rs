@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::columns::{Corner, ShapeKind};
+use super::corner::{Corner, ShapeKind};
 use crate::grid::PointCloud;
-
-/// Points along an ellipse.
-const ALONG_ELLIPSE: usize = 48;
+use crate::io::ellipse::ellipse;
 
 /// The cloud whose points stand in the order of their shapes, and what is to be told of these. Times follow their points.
 pub(super) fn drawn(cloud: &PointCloud, corners: &[Corner], times: &mut Vec<i64>) -> (PointCloud, Vec<String>) {
@@ -44,18 +42,4 @@ pub(super) fn drawn(cloud: &PointCloud, corners: &[Corner], times: &mut Vec<i64>
         notes.push(format!("{what} fewer than three points: these enclose nothing and count as single marks"));
     }
     (found, notes)
-}
-
-/// Points along the ellipse that touches a box, of which the corners are given in order.
-pub(crate) fn ellipse(corners: [[f64; 3]; 4]) -> Vec<[f64; 3]> {
-    let centre: [f64; 3] = std::array::from_fn(|a| corners.iter().map(|c| c[a]).sum::<f64>() / 4.0);
-    let half =
-        |from: usize, to: usize| -> [f64; 3] { std::array::from_fn(|a| 0.5 * (corners[to][a] - corners[from][a])) };
-    let (u, v) = (half(0, 1), half(1, 2));
-    let at = |n: usize| {
-        let angle = n as f64 * std::f64::consts::TAU / ALONG_ELLIPSE as f64;
-        let (sine, cosine) = libm::sincos(angle);
-        std::array::from_fn(|a| centre[a] + cosine * u[a] + sine * v[a])
-    };
-    (0..ALONG_ELLIPSE).map(at).collect()
 }

@@ -1,6 +1,6 @@
 //! The words in the name of a column that holds coordinates: an axis, words that only say that a position follows, a unit.
 
-use super::units::{Unit, mended};
+use crate::io::point_units::{Unit, mended};
 
 /// Words that say that a position follows, or of what; those that say it best come first.
 const FILLERS: [&str; 25] = [

@@ -5,11 +5,11 @@
 
 use std::io::BufRead;
 
-use super::PointFile;
 use super::columns::Rows;
 use super::layout::{Separator, uncommented};
 use super::names::Columns;
 use crate::error::{Error, Result};
+use crate::io::point_file::PointFile;
 use crate::io::text::{next_line, refuse_bare_returns};
 
 /// Reads the points from `first_line` on, counted from 1.

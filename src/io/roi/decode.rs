@@ -7,7 +7,7 @@
 use super::bytes::Bytes;
 use super::paths;
 use crate::error::{Error, Result};
-use crate::io::points::ellipse;
+use crate::io::ellipse::ellipse;
 
 /// What is marked.
 #[derive(Clone, Debug, PartialEq)]

@@ -14,7 +14,7 @@ use std::io::{Cursor, Read};
 use zip::ZipArchive;
 
 use super::input::Input;
-use super::points::{PointFile, Scale};
+use super::point_file::{PointFile, Scale};
 use super::text::quoted;
 use crate::error::{Error, Result};
 use crate::grid::PointCloud;

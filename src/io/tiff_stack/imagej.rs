@@ -4,7 +4,8 @@
 //! channel first, then slice, then frame. The xy spacing lies in the resolution tags, in pixels per unit.
 
 use super::layout::{Axis, Description, Dimensions};
-use super::units::{self, Unit};
+use crate::io::units;
+use crate::io::units::Unit;
 
 /// True when ImageJ wrote the description.
 pub(super) fn is_imagej(text: &str) -> bool {

@@ -4,9 +4,10 @@
 use super::ifd::{Tags, TiffFile};
 use super::layout::Description;
 use super::page::{Kind, Page, is_side_page, kind_of};
-use super::{imagej, ome_xml, shaped, units};
+use super::{imagej, ome_xml, shaped};
 use crate::error::{Error, Result};
-use crate::io::stacks::ImageSummary;
+use crate::io::stack::ImageSummary;
+use crate::io::units;
 
 /// The pixel size above which resolution tags of plain files are a print resolution (1270 dots per inch), in metres.
 const PRINT_SIZE: f64 = 20e-6;

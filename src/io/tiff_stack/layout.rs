@@ -1,9 +1,8 @@
 //! The order of planes in a file: from (channel, time, z) to the number of a plane.
 
-use crate::error::Result;
-
 use super::ifd::TiffFile;
 use super::page::Page;
+use crate::error::Result;
 pub(super) use crate::io::page_axes::Axis;
 
 /// The number of planes along each axis, fastest axis first.

@@ -13,6 +13,7 @@ mod layout;
 mod levels;
 mod names;
 mod ome_xml;
+pub(crate) mod opened;
 mod page;
 mod raw;
 mod samples;
@@ -20,18 +21,17 @@ mod sequence;
 mod shaped;
 mod slices;
 mod source;
-pub(super) mod units;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use super::stacks::Stack;
+use super::stack::Stack;
 use crate::error::{Error, Result};
 use crate::store::{ElementType, PlaneSource, SamplesMut, Whereabouts};
 use decode::Scratch;
-use source::{Opened, Source};
+use opened::{Opened, Source};
 
-pub use super::stacks::{ImageSummary, Select, StackInfo};
+pub use super::stack::{ImageSummary, Select, StackInfo};
 
 /// Whether a file that starts with these bytes is TIFF: classic or big, of either byte order.
 #[must_use]

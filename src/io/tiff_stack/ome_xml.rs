@@ -4,8 +4,8 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::layout::{Axis, Description, Dimensions, Run};
 use super::page::Page;
-use super::units;
-use crate::io::stacks::ImageSummary;
+use crate::io::stack::ImageSummary;
+use crate::io::units;
 
 /// The longest description that is read.
 pub(super) const MAX_TEXT: u64 = 32 << 20;

@@ -7,7 +7,8 @@ use serde_json::{Map, Value};
 
 use super::layout::{Axis, Description, Dimensions};
 use super::page::Page;
-use super::units::{self, Unit};
+use crate::io::units;
+use crate::io::units::Unit;
 
 #[derive(Deserialize)]
 struct Shaped {

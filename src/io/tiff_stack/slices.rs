@@ -6,8 +6,10 @@ use super::ifd::{Tags, TiffFile};
 use super::images;
 use super::layout::{Axis, Description};
 use super::names::{Name, file_name};
+use super::opened::open_slice;
+use super::opened::{Opened, Source};
 use super::page::Page;
-use super::source::{self, Opened, Source};
+use super::source;
 use super::{Select, ome_xml, sequence};
 use crate::error::{Error, Result};
 
@@ -81,19 +83,6 @@ fn open_first(path: &Path) -> Result<(TiffFile, Page)> {
     let (file, offset) = open_slice(path)?;
     let page = Page::parse(&Tags::read(&file, offset, 1)?)?;
     Ok((file, page))
-}
-
-/// Opens a file that must hold one page.
-pub(super) fn open_slice(path: &Path) -> Result<(TiffFile, u64)> {
-    let file = TiffFile::open(path)?;
-    let offsets = file.pages()?;
-    match offsets[..] {
-        [only] => Ok((file, only)),
-        _ => Err(file.error(format!(
-            "it has {} pages, but in a folder of slices every file is one plane; name the file itself to read it",
-            offsets.len()
-        ))),
-    }
 }
 
 /// What a folder holds.

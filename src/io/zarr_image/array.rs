@@ -11,10 +11,11 @@ use zarrs::array::Array;
 use zarrs::filesystem::FilesystemStore;
 use zarrs::plugin::{ExtensionName, ZarrVersion};
 
+use super::codecs::Shards;
 use super::codecs::{Codecs, ValueType, bytes_of, guarded, one_line, slack};
 use super::keys::Keys;
 use super::samples::Kind;
-use super::shards::{Shards, range_of};
+use super::shard_index::range_of;
 use crate::error::{Error, Result};
 
 /// The most bytes of a decoded chunk; Blosc packs no more either.

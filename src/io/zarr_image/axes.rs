@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use crate::io::tiff_stack::units::{self, Unit};
+use crate::io::units;
+use crate::io::units::Unit;
 
 /// What an axis is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,11 +13,11 @@ mod keys;
 mod multiscale;
 mod node;
 mod samples;
-mod shards;
+pub(crate) mod shard_index;
 
 use std::path::{Path, PathBuf};
 
-use super::stacks::{Select, Stack, StackInfo};
+use super::stack::{Select, Stack, StackInfo};
 use crate::error::{Error, Result};
 use crate::grid::Box3;
 use crate::store::{ElementType, SamplesMut, VolumeSource, Whereabouts};

@@ -1,9 +1,9 @@
 //! The whole job of `distance`: solve on a grid of any size, and write what was asked for.
 
-use super::found::DistanceFound;
 use std::sync::Arc;
 
 use super::contiguous::contiguous_margin;
+use super::found::DistanceFound;
 use super::output::Wanted;
 use super::readout::ReadOut;
 use super::{Method, Options, Schedule, Solved, Sources, solve};

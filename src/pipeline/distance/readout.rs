@@ -1,13 +1,12 @@
 //! The one look at all voxels of a solved distance: chunk by chunk the solved state is read, told from which side of
 //! meshes it is seen, measured for the report, and handed on to the images that are written.
 
-use super::read_tile::Tile;
-use crate::kernel::distance::features::source_labels;
 use std::collections::BTreeMap;
 
 use super::Solved;
 use super::found::DistanceFound;
 use super::output::{Buffers, Images, Wanted};
+use super::read_tile::Tile;
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::{Box3, DataSets, Geometry};
@@ -15,6 +14,7 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::distance::features::closest_point::ClosestPoints;
 use crate::kernel::distance::features::extent::extent;
 use crate::kernel::distance::features::inside::{Flood, Inside};
+use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::kernel::image::labels;

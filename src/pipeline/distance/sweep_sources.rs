@@ -4,6 +4,8 @@
 //! beside them read. What a brick cannot know at its turn is resolved when the sweep is over, in rounds (`trace`); then
 //! the faces before the next sweep are made the ones now. Distances are swept as they are alone (`sweep`).
 
+use super::sweep::{Companion, Swept, Visit};
+use super::trace::Rounds;
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
 use crate::grid::{FACES, Slot};
@@ -13,9 +15,6 @@ use crate::kernel::distance::state::neighbours::SWEEPS;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::store::{BrickArray, Scratch};
-
-use super::sweep::{Companion, Swept, Visit};
-use super::trace::Rounds;
 
 /// The sources of a field that is being swept.
 pub(super) struct TrackedSweeps<'a> {

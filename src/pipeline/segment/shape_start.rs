@@ -1,5 +1,7 @@
 //! An object that starts as the shape of its outlines: its band, and the speed at which image and shape move it.
 
+use std::sync::Arc;
+
 use super::begun::{Begun, Forces};
 use super::outlines::cloud;
 use super::picture::{Picture, name};
@@ -21,7 +23,6 @@ use crate::pipeline::image_terms::{EdgeSettings, presmooth};
 use crate::pipeline::intensity::Normalised;
 use crate::pipeline::marks::ObjectMarks;
 use crate::store::{BrickArray, Element};
-use std::sync::Arc;
 
 /// The weight of the image beside its variance: that is measured with outlines left out, so from twice as far away as
 /// anything between outlines is, and four times too large.

@@ -29,14 +29,14 @@ const VOXELS: [&str; 12] =
 
 /// What a word in a header says of its column.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Unit {
+pub(crate) enum Unit {
     Length(LengthUnit),
     Voxels,
 }
 
 impl Unit {
     /// The unit of that spelling, upper and lower case as one; none where it is no unit.
-    pub(super) fn of(text: &str) -> Option<Self> {
+    pub(crate) fn of(text: &str) -> Option<Self> {
         let text = mended(text.trim().trim_matches(['(', ')', '[', ']'])).to_lowercase();
         if VOXELS.contains(&text.as_str()) {
             return Some(Self::Voxels);
@@ -71,7 +71,7 @@ impl LengthUnit {
 
 /// The micro sign as it was meant: of a text in Latin-1 only a replacement character is left, of UTF-8 that was read as
 /// Latin-1 two characters.
-pub(super) fn mended(text: &str) -> String {
+pub(crate) fn mended(text: &str) -> String {
     text.replace("\u{fffd}m", "um").replace("\u{c2}\u{b5}", "\u{b5}").replace("\u{ce}\u{bc}", "\u{3bc}")
 }
 

@@ -35,7 +35,7 @@ const UNITS: [(&str, f64, &[&str]); 12] = [
 ];
 
 /// Metres of a micrometre.
-pub(super) const MICROMETRE: f64 = 1e-6;
+pub(crate) const MICROMETRE: f64 = 1e-6;
 
 /// What a spelling of a unit means.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,7 +115,7 @@ fn latin(letter: char) -> Option<u8> {
 }
 
 /// A size as written: with a decimal point, or a comma in its place.
-pub(super) fn size(text: &str) -> Option<f64> {
+pub(crate) fn size(text: &str) -> Option<f64> {
     let text = text.trim();
     let value =
         text.parse::<f64>().or_else(|e| if text.contains('.') { Err(e) } else { text.replacen(',', ".", 1).parse() });
@@ -124,13 +124,13 @@ pub(super) fn size(text: &str) -> Option<f64> {
 
 /// The spacing of voxels in one unit.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Spacing {
+pub(crate) struct Spacing {
     /// Along x, y, z, where it is known.
-    pub(super) sizes: [Option<f64>; 3],
+    pub(crate) sizes: [Option<f64>; 3],
     /// The unit as OME-Zarr spells it.
-    pub(super) unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// What could not be kept as it was written.
-    pub(super) notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// Voxels are not so many times as long as wide, or the other way round.
@@ -138,7 +138,7 @@ const LONGEST: f64 = 100.0;
 
 /// The unit of a size along z that names none, beside those of x and y in a unit that the tags of a file name: the same,
 /// but for a size that only micrometres, in which microscopes count, bring anywhere near them.
-pub(super) fn of_bare_size(z: f64, xy: [Option<f64>; 2], unit: &str) -> &str {
+pub(crate) fn of_bare_size(z: f64, xy: [Option<f64>; 2], unit: &str) -> &str {
     let (Unit::Length(_, metres), Some(across)) = (parse(unit), xy[0].or(xy[1])) else { return unit };
     let is_near = |one: f64| {
         let ratio = (z * one / (across * metres)).abs();
@@ -148,7 +148,7 @@ pub(super) fn of_bare_size(z: f64, xy: [Option<f64>; 2], unit: &str) -> &str {
 }
 
 /// What is to be told where [`of_bare_size`] took another unit.
-pub(super) fn bare_note(z: f64, unit: &str, taken: &str) -> Option<String> {
+pub(crate) fn bare_note(z: f64, unit: &str, taken: &str) -> Option<String> {
     (taken != unit).then(|| {
         format!(
             "the z size of {z} names no unit, and in {unit} would be nothing like those of x and y: {taken} is taken"
@@ -158,7 +158,7 @@ pub(super) fn bare_note(z: f64, unit: &str, taken: &str) -> Option<String> {
 
 /// Sizes along x, y, z with the unit of each, all in the unit of the first that has a physical one. What is in no
 /// physical unit, all axes alike, keeps its numbers: their ratios hold.
-pub(super) fn spacing(written: [Option<(f64, &str)>; 3]) -> Spacing {
+pub(crate) fn spacing(written: [Option<(f64, &str)>; 3]) -> Spacing {
     let mut spacing = Spacing::default();
     let mut named: Option<(&'static str, f64)> = None;
     let known = written.iter().flatten().map(|(_, unit)| parse(unit)).find(|unit| matches!(unit, Unit::Length(..)));
