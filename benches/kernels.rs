@@ -2,12 +2,13 @@
 #![allow(missing_docs, clippy::disallowed_methods)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use strandline::kernel::image::gaussian::{Block, Gaussian, Smoothed};
-use strandline::kernel::level_set::covolume::{Planes, assemble};
-use strandline::kernel::level_set::mask::CellMask;
-use strandline::kernel::level_set::scheme::SCHEME_LEN;
-use strandline::kernel::level_set::velocity::{Fields, Velocity};
-use strandline::kernel::level_set::{CELL_LEN, sor};
+use strandline::kernel::image::filter::gaussian::{Block, Gaussian, Smoothed};
+use strandline::kernel::level_set::cell::CELL_LEN;
+use strandline::kernel::level_set::scheme::covolume::{Planes, assemble};
+use strandline::kernel::level_set::scheme::mask::CellMask;
+use strandline::kernel::level_set::scheme::sor;
+use strandline::kernel::level_set::scheme::system::SCHEME_LEN;
+use strandline::kernel::level_set::scheme::velocity::{Fields, Velocity};
 
 fn level_set(c: &mut Criterion) {
     let n = 18usize.pow(3);

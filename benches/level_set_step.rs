@@ -15,10 +15,10 @@ use std::time::Instant;
 
 use lab::{Lab, PlainGrid, dense, whole};
 use plain_scheme::{PlainVelocity, coefficients, gradient_norms};
-use strandline::kernel::level_set::CELL;
-use strandline::kernel::level_set::velocity::Velocity;
-use strandline::pipeline::band::{Reaches, make_band};
-use strandline::pipeline::evolve::{Stop, TimeLoop, evolve};
+use strandline::kernel::level_set::cell::CELL;
+use strandline::kernel::level_set::scheme::velocity::Velocity;
+use strandline::pipeline::level_set::band::{Reaches, make_band};
+use strandline::pipeline::level_set::evolve::{Stop, TimeLoop, evolve};
 
 const STEPS: u32 = 20;
 /// Each program runs this often, taking turns; its fastest run counts.

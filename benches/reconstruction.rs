@@ -16,7 +16,7 @@ use common::plain_reconstruction::{PlainSettings, reconstruct_plainly};
 use strandline::grid::{Geometry, TriangleMesh};
 use strandline::kernel::surface::PatchIndex;
 use strandline::pipeline::distance::Method;
-use strandline::pipeline::motion::Motion;
+use strandline::pipeline::level_set::motion::Motion;
 use strandline::pipeline::reconstruct::{ReconstructSettings, reconstruct};
 use strandline::store::NoMesh;
 

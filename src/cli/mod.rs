@@ -4,41 +4,11 @@
 //! input, 130 interrupted, 143 terminated.
 
 mod args;
-pub(crate) mod command_line;
-mod config;
-mod console;
-mod demo;
-mod disk;
-mod distance;
-mod distance_args;
-mod distance_report;
-mod distance_sources;
-mod drawing;
-mod files;
-mod grid;
-mod grid_args;
-mod info;
-mod info_store;
-mod input;
-pub(crate) mod lines;
-mod marks;
-mod measure;
-mod middle;
-mod middle_args;
-mod neighbours_report;
+mod commands;
+mod inputs;
 mod outputs;
-mod pages_args;
-mod picture;
-mod reconstruct;
-mod reconstruct_args;
 mod report;
-mod segment;
-mod signals;
-mod sources;
-mod store_contents;
-mod table;
-mod text;
-mod values;
+mod terminal;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
@@ -48,7 +18,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::error::{Error, Result};
-use command_line::{Cli, Command};
+use args::command_line::{Cli, Command};
 
 /// Runs the program with its arguments, the first of which is its own name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
@@ -63,7 +33,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let typed: Vec<String> = arguments.iter().map(|a| a.to_string_lossy().into_owned()).collect();
     let ended = catch_unwind(AssertUnwindSafe(|| execute(cli, &typed)));
-    if !signals::speak_last() {
+    if !terminal::signals::speak_last() {
         // The process ends in another thread, which says so.
         loop {
             std::thread::park();
@@ -72,7 +42,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match ended {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
-            let error = signals::seen(error);
+            let error = terminal::signals::seen(error);
             complain(&error.to_string());
             ExitCode::from(error.exit_code())
         }
@@ -85,13 +55,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn execute(cli: Cli, typed: &[String]) -> Result<()> {
     match cli.command {
-        Command::Segment(args) => segment::run(&args, typed),
-        Command::Distance(args) => distance::run(&args, typed),
-        Command::Middle(args) => middle::run(&args, typed),
-        Command::Reconstruct(args) => reconstruct::run(&args, typed),
-        Command::Demo(args) => demo::run(&args, typed),
-        Command::Measure(args) => measure::run(&args),
-        Command::Info(args) => info::run(&args),
+        Command::Segment(args) => commands::segment::run(&args, typed),
+        Command::Distance(args) => commands::distance::run(&args, typed),
+        Command::Middle(args) => commands::middle::run(&args, typed),
+        Command::Reconstruct(args) => commands::reconstruct::run(&args, typed),
+        Command::Demo(args) => commands::demo::run(&args, typed),
+        Command::Measure(args) => commands::measure::run(&args),
+        Command::Info(args) => commands::info::run(&args),
     }
 }
 

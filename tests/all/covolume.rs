@@ -1,12 +1,12 @@
 //! The assembled co-volume scheme against the formulas as printed (Kósa 2015, sec. 3.3; Kósa PhD, eq. 3.12-3.18), in
 //! f64, one voxel and 24 tetrahedra at a time; gradients also against fields whose gradient is known.
 
-use strandline::kernel::image::edge_detector::edge_detector;
-use strandline::kernel::level_set::covolume::{Planes, assemble, mean_gradient};
-use strandline::kernel::level_set::mask::CellMask;
-use strandline::kernel::level_set::scheme::{SCHEME_LEN, scheme_place};
-use strandline::kernel::level_set::velocity::{Fields, Velocity};
-use strandline::kernel::level_set::{CELL, CELL_LEN};
+use strandline::kernel::image::filter::edge_detector::edge_detector;
+use strandline::kernel::level_set::cell::{CELL, CELL_LEN};
+use strandline::kernel::level_set::scheme::covolume::{Planes, assemble, mean_gradient};
+use strandline::kernel::level_set::scheme::mask::CellMask;
+use strandline::kernel::level_set::scheme::system::{SCHEME_LEN, scheme_place};
+use strandline::kernel::level_set::scheme::velocity::{Fields, Velocity};
 
 use crate::common::lab::PlainGrid;
 use crate::common::plain_scheme::{PlainVelocity, coefficients, gradient_norms, mean_norm, speed_coefficients};

@@ -46,7 +46,7 @@ fn threads_and_memory_change_no_bit() {
 }
 
 /// How far the schedule may be from sweeps to convergence, in units of the last place: the more the spacings differ,
-/// the more digits of an update cancel (the head of `pipeline::distance::front` says the same). Over 420 random clouds
+/// the more digits of an update cancel (the head of `pipeline::distance::schedule::front` says the same). Over 420 random clouds
 /// the largest were 3 for equal spacings, 10 at a ratio of 4, 32 at a ratio of 6.2, all in f32.
 fn bound(geometry: &Geometry) -> u64 {
     (10.0 * geometry.max_spacing() / geometry.min_spacing()) as u64

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
-use strandline::kernel::level_set::persistence::PERSISTENCE;
+use strandline::kernel::level_set::initial::persistence::PERSISTENCE;
 use strandline::pipeline::distance::{Method, Sources, cloud_distance};
-use strandline::pipeline::tagging::{Basin, Tagging, tag};
+use strandline::pipeline::enclosure::tagging::{Basin, Tagging, tag};
 
 use crate::common::clouds::{grid_around, sphere, sponge};
 use crate::common::lab::{Lab, PlainGrid, dense, whole};

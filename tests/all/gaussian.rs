@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use strandline::grid::BrickSet;
-use strandline::kernel::level_set::CELL;
-use strandline::pipeline::image_terms::{EdgeSettings, Smoothing, edges, presmooth};
-use strandline::pipeline::smoothing::smoothed;
+use strandline::kernel::level_set::cell::CELL;
+use strandline::pipeline::image::smoothing::smoothed;
+use strandline::pipeline::image::terms::{EdgeSettings, Smoothing, edges, presmooth};
 use strandline::store::{BoxSource, BrickArray};
 
 use crate::common::lab::{Lab, PlainGrid, dense, whole};

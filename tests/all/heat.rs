@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use strandline::grid::BrickSet;
-use strandline::kernel::level_set::CELL;
-use strandline::pipeline::image_terms::{EdgeSettings, Smoothing, edges, presmooth};
+use strandline::kernel::level_set::cell::CELL;
+use strandline::pipeline::image::terms::{EdgeSettings, Smoothing, edges, presmooth};
 use strandline::store::BrickArray;
 
 use crate::common::lab::{Lab, PlainGrid, dense, whole};

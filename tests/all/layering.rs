@@ -101,12 +101,12 @@ fn floor_of(room: &str) -> Option<u8> {
 
 /// A word or one punctuation mark of the source.
 #[derive(Clone, Copy, Debug)]
-struct Token<'a> {
-    word: &'a str,
-    line: usize,
+pub(crate) struct Token<'a> {
+    pub(crate) word: &'a str,
+    pub(crate) line: usize,
 }
 
-fn tokens(code: &str) -> Vec<Token<'_>> {
+pub(crate) fn tokens(code: &str) -> Vec<Token<'_>> {
     let mut found = Vec::new();
     for (index, text) in code.lines().enumerate() {
         let mut rest = text;
@@ -174,7 +174,7 @@ fn first_segments<'a>(tokens: &[Token<'a>], start: usize) -> Vec<Token<'a>> {
 }
 
 /// The source with comments and the contents of string and character literals turned to spaces; line breaks stay.
-fn blank_comments_and_strings(text: &str) -> String {
+pub(crate) fn blank_comments_and_strings(text: &str) -> String {
     let chars: Vec<char> = text.chars().collect();
     let mut code = String::with_capacity(text.len());
     let mut at = 0;
@@ -242,7 +242,7 @@ fn raw_string_length(rest: &[char]) -> usize {
     rest[body..].windows(close.len()).position(|window| window == close).map_or(rest.len(), |n| body + n + close.len())
 }
 
-fn source_files(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn source_files(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).expect("src/ is readable") {
         let path = entry.expect("src/ is readable").path();

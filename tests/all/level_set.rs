@@ -4,14 +4,14 @@
 use std::f64::consts::PI;
 
 use strandline::grid::{BrickGrid, Geometry, PointBins};
-use strandline::kernel::level_set::CELL;
-use strandline::kernel::level_set::persistence::PERSISTENCE;
-use strandline::kernel::level_set::velocity::Velocity;
+use strandline::kernel::level_set::cell::CELL;
+use strandline::kernel::level_set::initial::persistence::PERSISTENCE;
+use strandline::kernel::level_set::scheme::velocity::Velocity;
 use strandline::kernel::surface::{MarchingCubes, Measures, Patch, PatchIndex, SurfaceMeasure, Welder, cells_of_brick};
-use strandline::pipeline::band::{Reaches, make_band};
 use strandline::pipeline::distance::{Method, Sources, cloud_distance};
-use strandline::pipeline::evolve::{Evolution, Stop, TimeLoop, evolve};
-use strandline::pipeline::tagging::tag;
+use strandline::pipeline::enclosure::tagging::tag;
+use strandline::pipeline::level_set::band::{Reaches, make_band};
+use strandline::pipeline::level_set::evolve::{Evolution, Stop, TimeLoop, evolve};
 use strandline::store::MeshBuffer;
 
 use crate::common::clouds::{grid_around, sponge};

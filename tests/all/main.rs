@@ -43,6 +43,7 @@ mod cli;
 mod clouds_cli;
 mod layering;
 mod outlines;
+mod room_circles;
 #[cfg(target_os = "linux")]
 mod segment_notes;
 mod signals;

@@ -2,13 +2,13 @@
 //! before for any tau and eps, constants stay; and against the linear system of the printed scheme in f64.
 
 use proptest::prelude::*;
-use strandline::kernel::level_set::covolume::{Planes, assemble};
-use strandline::kernel::level_set::mask::CellMask;
-use strandline::kernel::level_set::scheme::SCHEME_LEN;
-use strandline::kernel::level_set::sor::{Halves, Relaxation, relax};
-use strandline::kernel::level_set::velocity::{Fields, Velocity};
-use strandline::kernel::level_set::{CELL, CELL_LEN};
-use strandline::pipeline::evolve::{Evolution, Stop, TimeLoop, evolve};
+use strandline::kernel::level_set::cell::{CELL, CELL_LEN};
+use strandline::kernel::level_set::scheme::covolume::{Planes, assemble};
+use strandline::kernel::level_set::scheme::mask::CellMask;
+use strandline::kernel::level_set::scheme::sor::{Halves, Relaxation, relax};
+use strandline::kernel::level_set::scheme::system::SCHEME_LEN;
+use strandline::kernel::level_set::scheme::velocity::{Fields, Velocity};
+use strandline::pipeline::level_set::evolve::{Evolution, Stop, TimeLoop, evolve};
 
 use crate::common::lab::{Lab, PlainGrid, whole};
 use crate::common::plain_scheme::{PlainVelocity, coefficients, gradient_norms};

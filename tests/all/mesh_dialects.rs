@@ -7,8 +7,8 @@ use std::path::Path;
 
 use serde_json::Value;
 use strandline::grid::TriangleMesh;
-use strandline::io::source::Source;
-use strandline::io::sources::read_noted;
+use strandline::io::geometry::read::source::Source;
+use strandline::io::geometry::read::sources::read_noted;
 use strandline::kernel::geometry::solid::Solid;
 use strandline::kernel::surface::Measures;
 

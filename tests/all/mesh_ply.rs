@@ -6,8 +6,8 @@ use std::path::Path;
 
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Ply, Property};
-use strandline::io::mesh_ply::PlyWriter;
-use strandline::io::points::read_cloud;
+use strandline::io::geometry::read::points::read_cloud;
+use strandline::io::geometry::write::ply::PlyWriter;
 use strandline::store::{MeshBuffer, MeshSink};
 
 fn tetrahedron() -> MeshBuffer {

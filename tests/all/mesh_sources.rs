@@ -4,8 +4,8 @@ use std::fs;
 
 use strandline::error::{ErrorKind, Result};
 use strandline::grid::TriangleMesh;
-use strandline::io::source::Source;
-use strandline::io::sources::{FORMATS, read_source};
+use strandline::io::geometry::read::source::Source;
+use strandline::io::geometry::read::sources::{FORMATS, read_source};
 
 use crate::common::damage::damaged;
 use crate::common::meshes::{self, Form};

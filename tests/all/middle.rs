@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use std::fs;
 
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
-use strandline::io::mesh_ply::PlyWriter;
+use strandline::io::geometry::write::ply::PlyWriter;
 use strandline::io::ome_zarr::StoreWriter;
 use strandline::kernel::distance::state::neighbours::Neighbours::{All, Faces};
 use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule};

@@ -9,10 +9,10 @@ use std::path::Path;
 use std::process::Stdio;
 
 use serde_json::Value;
-use strandline::io::point_file::Scale;
-use strandline::io::points::read_points;
-use strandline::io::source::Source;
-use strandline::io::sources::read_source;
+use strandline::io::geometry::read::point_file::Scale;
+use strandline::io::geometry::read::points::read_points;
+use strandline::io::geometry::read::source::Source;
+use strandline::io::geometry::read::sources::read_source;
 
 use crate::common::ball::{Ball, Bench, HEADER};
 use crate::common::python;

@@ -4,7 +4,7 @@ use std::fs;
 
 use strandline::error::{ErrorKind, Result};
 use strandline::grid::PointCloud;
-use strandline::io::points::read_cloud;
+use strandline::io::geometry::read::points::read_cloud;
 
 use crate::common::damage::damaged;
 use crate::common::random::Random;

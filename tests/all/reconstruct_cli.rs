@@ -5,9 +5,9 @@
 use std::fs;
 
 use serde_json::json;
-use strandline::io::source::Source;
-use strandline::io::sources::read_source;
-use strandline::kernel::distance::features::winding_number::WindingTree;
+use strandline::io::geometry::read::source::Source;
+use strandline::io::geometry::read::sources::read_source;
+use strandline::kernel::geometry::winding_number::WindingTree;
 
 use crate::common::ball::Bench;
 use crate::common::clouds::sphere;

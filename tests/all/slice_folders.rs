@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use strandline::io::tiff_stack::{Select, StackInfo};
+use strandline::io::stack::tiff::{Select, StackInfo};
 use tempfile::TempDir;
 
 use crate::common::ball::Bench;

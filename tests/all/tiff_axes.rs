@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 
-use strandline::io::tiff_stack::{Select, StackInfo};
+use strandline::io::stack::tiff::{Select, StackInfo};
 
 use crate::common::ball::Bench;
 use crate::common::tiff_bytes::{PageBytes, Value, gray_page, tiff_file};

@@ -5,7 +5,7 @@
 use std::fs;
 
 use serde_json::Value;
-use strandline::io::tiff_stack::Select;
+use strandline::io::stack::tiff::Select;
 
 use crate::common::{python, tiff_planes};
 

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-use strandline::io::tiff_stack::{Select, TiffStack};
+use strandline::io::stack::tiff::{Select, TiffStack};
 use strandline::store::{PlaneSource, SamplesMut};
 use tempfile::TempDir;
 

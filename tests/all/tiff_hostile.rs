@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use strandline::io::tiff_stack::{Select, TiffStack};
+use strandline::io::stack::tiff::{Select, TiffStack};
 use strandline::store::PlaneSource;
 
 use crate::common::random::Random;

@@ -4,7 +4,7 @@
 
 use std::fs;
 
-use strandline::io::tiff_stack::Select;
+use strandline::io::stack::tiff::Select;
 
 use crate::common::ball::Bench;
 use crate::common::tiff_bytes::{PageBytes, Value, gray_page, tiff_file};

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use strandline::grid::{Box3, BrickGrid, Geometry, TriangleBins, TriangleMesh};
-use strandline::io::source::Source;
-use strandline::io::sources::read_source;
-use strandline::kernel::distance::features::winding_number::{WindingTree, solid_angle};
+use strandline::io::geometry::read::source::Source;
+use strandline::io::geometry::read::sources::read_source;
 use strandline::kernel::distance::seeding::triangles::{cut_cells, fix_voxels};
 use strandline::kernel::distance::state::source::NO_SOURCE;
+use strandline::kernel::geometry::winding_number::{WindingTree, solid_angle};
 
 use crate::common::meshes::{cuboid, joined, sphere};
 use crate::common::random::Random;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use strandline::pipeline::distance::{Method, Sources, cloud_distance};
-use strandline::pipeline::watershed::{Sides, watershed};
+use strandline::pipeline::enclosure::watershed::{Sides, watershed};
 
 use crate::common::clouds::{grid_around, sphere};
 use crate::common::lab::{Lab, PlainGrid, whole};

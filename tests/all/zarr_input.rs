@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use strandline::io::stack::{Select, Stack};
-use strandline::io::zarr_image::ZarrImage;
+use strandline::io::stack::volume::{Select, Stack};
+use strandline::io::stack::zarr::ZarrImage;
 use strandline::store::VolumeSource;
 
 use crate::common::ball::{Ball, Bench};

@@ -9,8 +9,8 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 use strandline::grid::{Box3, Geometry};
 use strandline::io::ome_zarr::{ImageSpec, ImageWriter, LabelColor, LabelSpec, StoreWriter};
-use strandline::kernel::image::downsample;
-use strandline::kernel::image::palette::label_color;
+use strandline::kernel::image::filter::downsample;
+use strandline::kernel::image::picture::palette::label_color;
 use strandline::store::Element;
 
 use crate::common::python;

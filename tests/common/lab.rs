@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use strandline::exec::{Budget, Cancel, Engine, Silent};
 use strandline::grid::{Box3, BrickGrid, BrickSet, Slot};
-use strandline::kernel::level_set::CELL;
-use strandline::pipeline::band::Band;
+use strandline::kernel::level_set::cell::CELL;
+use strandline::pipeline::level_set::band::Band;
 use strandline::store::{BoxSink, BoxSource, BrickArray, Element, Scratch};
 
 /// An engine, and the folder it works in for as long as it lives.

@@ -3,3 +3,4 @@
 pub mod solid;
 pub mod triangle;
 pub(crate) mod vector;
+pub mod winding_number;

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::contiguous::contiguous_margin;
-use super::found::DistanceFound;
-use super::output::Wanted;
-use super::readout::ReadOut;
+use super::readout::found::DistanceFound;
+use super::readout::images::Wanted;
+use super::readout::visit::ReadOut;
+use super::seeding::contiguous::contiguous_margin;
 use super::{Method, Options, Schedule, Solved, Sources, solve};
 use crate::error::Result;
 use crate::exec::Engine;

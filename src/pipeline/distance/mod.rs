@@ -4,40 +4,28 @@
 //! The set need not cover the domain: a value within the set's reach of the cloud is reached only through smaller
 //! values, so leaving far bricks out changes none of the near ones.
 
-mod contiguous;
-mod field;
-pub(crate) mod found;
-mod front;
-mod initialise;
 mod job;
-mod look_outside;
 mod needs;
-mod output;
 mod ranks;
-pub(crate) mod read_tile;
-mod readout;
-mod second_look;
+pub mod readout;
+pub mod schedule;
+pub mod seeding;
 mod solvers;
 mod solving;
-mod sources;
-mod sweep;
-mod sweep_sources;
-mod textbook;
-mod trace;
 
 use std::sync::Arc;
 
-pub use field::{Solved, Together};
-pub use found::DistanceFound;
 pub use job::{DistanceSettings, Init, distance, solve_sets};
 pub use needs::Needs;
 pub(crate) use needs::tree_bytes;
-pub(crate) use output::Wanted;
 pub use ranks::solve;
-pub(crate) use readout::ReadOut;
+pub use readout::field::{Solved, Together};
+pub use readout::found::DistanceFound;
+pub(crate) use readout::images::Wanted;
+pub(crate) use readout::visit::ReadOut;
+pub use seeding::sources::Sources;
 pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};
 pub use solving::Solving;
-pub use sources::Sources;
 
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::second_look::with_second_look;
+use super::readout::repair::with_second_look;
 use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;

@@ -1,8 +1,8 @@
-//! The table of distance methods. A method is one file in `kernel::distance` and one row here; the command line, its
+//! The table of distance methods. A method is one file in `kernel::distance::methods` and one row here; the command line, its
 //! help and the shared tests pick it up from the table.
 
 use super::Schedule;
-use super::field::Solved;
+use super::readout::field::Solved;
 use super::solving::{Solving, dijkstra_pythagoras, fast_marching, fast_sweeping, vector_distance};
 use crate::error::Result;
 use crate::grid::BrickGrid;

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::field::{Solved, Values};
-use super::front::advance_front;
-use super::initialise::{Seeded, Start, initialise};
-use super::look_outside::look_outside;
-use super::sweep::{Alone, sweep_all};
-use super::sweep_sources::TrackedSweeps;
-use super::textbook::{Wanted, heap_dijkstra, heap_marching};
-use super::trace::{SourceField, trace_sources};
+use super::readout::field::{Solved, Values};
+use super::schedule::front::advance_front;
+use super::schedule::sweep::{Alone, sweep_all};
+use super::schedule::sweep_sources::TrackedSweeps;
+use super::schedule::textbook::{Wanted, heap_dijkstra, heap_marching};
+use super::schedule::trace::{SourceField, trace_sources};
+use super::seeding::initialise::{Seeded, Start, initialise};
+use super::seeding::outside::look_outside;
 use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};

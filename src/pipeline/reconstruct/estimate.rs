@@ -2,12 +2,12 @@
 
 use super::settings::ReconstructSettings;
 use crate::grid::{BrickGrid, Geometry};
-use crate::kernel::level_set::{CELL, CELL_LEN};
-use crate::pipeline::cell_needs::{
+use crate::kernel::level_set::cell::{CELL, CELL_LEN};
+use crate::pipeline::enclosure::needs::{
     COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, POINT_BYTES, STORED_CELL_BYTES, THREAD_BYTES,
 };
-use crate::pipeline::enclosure::first_reach_for;
-use crate::pipeline::vicinity::Vicinity;
+use crate::pipeline::enclosure::region::Vicinity;
+use crate::pipeline::enclosure::search::first_reach_for;
 
 /// What a run is expected to take; of a cloud whose holes are wider than the search's first reach it takes more.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -10,12 +10,12 @@ use crate::exec::{Engine, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
-use crate::pipeline::band::Band;
-use crate::pipeline::enclosure::{Deepest, Found, Hole, Search, Start, enclose, first_reach_for};
-use crate::pipeline::evolve::Evolution;
-use crate::pipeline::evolve_ranks::evolve_on_ranks;
-use crate::pipeline::pyramid::{Reduce, write_levels};
-use crate::pipeline::sheets::{Company, hold_sheets};
+use crate::pipeline::enclosure::search::{Deepest, Found, Hole, Search, Start, enclose, first_reach_for};
+use crate::pipeline::enclosure::sheets::{Company, hold_sheets};
+use crate::pipeline::level_set::band::Band;
+use crate::pipeline::level_set::evolve::Evolution;
+use crate::pipeline::level_set::ranks::evolve_on_ranks;
+use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 

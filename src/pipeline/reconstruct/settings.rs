@@ -1,8 +1,8 @@
 //! Settings of `reconstruct`, and what they are when the user gives none. Lengths are physical.
 
 use crate::pipeline::distance::Method;
-use crate::pipeline::evolve::Stop;
-use crate::pipeline::motion::Motion;
+use crate::pipeline::level_set::evolve::Stop;
+use crate::pipeline::level_set::motion::Motion;
 
 /// What the user may set.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,17 +5,17 @@ use super::settings::SegmentSettings;
 use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::{Box3, Geometry};
-use crate::pipeline::band::Band;
-use crate::pipeline::enclosure::Hole;
-use crate::pipeline::evolve::Evolution;
-use crate::pipeline::evolve::evolve;
-use crate::pipeline::image_terms::{edges, presmooth};
-use crate::pipeline::intensity::Normalised;
+use crate::pipeline::enclosure::search::Hole;
+use crate::pipeline::image::intensity::Normalised;
+use crate::pipeline::image::terms::{edges, presmooth};
+use crate::pipeline::level_set::band::Band;
+use crate::pipeline::level_set::evolve::Evolution;
+use crate::pipeline::level_set::evolve::evolve;
 use crate::pipeline::marks::ObjectMarks;
 use crate::store::{BrickArray, Element};
 
 /// What moves an object's surface, beside its curvature and the settings.
-pub(super) struct Forces {
+pub(crate) struct Forces {
     /// Weight of the pull towards the marks.
     pub theta: f64,
     /// Weight of the image.
@@ -37,7 +37,7 @@ impl Forces {
 }
 
 /// An object before its surface moves.
-pub(super) struct Begun {
+pub(crate) struct Begun {
     /// The grid of its box.
     pub geometry: Geometry,
     /// Its box in voxels of the image; may reach past it.
@@ -107,7 +107,7 @@ impl Begun {
 }
 
 /// A solved object before its surface is drawn.
-pub(super) struct Solution {
+pub(crate) struct Solution {
     /// The grid of its box.
     pub geometry: Geometry,
     /// Its box in voxels of the image; may reach past it.

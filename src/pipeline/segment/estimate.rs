@@ -5,19 +5,19 @@
 //! reach farther than its start: how far, only the flood can tell, and it is what the estimate is to be given before.
 
 use super::neighbours::needs;
+use super::outlined::shape_start::BAND;
 use super::reach::first_reach;
 use super::settings::{Guides, SegmentSettings};
-use super::shape_start::BAND;
 use crate::grid::{Box3, BrickGrid};
-use crate::kernel::level_set::{CELL, CELL_LEN};
-use crate::pipeline::cell_needs::{
+use crate::kernel::level_set::cell::{CELL, CELL_LEN};
+use crate::pipeline::enclosure::needs::{
     COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, KEPT_BYTES, POINT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES,
     STORED_CELL_BYTES, THREAD_BYTES,
 };
-use crate::pipeline::image_terms::Smoothing;
+use crate::pipeline::enclosure::region::Vicinity;
+use crate::pipeline::image::smoothing::thread_bytes;
+use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::marks::{ObjectMarks, cloud_of, contour_gap};
-use crate::pipeline::smoothing::thread_bytes;
-use crate::pipeline::vicinity::Vicinity;
 use crate::store::VolumeSource;
 
 /// What a run is expected to take.

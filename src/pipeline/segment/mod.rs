@@ -7,34 +7,28 @@
 //! ```
 
 pub(crate) mod begun;
-mod check;
-mod cross_validate;
-mod doubts;
+pub mod checks;
 mod estimate;
 mod labels;
 mod neighbours;
 mod object;
 pub(crate) mod object_report;
 mod objects;
-mod outlines;
+pub mod outlined;
 mod output;
 pub(crate) mod picture;
 mod reach;
 mod seed;
 mod settings;
-mod shape_field;
-mod shape_start;
-mod speed;
-mod survey;
 mod tissue;
 
-pub use check::{Grids, check_lengths, check_marks, check_seed, check_smoothing};
-pub use doubts::{doubts, open_outlines, same_place, spans_slices};
+pub use checks::doubts::{doubts, open_outlines, same_place, spans_slices};
+pub use checks::lengths::{Grids, check_lengths, check_marks, check_seed, check_smoothing};
 pub use estimate::{Estimate, estimate};
 pub use labels::{Overlap, Placed};
 pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_faces, join};
 pub use object_report::Refused;
 pub use object_report::{CrossValidation, ObjectReport};
-pub use outlines::crossed;
+pub use outlined::outlines::crossed;
 pub use output::{LARGEST_WHOLE, Outcome, segment};
 pub use settings::{Guides, ImageModel, SegmentSettings, Start};

@@ -2,16 +2,17 @@
 
 use super::begun::Solution;
 use super::begun::{Begun, Forces};
-use super::outlines::not_flat;
+use super::outlined::outlines::not_flat;
+use super::outlined::shape_start::begin;
+use super::outlined::survey::{Outlined, Trust};
 use super::picture::{Picture, World};
 use super::reach::first_reach;
 use super::seed::grow;
 use super::settings::{ImageModel, SegmentSettings, Start};
-use super::shape_start::begin;
-use super::survey::{Outlined, Trust};
 use crate::error::{Error, Result};
 use crate::exec::Engine;
-use crate::pipeline::enclosure::{self, Deepest, Found, Search, enclose};
+use crate::pipeline::enclosure::search;
+use crate::pipeline::enclosure::search::{Deepest, Found, Search, enclose};
 use crate::pipeline::marks::{ObjectMarks, cloud_of};
 use crate::store::Element;
 
@@ -44,7 +45,7 @@ pub(super) fn solve<T: Element>(
         cloud: &cloud,
         method: settings.method,
         beta: settings.beta,
-        start: if loose { enclosure::Start::Watershed } else { enclosure::Start::Tube },
+        start: if loose { search::Start::Watershed } else { search::Start::Tube },
         first_reach: first_reach(marks, picture.geometry, settings),
         suffix: &suffix,
     };

@@ -2,8 +2,8 @@
 
 use crate::kernel::surface::Hausdorff;
 use crate::kernel::surface::Measures;
-use crate::pipeline::enclosure::Hole;
-use crate::pipeline::evolve::Evolution;
+use crate::pipeline::enclosure::search::Hole;
+use crate::pipeline::level_set::evolve::Evolution;
 
 /// What is reported of a solved object.
 #[derive(Clone, Debug)]

@@ -1,25 +1,25 @@
 //! All objects: looked at together, solved each for itself, small ones side by side; their surfaces drawn and checked.
 
 use super::begun::Solution;
-use super::cross_validate::cross_validate;
 use super::object::solve;
 use super::object_report::ObjectReport;
 use super::object_report::Refused;
-use super::outlines::scatter_of;
+use super::outlined::cross_validate::cross_validate;
+use super::outlined::outlines::scatter_of;
+use super::outlined::survey::{Looking, Outlined, Trust, left_out_of, trust};
 use super::picture::Picture;
 use super::settings::{Guides, ImageModel, SegmentSettings, Start};
-use super::survey::{Looking, Outlined, Trust, left_out_of, trust};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
 use crate::grid::{Geometry, digits};
-use crate::io::mesh_ply::PlyWriter;
+use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::{ImageSpec, StoreWriter};
 use crate::kernel::surface::Hausdorff;
-use crate::pipeline::cell_needs::SOLVE_BYTES;
+use crate::pipeline::enclosure::needs::SOLVE_BYTES;
+use crate::pipeline::enclosure::region::voxel_bounds;
 use crate::pipeline::marks::ObjectMarks;
-use crate::pipeline::pyramid::{Reduce, write_levels};
+use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
-use crate::pipeline::vicinity::voxel_bounds;
 use crate::store::{Element, ElementType, NoMesh};
 
 /// What was solved, in order of the labels, and what was not.

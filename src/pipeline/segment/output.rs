@@ -16,10 +16,10 @@ use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, Geometry};
 use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
 use crate::kernel::image::labels;
-use crate::kernel::image::palette::label_color;
+use crate::kernel::image::picture::palette::label_color;
 use crate::kernel::surface::Contact;
-use crate::pipeline::ingest::{Image, ingest};
-use crate::pipeline::pyramid::{Reduce, write_levels};
+use crate::pipeline::image::ingest::{Image, ingest};
+use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::store::{BoxSource, Element, ElementType, Sample, SampleWork, VolumeSource};
 
 /// What a segmentation found.

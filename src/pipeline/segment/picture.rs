@@ -1,14 +1,14 @@
 //! The image that objects are found in, and where an object lies in it.
 
 use crate::grid::{Geometry, digits};
-use crate::kernel::image::grey_range::GreyRange;
-use crate::pipeline::enclosure::Hole;
+use crate::kernel::image::grey::grey_range::GreyRange;
+use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::marks::ObjectMarks;
 use crate::store::{BoxSource, Element};
 
 /// The image as the objects see it.
 #[derive(Clone, Copy)]
-pub(super) struct Picture<'a, T: Element> {
+pub(crate) struct Picture<'a, T: Element> {
     /// Its voxels.
     pub voxels: &'a dyn BoxSource<T>,
     /// The grey values taken as black and white.
@@ -21,7 +21,7 @@ pub(super) struct Picture<'a, T: Element> {
 
 /// Where a picture lies that is solved as if its first voxel were the origin.
 #[derive(Clone, Copy)]
-pub(super) struct World<'a> {
+pub(crate) struct World<'a> {
     /// The grid of the whole image.
     pub whole: &'a Geometry,
     /// The world position of the picture's origin.

@@ -2,7 +2,7 @@
 
 use super::settings::SegmentSettings;
 use crate::grid::Geometry;
-use crate::pipeline::enclosure::first_reach_for;
+use crate::pipeline::enclosure::search::first_reach_for;
 use crate::pipeline::marks::{ObjectMarks, contour_gap};
 
 /// Of the gap between contours.

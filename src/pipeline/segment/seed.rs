@@ -10,8 +10,9 @@ use super::settings::SegmentSettings;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{BrickGrid, BrickSet, Geometry};
-use crate::kernel::level_set::{CELL, ball};
-use crate::pipeline::band::Band;
+use crate::kernel::level_set::cell::CELL;
+use crate::kernel::level_set::initial::ball;
+use crate::pipeline::level_set::band::Band;
 use crate::pipeline::marks::{ObjectMarks, Seed};
 use crate::store::{BrickArray, Element};
 

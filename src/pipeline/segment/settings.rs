@@ -5,9 +5,9 @@ use super::neighbours::FillGaps;
 use super::object_report::Refused;
 use crate::grid::Geometry;
 use crate::pipeline::distance::Method;
-use crate::pipeline::image_terms::{EdgeSettings, Smoothing};
+use crate::pipeline::image::terms::{EdgeSettings, Smoothing};
+use crate::pipeline::level_set::motion::Motion;
 use crate::pipeline::marks::ObjectMarks;
-use crate::pipeline::motion::Motion;
 
 /// What the image shows at the border of the objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,11 +6,11 @@ use super::settings::SegmentSettings;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::Geometry;
-use crate::io::mesh_ply::PlyWriter;
+use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::surface::Contact;
-use crate::pipeline::ingest::Image;
-use crate::pipeline::intensity::Normalised;
+use crate::pipeline::image::ingest::Image;
+use crate::pipeline::image::intensity::Normalised;
 use crate::store::{Element, NoMesh};
 
 /// Joins objects; walls between them are looked for in the image where that has a say in them.

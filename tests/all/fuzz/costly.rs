@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{Cursor, Write};
 
-use strandline::io::points::read_points;
+use strandline::io::geometry::read::points::read_points;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use strandline::error::Result;
 use strandline::grid::{Box3, Geometry};
-use strandline::io::label_volume::{LabelVolume, labels_of};
-use strandline::io::points::read_cloud;
-use strandline::io::sources::{describe, read_source};
-use strandline::io::stack::Stack;
-use strandline::io::stacks::open_stack;
-use strandline::io::tiff_stack::Select;
-use strandline::io::zarr_image;
+use strandline::io::geometry::read::points::read_cloud;
+use strandline::io::geometry::read::sources::{describe, read_source};
+use strandline::io::stack::formats::open_stack;
+use strandline::io::stack::label_volume::{LabelVolume, labels_of};
+use strandline::io::stack::tiff::Select;
+use strandline::io::stack::volume::Stack;
+use strandline::io::stack::zarr;
 use strandline::store::{ElementType, Sample};
 
 use super::seeds::{images, meshes, pages, rois, slices, tables};
@@ -169,7 +169,7 @@ fn values<T: Sample>(stack: &dyn Stack, part: &Box3) -> Result<()> {
 
 /// Reads an image of Zarr as `info`, `segment` and `middle` do.
 fn image(folder: &Path) -> Result<()> {
-    let described = zarr_image::describe(folder, None).map(drop);
+    let described = zarr::describe(folder, None).map(drop);
     worst([described, volume(folder), labels_of(folder).and_then(|(path, _)| labels(&path))])
 }
 

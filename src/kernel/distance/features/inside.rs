@@ -4,8 +4,8 @@
 //! connected group of such voxels in a box one is asked for its winding number. Every voxel is asked where a mesh is
 //! open: the winding number then passes 1/2 also where there is no triangle.
 
-use super::winding_number::WindingTree;
 use crate::grid::{Box3, FACES, Geometry, TriangleMesh};
+use crate::kernel::geometry::winding_number::WindingTree;
 
 /// What tells the two sides of meshes apart.
 #[derive(Clone, Debug)]

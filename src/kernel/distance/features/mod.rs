@@ -9,4 +9,3 @@ pub mod inside;
 pub mod labelled_shapes;
 pub mod source_labels;
 pub mod source_trees;
-pub mod winding_number;

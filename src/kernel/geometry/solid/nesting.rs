@@ -9,8 +9,8 @@ use rstar::{AABB, RTree};
 
 use super::patches::Patches;
 use crate::grid::TriangleMesh;
-use crate::kernel::distance::features::winding_number::WindingTree;
 use crate::kernel::geometry::vector::{cross, dot, sub};
+use crate::kernel::geometry::winding_number::WindingTree;
 
 /// Volumes below this part of their box's are flat, with no inside to tell.
 const FLAT: f64 = 1e-12;

@@ -12,7 +12,7 @@ use super::widths::width;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::BrickSet;
-use crate::kernel::image::gaps::{GAP, GIVEN, Gaps, OUTSIDE};
+use crate::kernel::image::morphology::gaps::{GAP, GIVEN, Gaps, OUTSIDE};
 use crate::store::{BoxSink, BoxSource, BrickArray};
 
 /// How deep, in smallest spacings, objects give back what they claimed beside others, where an image tells of walls: the

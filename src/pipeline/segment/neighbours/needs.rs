@@ -4,7 +4,7 @@ use super::EDGE;
 use super::joined::FillGaps;
 use super::widths::widest;
 use crate::grid::Geometry;
-use crate::kernel::image::gaps::Gaps;
+use crate::kernel::image::morphology::gaps::Gaps;
 
 /// Bytes of scratch for a voxel: labels of contested voxels; with gaps also states, weights, costs, labels twice, faces.
 const SETTLED_BYTES: u64 = 4;

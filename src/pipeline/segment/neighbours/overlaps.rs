@@ -11,7 +11,7 @@ use super::survey::Survey;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickId, BrickSet, Geometry};
-use crate::kernel::image::nearness::Nearness;
+use crate::kernel::image::morphology::nearness::Nearness;
 use crate::pipeline::segment::labels::Placed;
 use crate::store::{BoxSink, BrickArray};
 

@@ -1,5 +1,5 @@
 //! The watershed: voxels of gaps, and those that objects gave back, go to the object that reaches them at the least cost
-//! (`kernel::image::geodesic`). Bricks are relaxed in rounds until nothing falls; costs are whole numbers, so the end is
+//! (`kernel::image::morphology::geodesic`). Bricks are relaxed in rounds until nothing falls; costs are whole numbers, so the end is
 //! the same for any order.
 
 use super::fields::Roots;
@@ -7,8 +7,8 @@ use super::walls::Walls;
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
 use crate::grid::{BrickSet, Geometry, NEIGHBOURS_26, Slot};
-use crate::kernel::image::gaps::SEED;
-use crate::kernel::image::geodesic::{Lengths, UNREACHED, relax};
+use crate::kernel::image::morphology::gaps::SEED;
+use crate::kernel::image::morphology::geodesic::{Lengths, UNREACHED, relax};
 use crate::store::{BoxSink, BoxSource, BrickArray};
 use crate::tile::HaloTile;
 

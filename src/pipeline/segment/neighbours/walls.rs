@@ -6,8 +6,8 @@
 
 use crate::error::Result;
 use crate::grid::{Box3, FACES};
-use crate::kernel::image::box_gaussian::Gaussian;
-use crate::kernel::image::gaps::{GAP, OUTSIDE, SEED};
+use crate::kernel::image::filter::box_gaussian::Gaussian;
+use crate::kernel::image::morphology::gaps::{GAP, OUTSIDE, SEED};
 use crate::store::BoxSource;
 
 /// Less contrast than this, of an image in [0, 1], tells of no wall.

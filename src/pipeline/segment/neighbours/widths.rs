@@ -11,7 +11,7 @@ use super::survey::Survey;
 use crate::error::Result;
 use crate::exec::{Stage, Workers, one_wave};
 use crate::grid::Geometry;
-use crate::kernel::image::gaps::{BINS, Gaps};
+use crate::kernel::image::morphology::gaps::{BINS, Gaps};
 
 /// Gaps wider than so many smallest spacings, or so many largest ones, are not looked for, nor filled.
 const REACH: [f64; 2] = [12.0, 6.0];

@@ -1,0 +1,47 @@
+//! The commands of the program, each with its flags.
+
+use clap::{Parser, Subcommand};
+
+use super::common::{DemoArgs, InfoArgs, MeasureArgs, SegmentArgs};
+use super::distance::DistanceJobArgs;
+use super::middle::MiddleArgs;
+use super::reconstruct::ReconstructArgs;
+
+/// Finds surfaces in 3-D volumes larger than memory.
+#[derive(Debug, Parser)]
+#[command(name = "strandline", version, max_term_width = 100, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Find objects in a 3-D image, guided by border points
+    #[command(after_help = HELP_ON_SEGMENT)]
+    Segment(Box<SegmentArgs>),
+    /// Compute the distance to point clouds and triangle meshes
+    #[command(after_help = HELP_ON_DISTANCE)]
+    Distance(Box<DistanceJobArgs>),
+    /// Compute the surface equally far from labelled point clouds and triangle meshes
+    #[command(after_help = HELP_ON_DISTANCE)]
+    Middle(Box<MiddleArgs>),
+    /// Reconstruct a closed surface from a point cloud, without normals
+    #[command(after_help = HELP_ON_DISTANCE)]
+    Reconstruct(Box<ReconstructArgs>),
+    /// Segment the built-in stack of a plant embryo
+    Demo(DemoArgs),
+    /// Measure a triangle mesh: volume, area, pieces, holes, and how far points lie from it
+    Measure(MeasureArgs),
+    /// Tell what an input or output is: shape, axes, spacing, unit, type
+    Info(InfoArgs),
+}
+
+pub(crate) const HELP_ON_SEGMENT: &str = "\
+Lengths are physical, in the unit of the image; triples are x,y,z; the centre of the first voxel is 0,0,0,
+or where an OME-Zarr image has it.
+Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 3 some\nobjects could not be solved, 130 interrupted, 143 terminated.";
+
+pub(crate) const HELP_ON_DISTANCE: &str = "\
+Lengths are those of the files; triples are x,y,z.
+Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 130 interrupted, 143 terminated.";

@@ -1,0 +1,10 @@
+//! What was typed: the commands and their flags.
+
+pub(crate) mod command_line;
+pub(crate) mod common;
+pub(crate) mod distance;
+pub(crate) mod grid;
+pub(crate) mod middle;
+pub(crate) mod pages;
+pub(crate) mod reconstruct;
+pub(crate) mod values;

@@ -1,0 +1,377 @@
+//! `strandline distance`: reads the sources, lays the grid, says what it will take, runs, writes, tells what was found.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use half::f16;
+
+use crate::cli::args::distance::MiddleChoice;
+use crate::cli::args::distance::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
+use crate::cli::inputs::grid;
+use crate::cli::inputs::settings;
+use crate::cli::inputs::settings::Resources;
+use crate::cli::inputs::sources::{Read, read_sets};
+use crate::cli::outputs::checks::Outputs;
+use crate::cli::outputs::disk::Disk;
+use crate::cli::outputs::drawing::Drawing;
+use crate::cli::outputs::files::{mesh_format, tell_of_anchor};
+use crate::cli::print;
+use crate::cli::report::distance::{Found, Settings, describe_found};
+use crate::cli::report::run_report::{Ran, Report};
+use crate::cli::report::table;
+use crate::cli::terminal::console::{Console, Voice};
+use crate::cli::terminal::signals;
+use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
+use crate::error::{Error, Result};
+use crate::exec::{Budget, Cancel, Engine, Progress};
+use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
+use crate::io::geometry::write::ply::PlyWriter;
+use crate::io::ome_zarr::StoreWriter;
+use crate::kernel::distance::seeding::outside::count_outside;
+use crate::kernel::distance::state::neighbours::Neighbours;
+use crate::kernel::distance::state::precision::Precision;
+use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, Textbook, distance};
+use crate::pipeline::middle::{MiddleSettings, middle};
+use crate::store::{MeshSink, Unfinished};
+
+/// A distance that is ready to be computed: all inputs are read and checked.
+struct Job {
+    args: DistanceJobArgs,
+    middle: Option<MiddleChoice>,
+    typed: Vec<String>,
+    settings: DistanceSettings,
+    resources: Resources,
+    sets: DataSets,
+    geometry: Geometry,
+    console: Arc<Console>,
+    cancel: Cancel,
+    started: Instant,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &DistanceJobArgs, typed: &[String]) -> Result<()> {
+    Job::new(args.clone(), None, typed)?.run_precise()
+}
+
+/// Runs `middle`: a distance with labels, and the surface between them.
+pub(crate) fn run_middle(args: DistanceJobArgs, choice: MiddleChoice, typed: &[String]) -> Result<()> {
+    choice.mesh.as_deref().map(mesh_format).transpose()?;
+    Job::new(args, Some(choice), typed)?.run_precise()
+}
+
+impl Job {
+    fn new(args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[String]) -> Result<Self> {
+        let started = Instant::now();
+        let cancel = signals::cancel_on_signals()?;
+        let mut settings = settings(&args)?;
+        let mesh = middle.as_ref().map_or(&None, |choice| &choice.mesh);
+        let output = &args.job.output;
+        let outputs = Outputs {
+            inputs: args.sources.iter().chain(&args.job.grid.like).map(PathBuf::as_path).collect(),
+            store: output.store(),
+            files: [&output.report, mesh].into_iter().flatten().map(PathBuf::as_path).collect(),
+            overwrite: output.overwrite,
+        };
+        outputs.check()?;
+        let resources = settings::resources(&args.job.resources, args.job.output.store())?;
+        let console = Arc::new(Console::new(Voice::of(args.job.output.quiet, args.job.output.verbose)));
+        let mut notes = Vec::new();
+        let given = grid::given(&args.job.grid, &mut notes)?;
+        for note in &notes {
+            console.note(note);
+        }
+        let Read { sets, volume } = read_sets(&args, given.as_ref(), resources.memory, &console, &cancel)?;
+        let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
+        let geometry = match (given, volume) {
+            (Some(geometry), _) => geometry,
+            (None, Some(geometry)) if !args.job.grid.is_asked_for() => geometry,
+            _ => grid::around(&args.job.grid, bounds)?,
+        };
+        if let Some(note) = outside_note(&geometry, &sets) {
+            console.note(&note);
+        }
+        if args.job.resources.brick.is_none() {
+            settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
+        }
+        let typed = typed.to_vec();
+        Ok(Self { args, middle, typed, settings, resources, sets, geometry, console, cancel, started })
+    }
+
+    fn run_precise(&self) -> Result<()> {
+        match self.args.job.field.precision {
+            PrecisionArg::F16 => self.run::<f16>(),
+            PrecisionArg::F32 => self.run::<f32>(),
+            PrecisionArg::F64 => self.run::<f64>(),
+        }
+    }
+
+    fn run<P: Precision>(&self) -> Result<()> {
+        check_range::<P>(&self.geometry, &self.sets)?;
+        let (threads, ranks) = (self.resources.threads, self.args.job.ranks);
+        let needs = match self.middle_settings() {
+            Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks),
+            None => self.settings.needs::<P>(&self.geometry, &self.sets, threads, ranks),
+        };
+        let needs = Needs { held: needs.held.saturating_add(self.written_held::<P>()), ..needs };
+        let plan = self.plan(&needs);
+        if self.args.job.output.dry_run {
+            print(&format!("{plan}\n"))?;
+        }
+        let window = self.fits(&needs)?;
+        if self.args.job.output.dry_run {
+            return Ok(());
+        }
+        self.console.say(&plan);
+        let engine = self.resources.engine(window, &self.cancel, &self.console)?;
+        let engine = engine.with_ranks(self.args.job.ranks);
+        let result = self.solve_and_write::<P>(&engine);
+        self.console.clear();
+        let found = result?;
+        if !self.args.job.output.quiet {
+            let output = &self.args.job.output;
+            let [labels_in, pairs_in] = ["", "meshes/pairs.csv"]
+                .map(|table| table::whole_in(output.store().is_some(), output.report.is_some(), table));
+            let told = describe_found(&found, &labels_in, &pairs_in);
+            print(&format!("{}\n{told}", table::stages(&engine.reports())))?;
+        }
+        Ok(())
+    }
+
+    fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {
+        let output = &self.args.job.output;
+        let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
+        let passing = tempfile::tempdir_in(&self.resources.scratch)
+            .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let _passes = Unfinished::new(passing.path());
+        let store = output.store().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let has_surface = self.middle.is_some();
+        let drawing = Drawing::new(store.as_ref().filter(|_| has_surface), mesh, passing.path())?;
+        let mut ply = drawing.start(|path| PlyWriter::tagged_on_grid(path, &self.geometry))?;
+        let found = self.solve::<P>(engine, store.as_ref(), ply.sink())?;
+        ply.finish()?;
+        tell_of_anchor(mesh, &self.geometry, &self.console);
+        if let Some(store) = store {
+            self.report(engine, &found).write(&store.file("report.json")?)?;
+            engine.check()?;
+            store.finish()?;
+        }
+        drawing.export(output.store(), &self.geometry)?;
+        match &output.report {
+            Some(path) => self.report(engine, &found).write(path)?,
+            None => engine.check()?,
+        }
+        Ok(found)
+    }
+
+    fn solve<P: Precision>(
+        &self,
+        engine: &Engine,
+        store: Option<&StoreWriter>,
+        mesh: &mut dyn MeshSink,
+    ) -> Result<Found> {
+        let (geometry, sets) = (&self.geometry, &self.sets);
+        match self.middle_settings() {
+            Some(settings) => {
+                Ok(Found::of_middle(&middle::<P>(engine, geometry, sets, &settings, store, mesh)?, sets.count()))
+            }
+            None => Ok(Found::new(&distance::<P>(engine, geometry, sets, &self.settings, store)?)),
+        }
+    }
+
+    fn middle_settings(&self) -> Option<MiddleSettings> {
+        let MiddleChoice { surface, labels, .. } = *self.middle.as_ref()?;
+        Some(MiddleSettings { distance: self.settings, surface, labels })
+    }
+
+    /// Refuses a run that cannot fit memory or disk.
+    fn fits(&self, needs: &Needs) -> Result<u64> {
+        self.refuse_too_many_bricks()?;
+        let window = Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
+            let name = self.settings.method.name();
+            let textbook = if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {
+                String::new()
+            } else {
+                format!(", or leave --schedule out: in the textbook's order {name} keeps all voxels in one heap")
+            };
+            Error::usage(format!(
+                "a grid of {} voxels needs {} of memory and {} of temporary fields; {error}, or a coarser \
+                 grid{textbook}",
+                grouped(self.geometry.domain().volume()),
+                bytes(needs.held),
+                bytes(needs.scratch)
+            ))
+        })?;
+        let output = self.args.job.output.store();
+        let written = if output.is_some() { self.written() } else { 0 };
+        Disk {
+            what: format!("a grid of {} voxels", grouped(self.geometry.domain().volume())),
+            scratch: &self.resources.scratch,
+            needed: needs.scratch.saturating_sub(window / 2),
+            output: output.unwrap_or(&self.resources.scratch),
+            written,
+            coarser: "a larger --spacing",
+        }
+        .check(&self.console)?;
+        Ok(window)
+    }
+
+    /// Bytes that are held while the output is written.
+    fn written_held<P: Precision>(&self) -> u64 {
+        if self.args.job.output.store().is_none() {
+            return 0;
+        }
+        let settings = DistanceSettings { labels: self.settings.labels || self.middle.is_some(), ..self.settings };
+        settings.written_held::<P>(&self.geometry, &self.sets, self.middle.is_some(), self.resources.threads)
+    }
+
+    /// Bytes of the output, if nothing of it could be compressed.
+    fn written(&self) -> u64 {
+        let element = match self.args.job.field.precision {
+            PrecisionArg::F16 => 2,
+            PrecisionArg::F32 => 4,
+            PrecisionArg::F64 => 8,
+        };
+        let labels = if self.middle.is_some() { 5 } else { 4 * u64::from(self.settings.labels) };
+        let places = 3 * element * u64::from(self.settings.closest_point);
+        // Coarser levels are an eighth each of the one before.
+        self.geometry.domain().volume().saturating_mul(element + labels + places).saturating_mul(8) / 7
+    }
+
+    /// Refuses more bricks than there are numbers for.
+    fn refuse_too_many_bricks(&self) -> Result<()> {
+        let bricks = BrickGrid::new(self.geometry.shape, self.settings.brick).len();
+        if bricks < u64::from(Slot::MAX) {
+            return Ok(());
+        }
+        Err(Error::usage(format!(
+            "a grid of {} voxels falls into {} bricks, more than can be numbered; give a larger --brick or a coarser \
+             grid",
+            grouped(self.geometry.domain().volume()),
+            grouped(bricks)
+        )))
+    }
+
+    /// What the run will take, in a few lines.
+    fn plan(&self, needs: &Needs) -> String {
+        let (g, s) = (&self.geometry, &self.settings);
+        let [x, y, z] = g.shape;
+        format!(
+            "{} points and {} triangles in {} data sets, {}\n\
+             grid {x} x {y} x {z} (x, y, z), {} voxels, spacing {}, origin {}\n\
+             about {}; memory up to {}, at least {}; {} of temporary fields, in memory or in {}",
+            grouped(self.sets.positions.len() as u64),
+            grouped(self.sets.mesh.len() as u64),
+            self.sets.count(),
+            s.method.name(),
+            grouped(g.domain().volume()),
+            triple(g.spacing),
+            place(g.origin, g.min_spacing()),
+            duration(needs.seconds),
+            bytes(self.resources.memory),
+            bytes(Budget::least(needs.held)),
+            bytes(needs.scratch),
+            self.resources.scratch.display()
+        )
+    }
+
+    fn report<'a>(&self, engine: &Engine, found: &'a Found) -> Report<Settings, &'a Found> {
+        let ran = Ran {
+            command: if self.middle.is_some() { "middle" } else { "distance" },
+            typed: &self.typed,
+            resources: &self.resources,
+            console: &self.console,
+            engine,
+            ranks: engine.ranks(),
+            started: self.started,
+        };
+        Report::new(
+            &ran,
+            Settings::new(&self.args, self.middle.as_ref(), &self.settings, &self.resources),
+            &self.geometry,
+            found,
+        )
+    }
+}
+
+/// The settings that the flags mean.
+fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
+    let field = &args.job.field;
+    let row = field.method.solver::<f32>();
+    let sweeps = field.schedule == ScheduleArg::Sweep;
+    if field.neighbours == Neighbours::All && !row.takes_all_neighbours {
+        return Err(Error::usage(format!("--method {} looks at 6 neighbours; leave --neighbours out", row.name)));
+    }
+    if sweeps && field.neighbours == Neighbours::All && row.textbook == Textbook::Sweeps {
+        return Err(Error::usage("sweeps by bricks cannot keep the order of 26 neighbours; leave --schedule out"));
+    }
+    if sweeps && field.max_distance.is_some() {
+        return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
+    }
+    settings::check_ranks(args.job.ranks)?;
+    if field.iterations == 0 {
+        return Err(Error::usage("--iterations is 0; give 1 or more"));
+    }
+    if let Some(far) = field.max_distance.filter(|d| !(d.is_finite() && *d > 0.0)) {
+        return Err(Error::usage(format!("--max-distance is {far}; give a length, more than 0")));
+    }
+    Ok(DistanceSettings {
+        method: field.method,
+        schedule: if sweeps { Schedule::Sweep { iterations: field.iterations } } else { Schedule::Front },
+        neighbours: field.neighbours,
+        init: match field.init {
+            InitArg::Cell => Init::Cell,
+            InitArg::Contiguous => Init::Contiguous,
+            InitArg::Grid => Init::Grid,
+        },
+        farthest: field.max_distance,
+        signed: args.choice.signed,
+        labels: args.choice.labels,
+        closest_point: args.choice.closest_point,
+        brick: settings::brick(args.job.resources.brick.unwrap_or(row.brick))?,
+    })
+}
+
+/// Says how many sources lie outside of the grid: it may not be where it was meant to be.
+fn outside_note(geometry: &Geometry, sets: &DataSets) -> Option<String> {
+    let (outside, all) = (count_outside(geometry, sets), sets.len() as u64);
+    let which = match outside {
+        0 => return None,
+        1 if all == 1 => "the only source lies outside of the grid or reaches".into(),
+        _ if outside == all => format!("all {} sources lie outside of the grid or reach", grouped(all)),
+        1 => format!("1 of {} sources lies outside of the grid or reaches", grouped(all)),
+        _ => format!("{} of {} sources lie outside of the grid or reach", grouped(outside), grouped(all)),
+    };
+    Some(format!(
+        "{which} out of it; such sources count like all others (--origin, --shape and --spacing say where it lies)"
+    ))
+}
+
+/// How far a voxel may be from the nearest source where all of them lie outside: half of the grid's diagonal more than its
+/// middle is.
+fn farthest_outside(geometry: &Geometry, sets: &DataSets, diagonal: f64) -> f64 {
+    let [lo, hi] = [geometry.position([0; 3]), geometry.position(geometry.shape.map(|n| n - 1))];
+    let middle: [f64; 3] = std::array::from_fn(|a| f64::midpoint(lo[a], hi[a]));
+    let away = |p: &[f64; 3]| (0..3).map(|a| (p[a] - middle[a]).powi(2)).sum::<f64>();
+    let corners = (0..sets.mesh.len()).map(|n| sets.mesh.corners(n)[0]);
+    let nearest = sets.positions.iter().copied().chain(corners).map(|p| away(&p)).fold(f64::INFINITY, f64::min);
+    nearest.sqrt() + 0.5 * diagonal
+}
+
+/// Refuses distances that the type cannot hold.
+fn check_range<P: Precision>(geometry: &Geometry, sets: &DataSets) -> Result<()> {
+    let diagonal = (0..3).map(|a| (geometry.shape[a] as f64 * geometry.spacing[a]).powi(2)).sum::<f64>().sqrt();
+    let is_outside = count_outside(geometry, sets) > 0;
+    let diagonal = if is_outside { diagonal.max(farthest_outside(geometry, sets, diagonal)) } else { diagonal };
+    let smallest = geometry.min_spacing();
+    // Below 2^-14 half precision loses digits.
+    if diagonal < P::MAX && smallest > P::LEAST {
+        return Ok(());
+    }
+    Err(Error::usage(format!(
+        "distances from {} to {} do not fit --precision {}; choose a wider one, or another unit of length",
+        number(smallest),
+        number(diagonal),
+        P::TYPE.name()
+    )))
+}

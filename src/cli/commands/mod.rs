@@ -1,0 +1,11 @@
+//! The commands, one file each.
+
+pub(crate) mod demo;
+pub(crate) mod distance;
+pub(crate) mod info;
+pub(crate) mod info_store;
+pub(crate) mod measure;
+pub(crate) mod middle;
+pub(crate) mod reconstruct;
+pub(crate) mod segment;
+pub(crate) mod store_contents;

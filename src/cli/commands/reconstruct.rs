@@ -1,0 +1,403 @@
+//! `strandline reconstruct`: reads the cloud, lays the grid, says what it will take, runs, writes, tells what was
+//! found.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::cli::args::grid::GridArgs;
+use crate::cli::args::reconstruct::{CloudGridArgs, ReconstructArgs};
+use crate::cli::inputs::grid::{asked_grid, check_counts};
+use crate::cli::inputs::noted::read_told;
+use crate::cli::inputs::settings;
+use crate::cli::inputs::settings::Resources;
+use crate::cli::outputs::checks::Outputs;
+use crate::cli::outputs::disk::Disk;
+use crate::cli::outputs::drawing::Drawing;
+use crate::cli::outputs::files::{mesh_format, tell_of_anchor};
+use crate::cli::print;
+use crate::cli::report::run_report::{Hausdorff, Hole, Moves, Ran, Report};
+use crate::cli::report::table;
+use crate::cli::terminal::console::{Console, Voice};
+use crate::cli::terminal::signals;
+use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
+use crate::error::{Error, Result};
+use crate::exec::{Budget, Cancel, Engine, Progress};
+use crate::grid::Geometry;
+use crate::io::geometry::read::source::Source;
+use crate::io::geometry::write::ply::PlyWriter;
+use crate::io::ome_zarr::StoreWriter;
+use crate::pipeline::reconstruct::{
+    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct, typical_spacing,
+    without_isolated,
+};
+use crate::store::Unfinished;
+
+/// Points without three others within so many spacings stand alone, where nothing else is said.
+const ISOLATED_SPACINGS: f64 = 4.0;
+
+/// Of so many points one may be off the surface without a word.
+const MOST_LOST: u64 = 20;
+
+/// A reconstruction that is ready to start: the cloud is read and checked.
+struct Job {
+    args: ReconstructArgs,
+    typed: Vec<String>,
+    settings: ReconstructSettings,
+    resources: Resources,
+    cloud: Vec<[f64; 3]>,
+    grid: Geometry,
+    console: Arc<Console>,
+    cancel: Cancel,
+    started: Instant,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
+    let job = Job::new(args.clone(), typed)?;
+    let threads = job.resources.threads as u64;
+    let estimate = estimate(&job.grid, &job.cloud, &job.settings, threads, job.writes_fields());
+    let plan = job.plan(&estimate);
+    if args.output.dry_run {
+        print(&format!("{plan}\n"))?;
+    }
+    let window = job.fits(&estimate)?;
+    if args.output.dry_run {
+        return Ok(());
+    }
+    job.console.say(&plan);
+    job.run(window, &estimate)
+}
+
+/// Leaves out points that stand alone, if that was asked for, and says how many.
+fn drop_isolated(cloud: Vec<[f64; 3]>, spacings: Option<f64>, console: &Console) -> Result<Vec<[f64; 3]>> {
+    let Some(spacings) = settings::above_zero("--drop-isolated", spacings)? else { return Ok(cloud) };
+    let Some(spacing) = typical_spacing(&cloud) else { return Ok(cloud) };
+    let kept = without_isolated(&cloud, spacings * spacing);
+    let dropped = (cloud.len() - kept.len()) as u64;
+    console.note(&format!(
+        "{} of {} points stand alone and are left out",
+        grouped(dropped),
+        grouped(cloud.len() as u64)
+    ));
+    Ok(kept)
+}
+
+/// The grid that was asked for, if one was, as fine as that around the cloud.
+fn laid_grid(
+    args: &CloudGridArgs,
+    around: &Geometry,
+    cloud: &[[f64; 3]],
+    console: &Console,
+) -> Result<Option<Geometry>> {
+    if !args.filled.is_given() {
+        return Ok(None);
+    }
+    let asked = GridArgs { spacing: Some(around.spacing), filled: args.filled.clone(), ..GridArgs::default() };
+    let high = |a: usize| cloud.iter().map(|p| p[a]).fold(f64::NEG_INFINITY, f64::max);
+    let laid = asked_grid(&asked, (around.origin, [high(0), high(1), high(2)]), &mut Vec::new())?;
+    let outside =
+        cloud.iter().filter(|&&p| !laid.domain().contains(laid.to_voxels(p).map(|v| v.floor() as i64))).count();
+    if outside > 0 {
+        console.note(&format!(
+            "{} of {} points lie outside of the grid; the surface is that of all points, fields end with the grid",
+            grouped(outside as u64),
+            grouped(cloud.len() as u64)
+        ));
+    }
+    Ok(Some(laid))
+}
+
+impl Job {
+    fn new(args: ReconstructArgs, typed: &[String]) -> Result<Self> {
+        let started = Instant::now();
+        let cancel = signals::cancel_on_signals()?;
+        let mut settings = settings::reconstruct_settings(&args.motion, args.distance.method)?;
+        let spacing = settings::spacing("--spacing", args.grid.spacing)?;
+        settings::check_ranks(args.ranks)?;
+        let outputs = Outputs {
+            inputs: vec![&args.cloud],
+            store: args.output.store(),
+            files: [&args.output.report, &args.mesh].into_iter().flatten().map(PathBuf::as_path).collect(),
+            overwrite: args.output.overwrite,
+        };
+        outputs.check()?;
+        args.mesh.as_deref().map(mesh_format).transpose()?;
+        let resources = settings::resources(&args.resources, args.output.store())?;
+        let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
+        let cloud = match read_told(&args.cloud, &|text| console.note(text))? {
+            Source::Cloud(cloud) => cloud.positions,
+            Source::Mesh(mesh) => {
+                console.note(&format!("{} is a mesh; its vertices are taken as points", args.cloud.display()));
+                mesh.vertices
+            }
+        };
+        let cloud = drop_isolated(cloud, args.grid.drop_isolated, &console)?;
+        let grid = grid_for(&cloud, spacing).ok_or_else(|| {
+            let what = "all points lie in one place, which tells no spacing and encloses nothing";
+            Error::input(what).at(&args.cloud)
+        })?;
+        let laid = laid_grid(&args.grid, &grid, &cloud, &console)?;
+        settings.keeps_grid = laid.is_some();
+        let grid = laid.unwrap_or(grid);
+        refuse_too_fine(&grid, resources.memory).map_err(|error| {
+            let rest = || strays(&cloud, spacing).filter(|(_, grid)| refuse_too_fine(grid, resources.memory).is_ok());
+            match args.grid.drop_isolated.map_or_else(rest, |_| None) {
+                Some((alone, _)) => far_strays(alone, cloud.len()).at(&args.cloud),
+                None => error,
+            }
+        })?;
+        let typed = typed.to_vec();
+        Ok(Self { args, typed, settings, resources, cloud, grid, console, cancel, started })
+    }
+
+    /// Fields are written out, or needed for the mesh.
+    fn writes_fields(&self) -> bool {
+        self.args.output.store().is_some()
+    }
+
+    /// Refuses a run that cannot fit memory or disk.
+    fn fits(&self, estimate: &Estimate) -> Result<u64> {
+        let window = Budget { total: self.resources.memory }.window(estimate.held)?;
+        // Two fields of the whole box, their coarser levels an eighth each of the one before; far from the points they are
+        // constant and take nothing.
+        let written = if self.writes_fields() { 8 * estimate.near_voxels.saturating_mul(8) / 7 } else { 0 };
+        Disk {
+            what: format!("a grid with {} voxels near the points", grouped(estimate.near_voxels)),
+            scratch: &self.resources.scratch,
+            needed: estimate.scratch.saturating_sub(window / 2),
+            output: self.args.output.store().unwrap_or(&self.resources.scratch),
+            written,
+            coarser: "a larger --spacing",
+        }
+        .check(&self.console)?;
+        Ok(window)
+    }
+
+    /// What the run will take, in a few lines.
+    fn plan(&self, estimate: &Estimate) -> String {
+        let [x, y, z] = self.grid.shape;
+        format!(
+            "{}: {} points, spacing {}, {x} x {y} x {z} voxels (x, y, z), {} of them near the points\n\
+             about {}; memory up to {}, at least {}; {} of temporary fields, in memory or in {}",
+            self.args.cloud.display(),
+            grouped(self.cloud.len() as u64),
+            triple(self.grid.spacing),
+            grouped(estimate.near_voxels),
+            duration(estimate.seconds),
+            bytes(self.resources.memory),
+            bytes(Budget::least(estimate.held)),
+            bytes(estimate.scratch),
+            self.resources.scratch.display()
+        )
+    }
+
+    fn run(&self, window: u64, estimate: &Estimate) -> Result<()> {
+        let engine = self.resources.engine(window, &self.cancel, &self.console)?.with_ranks(self.args.ranks);
+        engine.reserve(estimate.held)?;
+        let result = self.solve_and_write(&engine);
+        self.console.clear();
+        let found = result?;
+        if !self.args.output.quiet {
+            print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)))?;
+        }
+        Ok(())
+    }
+
+    fn solve_and_write(&self, engine: &Engine) -> Result<Reconstruction> {
+        let output = &self.args.output;
+        let passing = tempfile::tempdir_in(&self.resources.scratch)
+            .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let _passes = Unfinished::new(passing.path());
+        let store = output.store().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let mesh = Drawing::new(store.as_ref(), self.args.mesh.as_deref(), passing.path())?;
+        let mut ply = mesh.start(|path| PlyWriter::on_grid(path, &self.grid))?;
+        let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, ply.sink())
+            .map_err(|error| error.at(&self.args.cloud))?;
+        ply.finish()?;
+        if let Some(store) = &store {
+            found.write(engine, store)?;
+        }
+        self.tell_lost(&found);
+        tell_of_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
+        if let Some(store) = store {
+            self.report(engine, &found).write(&store.file("report.json")?)?;
+            engine.check()?;
+            store.finish()?;
+        }
+        engine.check()?;
+        mesh.export(output.store(), &found.geometry)?;
+        if let Some(path) = &output.report {
+            self.report(engine, &found).write(path)?;
+        }
+        Ok(found)
+    }
+
+    /// Says where the surface is not that of the points.
+    fn tell_lost(&self, found: &Reconstruction) {
+        let (lost, all) = (found.lost_points, self.cloud.len() as u64);
+        if MOST_LOST * lost > all {
+            self.console.note(&format!(
+                "{} of {} points are farther than a voxel from the surface; where it has shrunk away from them a larger --beta \
+                 may hold it, where they are stray points --drop-isolated leaves them out",
+                grouped(lost),
+                grouped(all)
+            ));
+        }
+    }
+
+    fn report(&self, engine: &Engine, found: &Reconstruction) -> Report<Settings, Found> {
+        let ran = Ran {
+            command: "reconstruct",
+            typed: &self.typed,
+            resources: &self.resources,
+            console: &self.console,
+            engine,
+            ranks: engine.ranks(),
+            started: self.started,
+        };
+        Report::new(&ran, Settings::new(self, found), &found.geometry, Found::new(found, self.cloud.len() as u64))
+    }
+}
+
+/// The points that stand alone, and the grid around the others.
+fn strays(cloud: &[[f64; 3]], spacing: Option<[f64; 3]>) -> Option<(usize, Geometry)> {
+    let kept = without_isolated(cloud, ISOLATED_SPACINGS * typical_spacing(cloud)?);
+    let alone = cloud.len() - kept.len();
+    if alone == 0 { None } else { Some((alone, grid_for(&kept, spacing)?)) }
+}
+
+fn far_strays(alone: usize, all: usize) -> Error {
+    Error::usage(format!(
+        "{} of {} points stand alone, and a grid that holds them and the others does not fit the memory; give \
+         --drop-isolated to leave them out",
+        grouped(alone as u64),
+        grouped(all as u64)
+    ))
+}
+
+/// Refuses a grid whose cells alone would not fit the memory, before any is taken for them.
+fn refuse_too_fine(grid: &Geometry, memory: u64) -> Result<()> {
+    check_counts(grid.shape.map(|n| n as f64))?;
+    let least = least_memory(grid);
+    if least <= memory {
+        return Ok(());
+    }
+    Err(Error::usage(format!(
+        "a grid of {} voxels needs {} of memory for its cells alone, but {} are allowed; give a larger --spacing",
+        grouped(grid.domain().volume()),
+        bytes(least),
+        bytes(memory)
+    )))
+}
+
+fn describe_found(found: &Reconstruction) -> String {
+    let m = &found.measures;
+    let surface = if m.is_closed() { "closed" } else { "OPEN" };
+    let mut lines = vec![format!(
+        "{surface} surface in {} pieces: volume {}, area {}, {} triangles",
+        m.components,
+        number(m.volume),
+        number(m.area),
+        grouped(m.triangles)
+    )];
+    lines.extend(found.hausdorff.map(|h| {
+        let lost = match found.lost_points {
+            0 => String::new(),
+            lost => format!("; {} of them more than a voxel", grouped(lost)),
+        };
+        format!("points off the surface: {} in the mean, {} at most{lost}", number(h.mean), number(h.max))
+    }));
+    if found.sheet_points > 0 {
+        lines.push(format!("sheets without an inside: {} points, held as thin shells", grouped(found.sheet_points)));
+    }
+    lines.extend(found.hole.map(|hole| {
+        let at = place(hole.place, 0.1 * hole.width);
+        format!("largest hole of the cloud: {} wide, at {at}", number(hole.width))
+    }));
+    lines.push(format!(
+        "start at {} from the points; {} steps, ended by {}",
+        number(found.beta),
+        found.evolution.steps,
+        found.evolution.stopped_by
+    ));
+    lines.join("\n") + "\n"
+}
+
+/// Every setting, also those that nobody gave; lengths physical.
+#[derive(Debug, Serialize)]
+struct Settings {
+    cloud: String,
+    output: Option<String>,
+    method: &'static str,
+    #[serde(flatten)]
+    motion: Moves,
+    /// Null when it was found; it is then in the result.
+    beta: Option<f64>,
+    scratch: String,
+}
+
+impl Settings {
+    fn new(job: &Job, found: &Reconstruction) -> Self {
+        Self {
+            cloud: job.args.cloud.display().to_string(),
+            output: job.args.output.store().map(|path| path.display().to_string()),
+            method: job.settings.method.name(),
+            motion: Moves::new(&job.settings.motion, &found.geometry),
+            beta: job.settings.beta,
+            scratch: job.resources.scratch.display().to_string(),
+        }
+    }
+}
+
+/// What was found.
+#[derive(Debug, Serialize)]
+struct Found {
+    volume: f64,
+    area: f64,
+    closed: bool,
+    components: u64,
+    triangles: u64,
+    open_edges: u64,
+    hausdorff: Option<Hausdorff>,
+    cloud_points: u64,
+    /// Points farther from the surface than a voxel.
+    lost_points: u64,
+    /// Points held as thin shells or slits.
+    sheet_points: u64,
+    spaces: usize,
+    beta: f64,
+    hole: Option<Hole>,
+    band_voxels: u64,
+    time_steps: u32,
+    sor_iterations: u64,
+    stopped_by: &'static str,
+    residual: f64,
+}
+
+impl Found {
+    fn new(found: &Reconstruction, cloud_points: u64) -> Self {
+        Self {
+            volume: found.measures.volume,
+            area: found.measures.area,
+            closed: found.measures.is_closed(),
+            components: found.measures.components,
+            triangles: found.measures.triangles,
+            open_edges: found.measures.open_edges,
+            hausdorff: found.hausdorff.map(Into::into),
+            cloud_points,
+            lost_points: found.lost_points,
+            sheet_points: found.sheet_points,
+            spaces: found.spaces,
+            beta: found.beta,
+            hole: found.hole.map(Into::into),
+            band_voxels: found.band_voxels,
+            time_steps: found.evolution.steps,
+            sor_iterations: found.evolution.sor_iterations,
+            stopped_by: found.evolution.stopped_by,
+            residual: found.evolution.residual,
+        }
+    }
+}

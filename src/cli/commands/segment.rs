@@ -1,0 +1,274 @@
+//! `strandline segment`: opens the inputs, says what it will take, runs, writes, tells what was found.
+
+mod notes;
+mod plan;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::cli::args::common::SegmentArgs;
+use crate::cli::inputs::image::{chosen_notes, crop_box, open_stack};
+use crate::cli::inputs::marks::{Marks, Objects, Reading, look_at_marks, read_marks};
+use crate::cli::inputs::settings;
+use crate::cli::inputs::settings::Resources;
+use crate::cli::outputs::checks::{Outputs, numbered};
+use crate::cli::outputs::files::{export_mesh, mesh_format, tell_of_anchor};
+use crate::cli::print;
+use crate::cli::report::run_report::{Found, Ran, Report, Settings, Solver, crop_xyz};
+use crate::cli::report::{picture, table};
+use crate::cli::terminal::console::{Console, Voice};
+use crate::cli::terminal::signals;
+use crate::cli::terminal::text::{bytes, duration};
+use crate::error::{Error, Result};
+use crate::exec::{Cancel, Engine, Progress};
+use crate::grid::{Box3, Geometry};
+use crate::io::ome_zarr::StoreWriter;
+use crate::io::stack::volume::Stack;
+use crate::pipeline::segment::{
+    Estimate, Grids, Guides, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing, segment,
+};
+use crate::store::Unfinished;
+use notes::refusal;
+
+/// A segmentation that is ready to start: all inputs are open and checked.
+pub(crate) struct Job {
+    /// How the image and its marks are called in messages and in the report.
+    names: Names,
+    typed: Vec<String>,
+    args: SegmentArgs,
+    settings: SegmentSettings,
+    resources: Resources,
+    stack: Box<dyn Stack>,
+    /// The grid of the part that is segmented.
+    geometry: Geometry,
+    crop: Box3,
+    marks: Marks,
+    objects: Objects,
+    console: Arc<Console>,
+    cancel: Cancel,
+    started: Instant,
+}
+
+/// How the command and its inputs are called.
+pub(crate) struct Names {
+    pub(crate) command: &'static str,
+    pub(crate) image: String,
+    pub(crate) points: Vec<String>,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
+    let points = args.points.iter().map(|path| path.display().to_string()).collect();
+    let names = Names { command: "segment", image: args.image.display().to_string(), points };
+    let job = Job::new(names, args.clone(), typed, signals::cancel_on_signals()?)?;
+    let estimate = job.estimate();
+    if args.output.dry_run {
+        job.print_plan(&estimate)?;
+        return job.fits(&estimate).map(|_| ());
+    }
+    job.run(&estimate).map(|_| ())
+}
+
+impl Job {
+    /// Understands what was typed and opens the inputs.
+    pub(crate) fn new(names: Names, args: SegmentArgs, typed: &[String], cancel: Cancel) -> Result<Self> {
+        let started = Instant::now();
+        let settings = settings::settings(&args)?;
+        let spacing = settings::spacing("--image-spacing", args.picture.image_spacing)?;
+        let output = &args.output;
+        let outputs = Outputs {
+            inputs: std::iter::once(&args.image).chain(&args.points).map(PathBuf::as_path).collect(),
+            store: output.store(),
+            files: [&output.report, &args.drawn.mesh, &args.drawn.picture]
+                .into_iter()
+                .flatten()
+                .map(PathBuf::as_path)
+                .collect(),
+            overwrite: output.overwrite,
+        };
+        outputs.check()?;
+        args.drawn.mesh.as_deref().map(mesh_format).transpose()?;
+        args.drawn.picture.as_deref().map(picture::check_name).transpose()?;
+        let resources = settings::resources(&args.resources, args.output.store())?;
+        let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
+        let picture = &args.picture;
+        let select = picture.volume.select();
+        let opened = open_stack(&args.image, select, spacing)?;
+        let chosen = chosen_notes(&args.image, opened.stack.info(), select);
+        opened.notes.iter().chain(&chosen).for_each(|note| console.note(note));
+        let crop = crop_box(args.picture.crop, opened.geometry.shape)?;
+        let reading = Reading { image: &opened.geometry, points_in: args.points_in, time: select.time };
+        let marks = read_marks(&args.points, &reading, &console)?;
+        let geometry = opened.geometry.crop(&crop);
+        check_lengths(&settings, &geometry)?;
+        let grids = Grids { whole: &opened.geometry, part: &geometry, guessed: opened.guessed };
+        let objects = look_at_marks(&marks, &grids, &args.seed, &console)?;
+        let numbers = objects.numbers();
+        if let Some(path) = args.drawn.mesh.as_deref().filter(|_| numbers.len() > 1) {
+            let meshes: Vec<PathBuf> = numbers.iter().map(|&object| numbered(path, object)).collect();
+            let others = [&output.report, &args.drawn.picture].into_iter().flatten();
+            let files = meshes.iter().chain(others).map(PathBuf::as_path).collect();
+            Outputs { store: None, files, ..outputs }.check()?;
+        }
+        check_smoothing(&settings, &geometry)?;
+        args.seed.iter().try_for_each(|seed| check_seed(seed, &geometry))?;
+        let typed = typed.to_vec();
+        let stack = opened.stack;
+        Ok(Self {
+            names,
+            typed,
+            args,
+            settings,
+            resources,
+            stack,
+            geometry,
+            crop,
+            marks,
+            objects,
+            console,
+            cancel,
+            started,
+        })
+    }
+
+    fn guides(&self) -> Guides<'_> {
+        Guides { geometry: &self.geometry, objects: &self.objects.fit, refused: &self.objects.refused }
+    }
+
+    /// Fields are written out, or needed for what is drawn from them.
+    fn needs_store(&self) -> bool {
+        let drawn = &self.args.drawn;
+        self.args.output.store().is_some() || drawn.mesh.is_some() || drawn.picture.is_some()
+    }
+
+    /// Runs the segmentation and writes all that was asked for; returns what was found.
+    pub(crate) fn run(&self, estimate: &Estimate) -> Result<Outcome> {
+        let window = self.fits(estimate)?;
+        self.console.say(&format!(
+            "{}: {}, about {}; memory up to {}, {} of temporary fields in {}",
+            self.names.image,
+            match self.objects.numbers().len() {
+                1 => "1 object".into(),
+                objects => format!("{objects} objects"),
+            },
+            duration(estimate.seconds),
+            bytes(self.resources.memory),
+            bytes(estimate.scratch),
+            self.resources.scratch.display()
+        ));
+        if self.console.is_verbose() {
+            self.describe().lines().for_each(|line| self.console.say(line));
+        }
+        let engine = self.resources.engine(window, &self.cancel, &self.console)?;
+        engine.reserve(estimate.held)?;
+        let result = self.solve_and_write(&engine);
+        self.console.clear();
+        let outcome = result?;
+        if !self.args.output.quiet {
+            print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())))?;
+        }
+        match outcome.refused.as_slice() {
+            [] => Ok(outcome),
+            refused => Err(refusal(refused, outcome.objects.len(), &self.whole_in())),
+        }
+    }
+
+    /// Where all objects are told.
+    fn whole_in(&self) -> String {
+        table::whole_in(self.args.output.store().is_some(), self.args.output.report.is_some(), "")
+    }
+
+    fn solve_and_write(&self, engine: &Engine) -> Result<Outcome> {
+        let output = &self.args.output;
+        // What is drawn from fields that nobody wants to keep needs them for a while all the same.
+        let passing = tempfile::tempdir_in(&self.resources.scratch)
+            .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
+        let _passes = Unfinished::new(passing.path());
+        let store = match output.store() {
+            Some(path) => Some(StoreWriter::create(path, output.overwrite)?),
+            None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
+            None => None,
+        };
+        let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())
+            .map_err(|error| self.marks.named_in(error))?;
+        self.tell(&outcome);
+        tell_of_anchor(self.args.drawn.mesh.as_deref(), &self.geometry, &self.console);
+        if let Some(store) = &store {
+            if self.names.command == "demo" {
+                picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;
+            }
+            self.report(engine, &outcome).write(&store.file("report.json")?)?;
+        }
+        engine.check()?;
+        // A failure from here on costs a copy, not the result.
+        let folder = match (store, output.store()) {
+            (Some(store), Some(path)) => {
+                store.finish()?;
+                path.to_path_buf()
+            }
+            (Some(store), None) => {
+                store.finish()?;
+                passing.path().join("passing.zarr")
+            }
+            (None, _) => PathBuf::new(),
+        };
+        self.write_copies(engine, &outcome, &folder)?;
+        Ok(outcome)
+    }
+
+    /// The files beside the store.
+    fn write_copies(&self, engine: &Engine, outcome: &Outcome, folder: &Path) -> Result<()> {
+        if let Some(path) = &self.args.drawn.mesh {
+            for object in &outcome.objects {
+                let several = outcome.objects.len() + outcome.refused.len() > 1;
+                let name = if several { format!("object-{}.ply", object.label) } else { "surface.ply".into() };
+                let target = if several { numbered(path, object.label) } else { path.clone() };
+                export_mesh(&folder.join("meshes").join(name), &self.geometry, &target)?;
+            }
+        }
+        if let Some(path) = &self.args.drawn.picture {
+            picture::draw(folder, self.centre(), path)?;
+        }
+        match &self.args.output.report {
+            Some(path) => self.report(engine, outcome).write(path),
+            None => Ok(()),
+        }
+    }
+
+    /// The middle of all marks, kept inside the image.
+    fn centre(&self) -> [f64; 3] {
+        let seed = self.args.seed.first().map_or([0.0; 3], |seed| seed.centre);
+        let (low, high) = self.marks.cloud.bounds().unwrap_or((seed, seed));
+        std::array::from_fn(|a| 0.5 * (low[a] + high[a]))
+    }
+
+    fn report(&self, engine: &Engine, outcome: &Outcome) -> Report<Settings, Found> {
+        let (volume, output) = (&self.args.picture.volume, &self.args.output);
+        let settings = Settings {
+            image: self.names.image.clone(),
+            points: self.names.points.clone(),
+            seeds: self.args.seed.iter().map(|s| [s.centre[0], s.centre[1], s.centre[2], s.radius]).collect(),
+            output: output.store().map(|path| path.display().to_string()),
+            channel: volume.channel,
+            axes: volume.pages.axes.map(|axes| axes.to_string()),
+            image_index: volume.pages.image_index,
+            time: volume.time,
+            level: volume.level,
+            crop_xyz: crop_xyz(&self.crop),
+            image_type: outcome.element.name(),
+            solver: Solver::new(&self.settings, &self.geometry),
+            scratch: self.resources.scratch.display().to_string(),
+        };
+        let ran = Ran {
+            command: self.names.command,
+            typed: &self.typed,
+            resources: &self.resources,
+            console: &self.console,
+            engine,
+            ranks: engine.comm().ranks(),
+            started: self.started,
+        };
+        Report::new(&ran, settings, &outcome.geometry, Found::new(outcome))
+    }
+}

@@ -1,0 +1,312 @@
+//! The marks of all files as one cloud in the world of the image, and what is odd about them.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::cli::args::common::PointsIn;
+use crate::cli::terminal::console::Console;
+use crate::cli::terminal::text::{number, triple};
+use crate::error::{Error, ErrorKind, Result};
+use crate::exec::Progress;
+use crate::grid::{Geometry, PointCloud};
+use crate::io::geometry::read::point_file::{PointFile, Scale};
+use crate::io::geometry::read::points::{LengthUnit, read_points};
+use crate::pipeline::marks::{ObjectMarks, Seed, split_and_seed};
+use crate::pipeline::segment::doubts;
+use crate::pipeline::segment::{Grids, Refused, check_marks, crossed, open_outlines, same_place, spans_slices};
+
+/// What decides how the numbers of a file are read.
+pub(crate) struct Reading<'a> {
+    /// The grid of the whole image.
+    pub(crate) image: &'a Geometry,
+    /// What was asked for, in place of what the file's form says.
+    pub(crate) points_in: Option<PointsIn>,
+    /// The time of the image, counted from 0.
+    pub(crate) time: u32,
+}
+
+/// The marks of all files, and which file each object is from.
+pub(crate) struct Marks {
+    pub(crate) cloud: PointCloud,
+    pub(crate) files: BTreeMap<u32, PathBuf>,
+    /// The objects whose numbers were read as lengths though nothing says that they are.
+    unsure: Vec<u32>,
+}
+
+/// Reads all files of marks. A file that names no objects is one object; those of later files are numbered on.
+pub(crate) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Console) -> Result<Marks> {
+    let mut marks = Marks { cloud: PointCloud::default(), files: BTreeMap::new(), unsure: Vec::new() };
+    for (n, path) in paths.iter().enumerate() {
+        if path.as_os_str() == "-" && paths[..n].contains(path) {
+            return Err(Error::usage("--points - is given twice; standard input holds one file"));
+        }
+        if let Some(before) = paths[..n].iter().find(|before| is_same(before, path)) {
+            let (path, before) = (path.display(), before.display());
+            console.note(&format!("{path} is given twice (--points {before}): each of its objects is solved twice"));
+        }
+        let file = read_points(path)?;
+        let note = |note: &str| console.note(&format!("{}: {note}", path.display()));
+        file.notes.iter().for_each(|told| note(told));
+        let is_told = |axis: usize| file.scales[axis] != Scale::Physical || file.units[axis].is_some();
+        let is_sure = reading.points_in.is_some() || (0..3).all(is_told);
+        let cloud = placed(file, reading, note).map_err(|error| error.at(path))?;
+        if !marks.cloud.is_empty() && marks.cloud.contours.is_empty() != cloud.contours.is_empty() {
+            let (this, other) =
+                if cloud.contours.is_empty() { ("no contours", "does") } else { ("contours", "does not") };
+            return Err(Error::input(format!(
+                "names {this} while {} {other}; give a contour column in all files of points or in none",
+                paths[0].display()
+            ))
+            .at(path));
+        }
+        for (from, to) in marks.add(cloud, path, is_sure) {
+            console.note(&format!("object {from} of {} is numbered {to}", path.display()));
+        }
+    }
+    Ok(marks)
+}
+
+/// Whether two paths name one file, by whatever spelling.
+fn is_same(a: &Path, b: &Path) -> bool {
+    a == b || a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+}
+
+/// The points of a file in the world of the image.
+pub(crate) fn placed(file: PointFile, reading: &Reading<'_>, note: impl Fn(&str)) -> Result<PointCloud> {
+    let image = reading.image;
+    let (form, scales, units) = (file.form.clone(), file.scales, file.units);
+    let mut cloud = of_time(file, reading.time, &note)?;
+    let in_voxels: [bool; 3] = std::array::from_fn(|axis| match (scales[axis], reading.points_in) {
+        (Scale::Slices, _) | (_, Some(PointsIn::Voxels)) => true,
+        (_, Some(PointsIn::Physical)) => false,
+        (scale, None) => scale == Scale::Voxels,
+    });
+    let factor: [f64; 3] = std::array::from_fn(|axis| unit_factor(units[axis], image));
+    for point in &mut cloud.positions {
+        for axis in 0..3 {
+            let value = &mut point[axis];
+            *value =
+                if in_voxels[axis] { image.origin[axis] + *value * image.spacing[axis] } else { *value * factor[axis] };
+        }
+    }
+    if reading.points_in.is_none() && in_voxels != [false; 3] {
+        let axes: Vec<&str> = (0..3).filter(|&a| in_voxels[a]).map(|a| ["x", "y", "z"][a]).collect();
+        let (axes, spacing) = (axes.join(", "), triple(image.spacing));
+        note(&format!(
+            "{form}: {axes} are read as voxel indices, times the spacing {spacing}; else give --points-in physical"
+        ));
+    }
+    if let Some(axis) = (0..3).find(|&axis| !in_voxels[axis] && factor[axis] != 1.0) {
+        let (from, to) = (units[axis].map_or("", |unit| unit.name), image.unit.as_deref().unwrap_or_default());
+        note(&format!(
+            "its lengths are in {from}, the image's in {to}: they are multiplied by {}",
+            number(factor[axis])
+        ));
+    }
+    Ok(cloud)
+}
+
+/// How many units of the image a unit of the file has, where both are known.
+fn unit_factor(unit: Option<LengthUnit>, image: &Geometry) -> f64 {
+    let known = image.unit.as_deref().and_then(LengthUnit::named);
+    match (unit, known) {
+        (Some(from), Some(to)) => from.in_units_of(to),
+        _ => 1.0,
+    }
+}
+
+/// The points of the image's time, where the file tells times.
+fn of_time(file: PointFile, time: u32, note: impl Fn(&str)) -> Result<PointCloud> {
+    let PointFile { mut cloud, times, .. } = file;
+    let Some(&first) = times.first() else { return Ok(cloud) };
+    let wanted = i64::from(time);
+    if times.iter().all(|&time| time == first) {
+        if first != wanted {
+            note(&format!("all of its points are of time {first}, the image is of time {wanted} (--time)"));
+        }
+        return Ok(cloud);
+    }
+    let keep: Vec<bool> = times.iter().map(|&time| time == wanted).collect();
+    let kept = keep.iter().filter(|&&keep| keep).count();
+    if kept == 0 {
+        let (low, high) = times.iter().fold((first, first), |(low, high), &t| (low.min(t), high.max(t)));
+        return Err(Error::input(format!(
+            "has points of the times {low} to {high} and none of time {wanted}, that of the image; give --time"
+        )));
+    }
+    let left_out = keep.len() - kept;
+    note(&format!("{left_out} points are of other times than {wanted} (--time) and are left out"));
+    retain(&mut cloud.positions, &keep);
+    retain(&mut cloud.objects, &keep);
+    retain(&mut cloud.contours, &keep);
+    Ok(cloud)
+}
+
+fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut keep = keep.iter();
+    values.retain(|_| keep.next() == Some(&true));
+}
+
+impl Marks {
+    /// The error with the file of the marks: an input that cannot be used and is not the image, which its errors name.
+    pub(crate) fn named_in(&self, error: Error) -> Error {
+        let first = self.files.values().next();
+        match first.filter(|first| self.files.values().all(|file| file == *first)) {
+            Some(only) if error.kind() == ErrorKind::Input => error.at(only),
+            _ => error,
+        }
+    }
+
+    /// Adds a file's marks; returns its objects that have another number now, with that.
+    fn add(&mut self, cloud: PointCloud, path: &Path, is_sure: bool) -> Vec<(u32, u32)> {
+        let before = self.files.keys().last().copied().unwrap_or(0);
+        let names_objects = !cloud.objects.is_empty();
+        let objects = if names_objects { cloud.objects } else { vec![1; cloud.len()] };
+        let mut numbers: BTreeMap<u32, u32> = objects.iter().map(|&object| (object, object)).collect();
+        if before > 0 {
+            (before + 1..).zip(numbers.values_mut()).for_each(|(number, renumbered)| *renumbered = number);
+        }
+        self.files.extend(numbers.values().map(|&object| (object, path.to_path_buf())));
+        if !is_sure {
+            self.unsure.extend(numbers.values());
+        }
+        self.cloud.objects.extend(objects.iter().map(|object| numbers[object]));
+        self.cloud.positions.extend(cloud.positions);
+        self.cloud.contours.extend(cloud.contours);
+        numbers.into_iter().filter(|&(from, to)| names_objects && from != to).collect()
+    }
+}
+
+/// The objects that marks and seeds stand for.
+pub(crate) struct Objects {
+    /// Those whose marks can be those of the image, and those of seeds.
+    pub(crate) fit: Vec<ObjectMarks>,
+    /// Those whose marks cannot.
+    pub(crate) refused: Vec<Refused>,
+}
+
+impl Objects {
+    /// The numbers of all.
+    pub(crate) fn numbers(&self) -> Vec<u32> {
+        self.fit.iter().map(|marks| marks.object).chain(self.refused.iter().map(|refused| refused.label)).collect()
+    }
+}
+
+/// Checks the marks of each object, and says what is odd about them; refuses all where no object's fit the image.
+pub(crate) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: &[Seed], console: &Console) -> Result<Objects> {
+    let (seeded, marked): (Vec<_>, Vec<_>) =
+        split_and_seed(&marks.cloud, seeds).into_iter().partition(|object| object.seed.is_some());
+    let (mut fit, mut refused, mut first_error) = (Vec::new(), Vec::new(), None);
+    for object in &marked {
+        let label = object.object;
+        match check_marks(object, grids) {
+            Ok(notes) => {
+                let doubts = if marks.unsure.contains(&label) { doubts(object, grids.whole) } else { Vec::new() };
+                notes.iter().chain(&doubts).for_each(|note| console.note(note));
+                fit.push(object.clone());
+            }
+            Err(error) => {
+                refused.push(Refused { label, reason: error.to_string() });
+                first_error.get_or_insert(error.at(&marks.files[&label]));
+            }
+        }
+        for number in crossed(object, grids.part) {
+            console.note(&format!("outline {number} of object {label} crosses itself: are its marks in order?"));
+        }
+        if object.drawn && object.contours.len() == 1 {
+            console.note(&format!(
+                "object {label} has one outline: how far it goes on beyond it is guessed; mark it on more slices"
+            ));
+        }
+        let open = open_outlines(object);
+        if !open.is_empty() {
+            let numbers: Vec<String> = open.iter().take(MOST_NAMED).map(i64::to_string).collect();
+            let more = if open.len() > MOST_NAMED { ", ..." } else { "" };
+            console.note(&format!(
+                "outlines of object {label} are open ({}{more}): their ends, far from each other, are joined by a straight line",
+                numbers.join(", ")
+            ));
+        }
+        for (number, slices) in spans_slices(object, grids.whole) {
+            console.note(&format!(
+                "outline {number} of object {label} has marks on {slices} slices: give each slice's outline a number of its own"
+            ));
+        }
+    }
+    tell_twice_marked(&marked, marks, grids.whole, console);
+    fit.extend(seeded);
+    // One of several that does not fit is refused by itself.
+    match first_error {
+        Some(error) if fit.is_empty() => Err(error),
+        _ => Ok(Objects { fit, refused }),
+    }
+}
+
+/// Outlines that a note names, at most.
+const MOST_NAMED: usize = 8;
+
+/// Pairs of objects that are compared, at most: it is looked at for people's files, not for thousands of cells.
+const MOST_PAIRS: usize = 1 << 20;
+
+/// Says which objects of two files lie where one object would.
+fn tell_twice_marked(objects: &[ObjectMarks], marks: &Marks, image: &Geometry, console: &Console) {
+    if objects.len().pow(2) > MOST_PAIRS {
+        return;
+    }
+    for (n, a) in objects.iter().enumerate() {
+        for b in &objects[n + 1..] {
+            let files = [a, b].map(|object| &marks.files[&object.object]);
+            if files[0] == files[1] {
+                continue;
+            }
+            if let Some(share) = same_place(a, b, image) {
+                console.note(&format!(
+                    "objects {} ({}) and {} ({}) overlap by {:.0} %: if they are one, put their marks into one file, with \
+                     one object number",
+                    a.object,
+                    files[0].display(),
+                    b.object,
+                    files[1].display(),
+                    100.0 * share
+                ));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(objects: &[u32]) -> PointCloud {
+        PointCloud { positions: vec![[0.0; 3]; objects.len().max(2)], objects: objects.into(), contours: Vec::new() }
+    }
+
+    #[test]
+    fn objects_of_later_files_are_numbered_on() {
+        let mut marks = Marks { cloud: PointCloud::default(), files: BTreeMap::new(), unsure: Vec::new() };
+        assert!(marks.add(cloud(&[2, 5, 2]), Path::new("a"), true).is_empty());
+        assert!(marks.add(cloud(&[]), Path::new("b"), true).is_empty());
+        assert_eq!(marks.add(cloud(&[9, 1, 9]), Path::new("c"), false), [(1, 7), (9, 8)]);
+        assert_eq!(marks.cloud.objects, [2, 5, 2, 6, 6, 8, 7, 8]);
+        let files: Vec<(u32, &str)> = marks.files.iter().map(|(&n, p)| (n, p.to_str().unwrap())).collect();
+        assert_eq!(files, [(2, "a"), (5, "a"), (6, "b"), (7, "c"), (8, "c")]);
+    }
+
+    #[test]
+    fn units_are_converted_where_both_are_known() {
+        let image = |unit: Option<&str>| Geometry {
+            shape: [9; 3],
+            spacing: [1.0; 3],
+            origin: [0.0; 3],
+            unit: unit.map(ToOwned::to_owned),
+        };
+        let factor = |from, to| unit_factor(LengthUnit::named(from), &image(to));
+        assert_eq!(factor("nm", Some("micrometer")), 1e-3);
+        assert_eq!(factor("mm", Some("micrometer")), 1e3);
+        assert_eq!(
+            (factor("um", Some("micrometer")), factor("um", None), factor("furlong", Some("meter"))),
+            (1.0, 1.0, 1.0)
+        );
+    }
+}

@@ -1,0 +1,8 @@
+//! What was typed becomes what is read: images, marks, sources, grids, settings.
+
+pub(crate) mod grid;
+pub(crate) mod image;
+pub(crate) mod marks;
+pub(crate) mod noted;
+pub(crate) mod settings;
+pub(crate) mod sources;

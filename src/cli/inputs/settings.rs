@@ -1,0 +1,339 @@
+//! What was typed becomes what is meant: settings checked one by one and together, budgets resolved.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::available_parallelism;
+
+use crate::cli::args::common::{
+    Edge, ImageArg, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, SmoothingArg, StartArg, StopArg,
+};
+use crate::cli::outputs::files::folder_of;
+use crate::cli::terminal::console::Console;
+use crate::cli::terminal::text::bytes;
+use crate::error::{Error, Result};
+use crate::exec::{Budget, Cancel, Engine, Progress, machine_memory};
+use crate::pipeline::distance::Method;
+use crate::pipeline::image::terms::Smoothing;
+use crate::pipeline::level_set::evolve::Stop;
+use crate::pipeline::level_set::motion::Motion;
+use crate::pipeline::reconstruct::ReconstructSettings;
+use crate::pipeline::segment::{FillGaps, ImageModel, Overlap, SegmentSettings, Start};
+use crate::store::Scratch;
+
+/// What a run may use.
+#[derive(Clone, Debug)]
+pub(crate) struct Resources {
+    pub(crate) memory: u64,
+    pub(crate) threads: usize,
+    pub(crate) scratch: PathBuf,
+}
+
+impl Resources {
+    /// An engine that keeps to them, with a window of so many bytes of scratch pages.
+    pub(crate) fn engine(&self, window: u64, cancel: &Cancel, console: &Arc<Console>) -> Result<Engine> {
+        let scratch = Scratch::new(&self.scratch, window);
+        let progress: Arc<dyn Progress> = console.clone();
+        Engine::new(self.threads, scratch, Budget { total: self.memory }, cancel.clone(), progress)
+    }
+}
+
+const L2_TOLERANCE: f64 = 1e-3;
+const BRICKS: std::ops::RangeInclusive<i64> = 16..=512;
+const MOST_THREADS: usize = 1024;
+
+/// The settings of a segmentation.
+pub(crate) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
+    let defaults = SegmentSettings::default();
+    let (image, pull) = (&args.picture, &args.pull);
+    let edges = Motion {
+        rho: checked("--rho", pull.rho.unwrap_or(defaults.motion.rho), AT_LEAST_ZERO)?,
+        normalised: image.edge == Edge::Normalised,
+        ..defaults.motion
+    };
+    Ok(SegmentSettings {
+        method: args.distance.method,
+        image: match image.model {
+            _ if pull.rho == Some(0.0) => ImageModel::None,
+            ImageArg::Auto => ImageModel::Auto,
+            ImageArg::Level => ImageModel::Level,
+            ImageArg::Wall => ImageModel::Wall,
+            ImageArg::Edge => ImageModel::Edge,
+            ImageArg::None => ImageModel::None,
+        },
+        start: match image.start {
+            // Where the start lies is what a beta tells the flood.
+            StartArg::Auto if args.motion.beta.is_none() => Start::Auto,
+            StartArg::Auto | StartArg::Flood => Start::Flood,
+        },
+        cross_validate: image.cross_validate,
+        motion: motion(&args.motion, edges)?,
+        theta: args.motion.theta,
+        rho: pull.rho,
+        k: checked("--k", pull.k.unwrap_or(defaults.k), AT_LEAST_ZERO)?,
+        smoothing: match image.smoothing {
+            SmoothingArg::Gaussian => Smoothing::Gaussian,
+            SmoothingArg::Heat => Smoothing::Heat,
+        },
+        sigma: optional("--sigma", pull.sigma, AT_LEAST_ZERO)?,
+        beta: optional("--beta", args.motion.beta, ABOVE_ZERO)?,
+        caps: !image.no_caps,
+        percentiles: percentiles(image.percentiles)?,
+        overlap: match image.overlap {
+            OverlapArg::Smaller => Overlap::Smaller,
+            OverlapArg::Larger => Overlap::Larger,
+            OverlapArg::First => Overlap::First,
+            OverlapArg::Last => Overlap::Last,
+        },
+        fill_gaps: image.fill_gaps.map(fill_gaps).transpose()?,
+        brick: brick(args.resources.brick.unwrap_or(defaults.brick))?,
+    })
+}
+
+fn fill_gaps(given: FillGaps) -> Result<FillGaps> {
+    match given {
+        FillGaps::Width(width) => checked("--fill-gaps", width, ABOVE_ZERO).map(FillGaps::Width),
+        FillGaps::Auto => Ok(FillGaps::Auto),
+    }
+}
+
+/// The settings of a reconstruction.
+pub(crate) fn reconstruct_settings(args: &MotionArgs, method: Method) -> Result<ReconstructSettings> {
+    let defaults = ReconstructSettings::default();
+    Ok(ReconstructSettings {
+        method,
+        motion: motion(args, defaults.motion)?,
+        beta: optional("--beta", args.beta, ABOVE_ZERO)?,
+        keeps_grid: false,
+    })
+}
+
+/// How the surface is to move; what was not typed as in `defaults`.
+fn motion(args: &MotionArgs, defaults: Motion) -> Result<Motion> {
+    Ok(Motion {
+        theta: checked("--theta", args.theta.unwrap_or(defaults.theta), AT_LEAST_ZERO)?,
+        delta: optional("--delta", args.delta, AT_LEAST_ZERO)?,
+        tau: optional("--tau", args.tau, ABOVE_ZERO)?,
+        epsilon: optional("--epsilon", args.epsilon, ABOVE_ZERO)?,
+        omega: checked("--omega", args.omega.unwrap_or(defaults.omega), BETWEEN_ZERO_AND_TWO)?,
+        stop: stop(args, defaults.stop)?,
+        max_steps: args.max_steps.unwrap_or(defaults.max_steps),
+        ..defaults
+    })
+}
+
+/// More ranks than this are no use in one process.
+const MOST_RANKS: usize = 64;
+
+/// Refuses numbers of ranks that are of no use.
+pub(crate) fn check_ranks(ranks: usize) -> Result<()> {
+    if (1..=MOST_RANKS).contains(&ranks) {
+        return Ok(());
+    }
+    Err(Error::usage(format!("--ranks is {ranks}; give 1 to {MOST_RANKS}")))
+}
+
+/// A number above 0, or none.
+pub(crate) fn above_zero(flag: &str, value: Option<f64>) -> Result<Option<f64>> {
+    optional(flag, value, ABOVE_ZERO)
+}
+
+/// A range of numbers and how to say it.
+type Range = (fn(f64) -> bool, &'static str);
+const AT_LEAST_ZERO: Range = (|v| v >= 0.0, "0 or more");
+const ABOVE_ZERO: Range = (|v| v > 0.0, "more than 0");
+const BETWEEN_ZERO_AND_TWO: Range = (|v| 0.0 < v && v < 2.0, "between 0 and 2");
+
+fn checked(flag: &str, value: f64, (holds, range): Range) -> Result<f64> {
+    // Lengths and weights are computed with in single precision.
+    if value.is_finite() && (value as f32).is_finite() && holds(value) {
+        return Ok(value);
+    }
+    Err(Error::usage(format!("{flag} is {value}; it must be a number, {range}")))
+}
+
+fn optional(flag: &str, value: Option<f64>, range: Range) -> Result<Option<f64>> {
+    value.map(|value| checked(flag, value, range)).transpose()
+}
+
+fn stop(args: &MotionArgs, default: Stop) -> Result<Stop> {
+    let tolerance = optional("--tol", args.tol, ABOVE_ZERO)?;
+    Ok(match (args.stop, default) {
+        (StopArg::Surface, Stop::Surface(limit)) => Stop::Surface(tolerance.unwrap_or(limit)),
+        (StopArg::Surface, Stop::L2(_)) => Stop::Surface(tolerance.unwrap_or(0.02)),
+        (StopArg::L2, _) => Stop::L2(tolerance.unwrap_or(L2_TOLERANCE)),
+    })
+}
+
+fn percentiles([low, high]: [f64; 2]) -> Result<[f64; 2]> {
+    if 0.0 <= low && low < high && high <= 100.0 {
+        return Ok([low, high]);
+    }
+    Err(Error::usage(format!(
+        "--percentiles is {low},{high}; give two percentages, the lower one first, such as 0.1,99.9"
+    )))
+}
+
+/// The edge of bricks that was asked for.
+pub(crate) fn brick(edge: i64) -> Result<i64> {
+    if BRICKS.contains(&edge) && edge % 16 == 0 {
+        return Ok(edge);
+    }
+    Err(Error::usage(format!("--brick is {edge}; give a multiple of 16 from {} to {}", BRICKS.start(), BRICKS.end())))
+}
+
+/// A spacing from the command line.
+pub(crate) fn spacing(flag: &str, given: Option<[f64; 3]>) -> Result<Option<[f64; 3]>> {
+    if let Some([x, y, z]) = given.filter(|h| h.iter().any(|&v| checked("", v, ABOVE_ZERO).is_err())) {
+        return Err(Error::usage(format!("{flag} is {x},{y},{z}; give lengths, each more than 0")));
+    }
+    Ok(given)
+}
+
+/// Memory, threads and scratch; `output` is what lies nearest to large free disks when nothing else is said.
+pub(crate) fn resources(args: &ResourceArgs, output: Option<&Path>) -> Result<Resources> {
+    let threads = args.threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
+    if !(1..=MOST_THREADS).contains(&threads) {
+        return Err(Error::usage(format!("--threads is {threads}; give 1 to {MOST_THREADS}")));
+    }
+    let there = machine_memory();
+    let memory = args.memory.unwrap_or(there / 2);
+    if memory > there {
+        return Err(Error::usage(format!(
+            "--memory is {}, but the machine or its control group has {}; give less, or leave it out",
+            bytes(memory),
+            bytes(there)
+        )));
+    }
+    let from_environment = || std::env::var_os("TMPDIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
+    let beside_output = || output.map(|path| folder_of(path).to_path_buf());
+    let scratch = args.scratch.clone().or_else(from_environment).or_else(beside_output);
+    let scratch = scratch.unwrap_or_else(std::env::temp_dir);
+    if !scratch.is_dir() {
+        let what = "the folder for temporary fields does not exist; create it, or name another with --scratch";
+        return Err(Error::usage(what).at(&scratch));
+    }
+    Ok(Resources { memory, threads, scratch })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::args::command_line::{Cli, Command};
+
+    fn typed(flags: &str) -> Box<SegmentArgs> {
+        let words = "strandline segment image.tif --points marks.csv -o none".split(' ');
+        let cli = Cli::try_parse_from(words.chain(flags.split_whitespace())).unwrap();
+        let Command::Segment(args) = cli.command else { panic!("another command") };
+        args
+    }
+
+    fn meant(flags: &str) -> Result<SegmentSettings> {
+        let args = typed(flags);
+        settings(&args)
+    }
+
+    #[test]
+    fn nothing_typed_means_the_defaults() {
+        assert_eq!(meant("").unwrap(), SegmentSettings::default());
+    }
+
+    #[test]
+    fn the_help_states_the_true_defaults() {
+        use clap::CommandFactory;
+        let help = Cli::command().find_subcommand_mut("segment").unwrap().render_long_help().to_string();
+        let defaults = SegmentSettings::default();
+        for (value, what) in [
+            (defaults.motion.theta, "towards the points"),
+            (defaults.k, "intensities from 0 to 1"),
+            (defaults.motion.omega, "between 0 and 2"),
+            (f64::from(defaults.motion.max_steps), "Time steps at most"),
+        ] {
+            let line = help.lines().find(|line| line.contains(what)).unwrap_or_else(|| panic!("{what}: {help}"));
+            assert!(line.contains(&format!("[default: {value}]")), "{line}");
+        }
+        assert!(help.contains("[default: 64;") && defaults.brick == 64);
+        assert!(help.contains("[default: 0.1,99.9]") && defaults.percentiles == [0.1, 99.9]);
+        assert!(help.contains("0.02 for surface") && defaults.motion.stop == Stop::Surface(0.02));
+    }
+
+    #[test]
+    fn every_flag_arrives() {
+        let settings = meant(
+            "--delta 1 --theta 2 --rho 3 --k 4 --sigma 5 --beta 6 --tau 7 --epsilon 8 --omega 1.5 --stop l2 --tol 9 \
+             --max-steps 10 --method fsm --edge plain --smoothing heat --percentiles 1,99 --no-caps --overlap last --image wall --cross-validate \
+              --fill-gaps 2.5 --brick 32",
+        );
+        let expected = SegmentSettings {
+            method: Method::FSM,
+            // A beta is for the flood.
+            image: ImageModel::Wall,
+            start: Start::Flood,
+            theta: Some(2.0),
+            rho: Some(3.0),
+            cross_validate: true,
+            motion: Motion {
+                theta: 2.0,
+                rho: 3.0,
+                normalised: false,
+                delta: Some(1.0),
+                tau: Some(7.0),
+                epsilon: Some(8.0),
+                omega: 1.5,
+                stop: Stop::L2(9.0),
+                max_steps: 10,
+            },
+            k: 4.0,
+            smoothing: Smoothing::Heat,
+            sigma: Some(5.0),
+            beta: Some(6.0),
+            caps: false,
+            percentiles: [1.0, 99.0],
+            overlap: Overlap::Last,
+            fill_gaps: Some(FillGaps::Width(2.5)),
+            brick: 32,
+        };
+        assert_eq!(settings.unwrap(), expected);
+        assert_eq!(meant("--fill-gaps auto").unwrap().fill_gaps, Some(FillGaps::Auto));
+        assert_eq!(meant("--stop l2").unwrap().motion.stop, Stop::L2(L2_TOLERANCE));
+    }
+
+    #[test]
+    fn senseless_settings_are_refused_by_name() {
+        for flags in [
+            "--theta -1",
+            "--theta nan",
+            "--rho inf",
+            "--delta -0.1",
+            "--k -3",
+            "--sigma -1",
+            "--beta 0",
+            "--tau 0",
+            "--tau 1e300",
+            "--epsilon 0",
+            "--omega 2",
+            "--omega 0",
+            "--tol 0",
+            "--fill-gaps 0",
+            "--fill-gaps -2",
+            "--fill-gaps nan",
+            "--percentiles 99,1",
+            "--percentiles -1,50",
+            "--percentiles nan,50",
+            "--percentiles 0,101",
+            "--brick 8",
+            "--brick 24",
+            "--brick 0",
+            "--brick -16",
+            "--brick 528",
+        ] {
+            let error = meant(flags).unwrap_err();
+            let flag = flags.split(' ').next().unwrap();
+            assert!(error.exit_code() == 2 && error.to_string().starts_with(flag), "{flags}: {error}");
+        }
+        for given in [[0.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, f64::NAN], [f64::INFINITY, 1.0, 1.0]] {
+            assert!(spacing("--image-spacing", Some(given)).unwrap_err().to_string().contains("--image-spacing"));
+        }
+    }
+}

@@ -1,0 +1,8 @@
+//! What is told after a run: report, tables, pictures.
+
+pub(crate) mod distance;
+pub(crate) mod lines;
+pub(crate) mod neighbours;
+pub(crate) mod picture;
+pub(crate) mod run_report;
+pub(crate) mod table;

@@ -1,0 +1,377 @@
+//! `report.json`: what was done, with which settings, at what cost, and what was found; all that repeating it needs.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::neighbours::{Contact, Neighbours, fill_gaps};
+use crate::cli::inputs::settings::Resources;
+use crate::cli::terminal::console::Console;
+use crate::error::{Error, Result};
+use crate::exec::{Engine, StageReport, peak_resident};
+use crate::grid::Geometry;
+use crate::pipeline::image::terms::Smoothing;
+use crate::pipeline::level_set::evolve::Stop;
+use crate::pipeline::level_set::motion::Motion;
+use crate::pipeline::segment::{ObjectReport, Outcome, Overlap, SegmentSettings};
+
+/// The whole report.
+#[derive(Debug, Serialize)]
+pub(crate) struct Report<S, R> {
+    pub(crate) version: &'static str,
+    pub(crate) command: &'static str,
+    /// The command line as typed.
+    pub(crate) arguments: Vec<String>,
+    pub(crate) settings: S,
+    pub(crate) grid: Grid,
+    pub(crate) threads: usize,
+    pub(crate) ranks: usize,
+    pub(crate) memory_budget_bytes: u64,
+    pub(crate) peak_rss_bytes: u64,
+    pub(crate) seconds: f64,
+    pub(crate) notes: Vec<String>,
+    pub(crate) stages: Vec<Stage>,
+    pub(crate) result: R,
+}
+
+/// Every setting, also those that nobody gave; lengths physical.
+#[derive(Debug, Serialize)]
+pub(crate) struct Settings {
+    pub(crate) image: String,
+    pub(crate) points: Vec<String>,
+    /// Balls that objects without points start as: x, y, z, radius.
+    pub(crate) seeds: Vec<[f64; 4]>,
+    pub(crate) output: Option<String>,
+    pub(crate) channel: u32,
+    pub(crate) time: u32,
+    pub(crate) level: u32,
+    /// What the pages were said to be; null when it is the file's word.
+    pub(crate) axes: Option<String>,
+    pub(crate) image_index: Option<u32>,
+    /// First voxel and one past the last, x, y, z.
+    pub(crate) crop_xyz: [[i64; 2]; 3],
+    pub(crate) image_type: &'static str,
+    #[serde(flatten)]
+    pub(crate) solver: Solver,
+    pub(crate) scratch: String,
+}
+
+#[derive(Debug, Serialize)]
+pub(crate) struct Solver {
+    method: &'static str,
+    #[serde(flatten)]
+    motion: Moves,
+    image_model: &'static str,
+    start: &'static str,
+    /// Null when it follows from what each object shows; it is then in the results.
+    rho: Option<f64>,
+    k: f64,
+    smoothing: &'static str,
+    /// Null when it follows from what each object shows.
+    sigma: Option<f64>,
+    /// Null when it was found for each object; it is then in the results.
+    beta: Option<f64>,
+    edge: &'static str,
+    caps: bool,
+    percentiles: [f64; 2],
+    overlap: &'static str,
+    /// A width, `auto`, or null.
+    fill_gaps: serde_json::Value,
+    brick: i64,
+}
+
+#[derive(Debug, Serialize)]
+pub(crate) struct Grid {
+    shape_zyx: [i64; 3],
+    spacing_zyx: [f64; 3],
+    origin_zyx: [f64; 3],
+    unit: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+pub(crate) struct Stage {
+    name: String,
+    seconds: f64,
+    voxels: u64,
+    brick_loads: u64,
+    bricks: u64,
+    bytes_read: u64,
+    bytes_written: u64,
+    iterations: u64,
+    residual: f64,
+    peak_rss_bytes: u64,
+}
+
+/// What was found; of one object everything directly, of all objects in the list.
+#[derive(Debug, Serialize)]
+pub(crate) struct Found {
+    #[serde(flatten)]
+    single: Option<Object>,
+    label_voxels: BTreeMap<String, u64>,
+    objects: Vec<Object>,
+    refused: Vec<Refused>,
+    neighbours: Neighbours,
+    contacts: Vec<Contact>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct Object {
+    label: u32,
+    voxels: u64,
+    volume: f64,
+    area: f64,
+    closed: bool,
+    components: u64,
+    triangles: u64,
+    hausdorff: Option<Hausdorff>,
+    cloud_points: u64,
+    beta: f64,
+    hole: Option<Hole>,
+    band_voxels: u64,
+    time_steps: u32,
+    sor_iterations: u64,
+    stopped_by: &'static str,
+    residual: f64,
+    /// What was taken from the image, and how much marks and image weighed.
+    image_model: &'static str,
+    theta: f64,
+    rho: f64,
+    /// Marks farther than a voxel from the surface.
+    marks_off: u64,
+    cross_validation: Option<CrossValidation>,
+}
+
+/// What leaving out each outline tells; the slice is that across its axis, counted from 0.
+#[derive(Clone, Debug, Serialize)]
+struct CrossValidation {
+    mean: f64,
+    p90: f64,
+    next_slice: Option<NextSlice>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct NextSlice {
+    axis: &'static str,
+    slice: i64,
+}
+
+impl From<crate::pipeline::segment::CrossValidation> for CrossValidation {
+    fn from(found: crate::pipeline::segment::CrossValidation) -> Self {
+        let next = found.next_slice.map(|(axis, slice)| NextSlice { axis: ["x", "y", "z"][axis], slice });
+        Self { mean: found.mean, p90: found.p90, next_slice: next }
+    }
+}
+
+/// An object that could not be solved.
+#[derive(Debug, Serialize)]
+struct Refused {
+    label: u32,
+    reason: String,
+}
+
+/// Distances of the marks from the surface.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Hausdorff {
+    mean: f64,
+    max: f64,
+}
+
+impl From<crate::kernel::surface::Hausdorff> for Hausdorff {
+    fn from(found: crate::kernel::surface::Hausdorff) -> Self {
+        Self { mean: found.mean, max: found.max }
+    }
+}
+
+/// The cloud's largest hole.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Hole {
+    width: f64,
+    place_xyz: [f64; 3],
+}
+
+impl From<crate::pipeline::enclosure::search::Hole> for Hole {
+    fn from(hole: crate::pipeline::enclosure::search::Hole) -> Self {
+        Self { width: hole.width, place_xyz: hole.place }
+    }
+}
+
+/// How the surface moved.
+#[derive(Debug, Serialize)]
+pub(crate) struct Moves {
+    theta: f64,
+    delta: f64,
+    tau: f64,
+    epsilon: f64,
+    omega: f64,
+    stop: &'static str,
+    tol: f64,
+    max_steps: u32,
+}
+
+impl Moves {
+    pub(crate) fn new(motion: &Motion, geometry: &Geometry) -> Self {
+        let (stop, tol) = match motion.stop {
+            Stop::Surface(limit) => ("surface", limit),
+            Stop::L2(limit) => ("l2", limit),
+        };
+        Self {
+            theta: motion.theta,
+            delta: motion.delta_on(geometry),
+            tau: motion.tau_on(geometry),
+            epsilon: motion.epsilon_on(geometry),
+            omega: motion.omega,
+            stop,
+            tol,
+            max_steps: motion.max_steps,
+        }
+    }
+}
+
+fn zyx<T: Copy>([x, y, z]: [T; 3]) -> [T; 3] {
+    [z, y, x]
+}
+
+impl Grid {
+    fn new(geometry: &Geometry) -> Self {
+        Self {
+            shape_zyx: zyx(geometry.shape),
+            spacing_zyx: zyx(geometry.spacing),
+            origin_zyx: zyx(geometry.origin),
+            unit: geometry.unit.clone(),
+        }
+    }
+}
+
+impl Solver {
+    pub(crate) fn new(settings: &SegmentSettings, geometry: &Geometry) -> Self {
+        Self {
+            method: settings.method.name(),
+            motion: Moves::new(&settings.motion, geometry),
+            image_model: settings.image.name(),
+            start: settings.start.name(),
+            rho: settings.rho,
+            k: settings.k,
+            smoothing: match settings.smoothing {
+                Smoothing::Gaussian => "gaussian",
+                Smoothing::Heat => "heat",
+            },
+            sigma: settings.sigma,
+            beta: settings.beta,
+            edge: if settings.motion.normalised { "normalised" } else { "plain" },
+            caps: settings.caps,
+            percentiles: settings.percentiles,
+            overlap: match settings.overlap {
+                Overlap::Smaller => "smaller",
+                Overlap::Larger => "larger",
+                Overlap::First => "first",
+                Overlap::Last => "last",
+            },
+            fill_gaps: fill_gaps(settings.fill_gaps),
+            brick: settings.brick,
+        }
+    }
+}
+
+impl From<StageReport> for Stage {
+    fn from(stage: StageReport) -> Self {
+        Self {
+            name: stage.name,
+            seconds: stage.seconds,
+            voxels: stage.voxels,
+            brick_loads: stage.brick_loads,
+            bricks: stage.bricks,
+            bytes_read: stage.bytes_read,
+            bytes_written: stage.bytes_written,
+            iterations: stage.iterations,
+            residual: stage.residual,
+            peak_rss_bytes: stage.peak_rss_bytes,
+        }
+    }
+}
+
+impl Object {
+    fn new(object: &ObjectReport, voxels: u64) -> Self {
+        Self {
+            label: object.label,
+            voxels,
+            volume: object.measures.volume,
+            area: object.measures.area,
+            closed: object.measures.is_closed(),
+            components: object.measures.components,
+            triangles: object.measures.triangles,
+            hausdorff: object.hausdorff.map(Into::into),
+            cloud_points: object.cloud_points,
+            beta: object.beta,
+            hole: object.hole.map(Into::into),
+            band_voxels: object.band_voxels,
+            time_steps: object.evolution.steps,
+            sor_iterations: object.evolution.sor_iterations,
+            stopped_by: object.evolution.stopped_by,
+            residual: object.evolution.residual,
+            image_model: object.image_model,
+            theta: object.theta,
+            rho: object.rho,
+            marks_off: object.marks_off,
+            cross_validation: object.cross_validation.map(Into::into),
+        }
+    }
+}
+
+impl Found {
+    pub(crate) fn new(outcome: &Outcome) -> Self {
+        let voxels = |label| outcome.label_voxels.get(&label).copied().unwrap_or(0);
+        let objects: Vec<Object> = outcome.objects.iter().map(|o| Object::new(o, voxels(o.label))).collect();
+        let single = if let [only] = objects.as_slice() { Some(only.clone()) } else { None };
+        let label_voxels = outcome.objects.iter().map(|o| (o.label.to_string(), voxels(o.label))).collect();
+        let contacts = outcome.contacts.iter().map(Contact::new).collect();
+        let refused = outcome.refused.iter().map(|r| Refused { label: r.label, reason: r.reason.clone() }).collect();
+        Self { single, label_voxels, objects, refused, neighbours: Neighbours::new(&outcome.neighbours), contacts }
+    }
+}
+
+/// The crop as the report states it.
+pub(crate) fn crop_xyz(part: &crate::grid::Box3) -> [[i64; 2]; 3] {
+    std::array::from_fn(|a| [part.lo[a], part.hi[a]])
+}
+
+/// What a report tells of a run, whatever it was for.
+pub(crate) struct Ran<'a> {
+    pub(crate) command: &'static str,
+    pub(crate) typed: &'a [String],
+    pub(crate) resources: &'a Resources,
+    pub(crate) console: &'a Console,
+    pub(crate) engine: &'a Engine,
+    pub(crate) ranks: usize,
+    pub(crate) started: Instant,
+}
+
+impl<S: Serialize, R: Serialize> Report<S, R> {
+    pub(crate) fn new(ran: &Ran<'_>, settings: S, geometry: &Geometry, result: R) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            command: ran.command,
+            arguments: ran.typed.to_vec(),
+            settings,
+            grid: Grid::new(geometry),
+            threads: ran.engine.threads(),
+            ranks: ran.ranks,
+            memory_budget_bytes: ran.resources.memory,
+            peak_rss_bytes: peak_resident(),
+            seconds: ran.started.elapsed().as_secs_f64(),
+            notes: ran.console.notes(),
+            stages: ran.engine.reports().into_iter().map(Into::into).collect(),
+            result,
+        }
+    }
+
+    /// Writes the report; nothing stands under the name before it is whole.
+    pub(crate) fn write(&self, path: &Path) -> Result<()> {
+        let fault = |error: std::io::Error| Error::from_io("the report cannot be written", &error).at(path);
+        let mut text = serde_json::to_string_pretty(self).map_err(|error| fault(error.into()))?;
+        text.push('\n');
+        crate::cli::outputs::files::write_whole(path, |file| std::io::Write::write_all(file, text.as_bytes()))
+            .map_err(fault)
+    }
+}

@@ -1,0 +1,5 @@
+//! The terminal: what is told while a run goes on, and the signals that end it.
+
+pub(crate) mod console;
+pub(crate) mod signals;
+pub(crate) mod text;

@@ -1,0 +1,83 @@
+//! SIGINT and SIGTERM: the first asks the run to end in order. A run that has not ended a while after it, since it reads a
+//! slow disk or is in a long computation, or is sent a second one, is ended from here, and what it had begun to write is
+//! removed. A signal in the midst of that ends the process at once.
+
+use std::process::exit;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::flag;
+
+use crate::cli::complain;
+use crate::error::{Error, Result};
+use crate::exec::Cancel;
+use crate::store::remove_unfinished;
+
+/// How often it is looked whether a signal came.
+const LOOK: Duration = Duration::from_millis(100);
+/// How long a run may take to end in order.
+const PATIENCE: Duration = Duration::from_millis(1200);
+
+/// True once somebody has said, or is about to say, how the process ends.
+static ENDS: AtomicBool = AtomicBool::new(false);
+/// The signal that asked for the end, or 0.
+static ASKED: AtomicUsize = AtomicUsize::new(0);
+
+/// A flag that the first signal sets.
+pub(crate) fn cancel_on_signals() -> Result<Cancel> {
+    let cancel = Cancel::default();
+    let (again, removing) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    for signal in [SIGINT, SIGTERM] {
+        flag::register_conditional_shutdown(signal, 128 + signal, removing.clone())
+            .and_then(|_| flag::register(signal, again.clone()))
+            .and_then(|_| flag::register_usize(signal, cancel.flag(), signal as usize))
+            .map_err(|error| Error::from_io("cannot listen to signals", &error))?;
+    }
+    // A file that grows past its limit is then an error of the write, which names the file, and not the end.
+    flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))
+        .map_err(|error| Error::from_io("cannot listen to signals", &error))?;
+    let asked = cancel.flag();
+    let watch = move || {
+        while asked.load(Relaxed) == 0 {
+            thread::sleep(LOOK);
+        }
+        ASKED.store(asked.load(Relaxed), Relaxed);
+        // Of two signals that come before this one is seen.
+        again.store(false, Relaxed);
+        let seen = Instant::now();
+        while seen.elapsed() < PATIENCE && !again.load(Relaxed) {
+            thread::sleep(LOOK);
+        }
+        if speak_last() {
+            removing.store(true, Relaxed);
+            end(asked.load(Relaxed));
+        }
+    };
+    thread::Builder::new().spawn(watch).map_err(|error| Error::from_io("cannot listen to signals", &error))?;
+    Ok(cancel)
+}
+
+/// Whether the caller is the one who says how the process ends: the first who asks.
+pub(crate) fn speak_last() -> bool {
+    !ENDS.swap(true, Relaxed)
+}
+
+/// What an error is to the user: after a signal, what fails because all goes away is no failure of its own.
+pub(crate) fn seen(error: Error) -> Error {
+    match ASKED.load(Relaxed) {
+        0 => error,
+        signal => Error::interrupted(signal as i32),
+    }
+}
+
+/// Ends the process in the middle of whatever it does.
+fn end(signal: usize) -> ! {
+    remove_unfinished();
+    let error = Error::interrupted(signal as i32);
+    complain(&error.to_string());
+    exit(i32::from(error.exit_code()))
+}

@@ -1,0 +1,4 @@
+//! Files of points and meshes.
+
+pub mod read;
+pub mod write;

@@ -1,0 +1,4 @@
+//! Meshes as they are written.
+
+pub mod export;
+pub mod ply;

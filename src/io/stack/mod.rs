@@ -1,0 +1,9 @@
+//! Volumes in files: TIFF stacks and Zarr images.
+
+pub mod formats;
+pub mod label_volume;
+pub mod page_axes;
+pub mod tiff;
+pub(super) mod units;
+pub mod volume;
+pub mod zarr;

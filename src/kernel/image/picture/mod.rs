@@ -1,0 +1,4 @@
+//! Pictures of slices.
+
+pub mod palette;
+pub mod panel;

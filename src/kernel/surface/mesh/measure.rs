@@ -1,0 +1,104 @@
+//! `SurfaceMeasure`: volume, area, closedness and pieces of a mesh, summed while its triangles pass.
+
+use crate::kernel::geometry::vector::{cross, dot, sub};
+use crate::kernel::surface::{Components, EdgeTally};
+
+/// Running sums over triangles, in f64 and in the order the triangles come.
+#[derive(Clone, Debug)]
+pub struct SurfaceMeasure {
+    centre: [f64; 3],
+    /// Six times the volume.
+    volume6: f64,
+    /// Twice the area.
+    area2: f64,
+    triangles: u64,
+    edges: EdgeTally,
+    components: Components,
+}
+
+/// What a mesh measures, in the physical unit of its positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measures {
+    /// Enclosed volume, positive for outward triangles; has a meaning only for a closed mesh.
+    pub volume: f64,
+    /// Area of all triangles.
+    pub area: f64,
+    /// Number of edges that no second triangle closes.
+    pub open_edges: u64,
+    /// Number of connected pieces.
+    pub components: u64,
+    /// Number of triangles.
+    pub triangles: u64,
+    /// Number of vertices that triangles have.
+    pub vertices: u64,
+}
+
+impl Measures {
+    /// True when the mesh is closed and consistently oriented.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        self.open_edges == 0
+    }
+}
+
+impl SurfaceMeasure {
+    /// Empty sums. `centre` is any world position near the mesh: volumes are summed as seen from there, so that a
+    /// mesh far from the origin loses no digits.
+    #[must_use]
+    pub fn new(centre: [f64; 3]) -> Self {
+        Self {
+            centre,
+            volume6: 0.0,
+            area2: 0.0,
+            triangles: 0,
+            edges: EdgeTally::default(),
+            components: Components::default(),
+        }
+    }
+
+    /// Adds a triangle, its corners as vertex numbers and as world positions.
+    pub fn add(&mut self, corners: [u32; 3], positions: [[f64; 3]; 3]) {
+        let [a, b, c] = positions.map(|p| sub(p, self.centre));
+        // Divergence theorem: the tetrahedron from the centre to a triangle has the volume a . (b x c) / 6.
+        self.volume6 += dot(a, cross(b, c));
+        let normal = cross(sub(b, a), sub(c, a));
+        self.area2 += dot(normal, normal).sqrt();
+        self.triangles += 1;
+        self.edges.add(corners);
+        self.components.add(corners);
+    }
+
+    /// The measures of all triangles so far.
+    #[must_use]
+    pub fn measures(&self) -> Measures {
+        Measures {
+            volume: self.volume6 / 6.0,
+            area: self.area2 / 2.0,
+            open_edges: self.edges.open(),
+            components: self.components.count(),
+            triangles: self.triangles,
+            vertices: self.components.vertices(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tetrahedron_far_from_the_origin() {
+        let offset = 4_096_000.0;
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]];
+        let mut measure = SurfaceMeasure::new([4_096_000.5; 3]);
+        for triangle in [[0_u32, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] {
+            measure.add(triangle, triangle.map(|v| corners[v as usize].map(|x: f64| x + offset)));
+        }
+        let found = measure.measures();
+        assert!((found.volume - 1.0).abs() < 1e-12);
+        // Three right triangles and the slanted one: 1 + 1.5 + 3 + sqrt(36 + 9 + 4) / 2.
+        assert!((found.area - 9.0).abs() < 1e-12);
+        assert!(found.is_closed());
+        assert_eq!((found.components, found.triangles, found.vertices), (1, 4, 4));
+    }
+}

@@ -1,0 +1,9 @@
+//! Triangles as they pass: joined, counted, measured, looked up.
+
+pub(crate) mod components;
+pub(crate) mod edge_tally;
+pub(crate) mod measure;
+pub(crate) mod nearest;
+pub(crate) mod patch;
+pub(crate) mod vertex_key;
+pub(crate) mod weld;

@@ -1,0 +1,31 @@
+//! `Patch`: a piece of a mesh, as one brick gives it.
+
+use super::vertex_key::VertexKey;
+use crate::grid::Box3;
+
+/// The surface inside the cells of one brick.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// The cells that were walked, by their lowest corners.
+    pub cells: Box3,
+    /// What each vertex lies on or within.
+    pub keys: Vec<VertexKey>,
+    /// Positions of the vertices in voxel units of the domain, whole numbers at voxel centres, `[x, y, z]`.
+    pub positions: Vec<[f64; 3]>,
+    /// Triangles as places in `keys` and `positions`, counter-clockwise as seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// The two labels that each triangle separates, the smaller first; empty where there are no labels.
+    pub pairs: Vec<[u32; 2]>,
+}
+
+impl Default for Patch {
+    fn default() -> Self {
+        Self {
+            cells: Box3::from_shape([0; 3]),
+            keys: Vec::new(),
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            pairs: Vec::new(),
+        }
+    }
+}

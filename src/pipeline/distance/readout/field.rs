@@ -1,0 +1,121 @@
+//! What a solved distance can be read as: distances and the indices of nearest sources, both made out of the state of
+//! the method as they are read, so that no second field is stored.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::exec::Workers;
+use crate::grid::Box3;
+use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::store::{BoxSource, BrickArray};
+
+/// A solved distance.
+pub struct Solved<'a, P> {
+    /// Distances in physical units, none above the farthest asked for; infinite where no source is known.
+    pub values: Arc<dyn BoxSource<P> + Send + 'a>,
+    /// For each voxel the index of its nearest known source, or [`NO_SOURCE`].
+    pub sources: Arc<dyn BoxSource<u32> + Send + 'a>,
+    /// Both at once, where they are made of the same and that is cheaper.
+    pub together: Option<Arc<dyn Together<P> + Send + 'a>>,
+    /// 1 where a source fixed the voxel, else 0.
+    pub fixed: Arc<dyn BoxSource<u8> + Send + 'a>,
+    /// Voxels that sources fixed.
+    pub fixed_voxels: u64,
+    /// Distances from a voxel to a triangle that were computed to fix them.
+    pub triangle_distances: u64,
+}
+
+/// Distances and sources that are made of the same state.
+pub trait Together<P>: Sync {
+    /// Reads both for a box, dense `[z][y][x]`.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()>;
+}
+
+impl<P: Precision> Solved<'_, P> {
+    /// Reads distances and sources of a box, dense `[z][y][x]`.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    pub fn read_both(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
+        if let Some(together) = &self.together {
+            return together.read_together(part, values, sources);
+        }
+        self.values.read_box(part, values)?;
+        self.sources.read_box(part, sources)
+    }
+}
+
+/// A method's state, read as distances or sources.
+pub(crate) struct Values<M: DistanceMethod> {
+    pub(crate) method: M,
+    pub(crate) state: BrickArray<M::State>,
+    pub(crate) farthest: f64,
+    /// Kept from one read to the next: fresh memory would cost more than what is computed in it.
+    pub(crate) buffers: Workers<Vec<M::State>>,
+}
+
+impl<M: DistanceMethod> Values<M> {
+    /// What was solved, where sources too are made of the state.
+    pub(crate) fn solved<'a, P: Precision>(self, fixed_voxels: u64, triangle_distances: u64) -> Solved<'a, P>
+    where
+        M: 'a,
+    {
+        let (values, together) = (Arc::new(self), None);
+        let (sources, fixed) = (values.clone(), values.clone());
+        Solved { values, sources, together, fixed, fixed_voxels, triangle_distances }
+    }
+
+    /// Reads the state of a box and hands each voxel on, with its place in the box.
+    fn each(&self, part: &Box3, mut f: impl FnMut(usize, M::State, [i64; 3])) -> Result<()> {
+        self.buffers.with(|states| {
+            states.resize(part.len().max(states.len()), M::UNKNOWN);
+            self.state.read_box(part, &mut states[..part.len()])?;
+            let mut at = 0;
+            for (y, z) in part.rows() {
+                for x in part.lo[0]..part.hi[0] {
+                    f(at, states[at], [x, y, z]);
+                    at += 1;
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+impl<M: DistanceMethod, P: Precision> BoxSource<P> for Values<M> {
+    fn shape(&self) -> [i64; 3] {
+        self.state.set().grid().shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [P]) -> Result<()> {
+        self.each(part, |at, state, voxel| {
+            let distance = self.method.distance(state, voxel).min(self.farthest);
+            out[at] = P::from_f64(distance);
+        })
+    }
+}
+
+impl<M: DistanceMethod> BoxSource<u8> for Values<M> {
+    fn shape(&self) -> [i64; 3] {
+        self.state.set().grid().shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [u8]) -> Result<()> {
+        self.each(part, |at, state, _| out[at] = u8::from(M::is_fixed(state)))
+    }
+}
+
+impl<M: DistanceMethod> BoxSource<u32> for Values<M> {
+    fn shape(&self) -> [i64; 3] {
+        self.state.set().grid().shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
+        self.each(part, |at, state, _| out[at] = M::source(state).unwrap_or(NO_SOURCE))
+    }
+}

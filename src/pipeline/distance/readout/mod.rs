@@ -1,0 +1,8 @@
+//! A solved distance as it is read: repaired, told from which side, measured, and put into images.
+
+pub(crate) mod field;
+pub(crate) mod found;
+pub(crate) mod images;
+pub(crate) mod repair;
+pub(crate) mod tile;
+pub(crate) mod visit;

@@ -1,0 +1,151 @@
+//! Sources along with the sweeps of FSM, bit for bit those of the triple loop (Kósa & Mikula 2023, Alg. 7).
+//!
+//! Bricks of sources are kept as they are now; of how they were before the sweep only faces are kept, which bricks
+//! beside them read. What a brick cannot know at its turn is resolved when the sweep is over, in rounds (`trace`); then
+//! the faces before the next sweep are made the ones now. Distances are swept as they are alone (`sweep`).
+
+use super::sweep::{Companion, Swept, Visit};
+use super::trace::Rounds;
+use crate::error::Result;
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
+use crate::grid::{FACES, Slot};
+use crate::kernel::distance::methods::fast_sweeping::FastSweeping;
+use crate::kernel::distance::methods::sweep_sources::{Fell, Ghosts, SweepSources};
+use crate::kernel::distance::state::neighbours::SWEEPS;
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::store::{BrickArray, Scratch};
+
+/// The sources of a field that is being swept.
+pub(crate) struct TrackedSweeps<'a> {
+    states: &'a BrickArray<u32>,
+    /// Faces as they were before the sweep.
+    before: BrickArray<u32>,
+    exchange: Exchange<'a>,
+    /// For all ghosts, and for each direction of a sweep those that lie upwind.
+    plan: HaloPlan,
+    upwind: [HaloPlan; 8],
+    sources: [SweepSources; 8],
+    /// What the sweep under way left of each brick; ghosts too.
+    visits: Vec<Visit>,
+}
+
+const BEYOND: Boundary<u32> = Boundary::Constant(NO_SOURCE);
+
+fn number(upward: [bool; 3]) -> usize {
+    (0..3).map(|a| usize::from(!upward[a]) << a).sum()
+}
+
+impl<'a> TrackedSweeps<'a> {
+    /// Of the sources in `states`, which fixed voxels on this rank's bricks in `start` have.
+    pub(crate) fn new(
+        stage: &Stage<'a>,
+        scratch: &Scratch,
+        states: &'a BrickArray<u32>,
+        start: &[Slot],
+    ) -> Result<Self> {
+        let set = states.set();
+        let plan = HaloPlan::new(*set.grid(), Reach::All);
+        let sources = SWEEPS.map(SweepSources::new);
+        let upwind = std::array::from_fn(|n| plan.only(|offset| sources[n].is_upwind(offset)));
+        let exchange = Exchange::new(stage.comm(), set, &plan)?;
+        let before = BrickArray::blank_faces(scratch, set, NO_SOURCE)?;
+        let told = exchange.faces(states, start)?;
+        let visits = vec![Visit::default(); set.len()];
+        let tracked = Self { states, before, exchange, plan, upwind, sources, visits };
+        start.iter().chain(&told).for_each(|&slot| tracked.keep_faces(slot));
+        Ok(tracked)
+    }
+
+    /// Makes the faces of a brick before the sweep those now.
+    fn keep_faces(&self, slot: Slot) {
+        let area = self.states.set().grid().edge().pow(2) as usize;
+        self.before.write_faces(slot, |before| {
+            for (face, before) in FACES.into_iter().zip(before.chunks_exact_mut(area)) {
+                self.states.read_face(slot, face, |now| before.copy_from_slice(now));
+            }
+        });
+    }
+
+    fn valid(&self, slot: Slot) -> [usize; 3] {
+        let set = self.states.set();
+        set.grid().brick_box(set.id(slot)).shape().map(|n| n as usize)
+    }
+
+    /// Gives voxels of a brick that fell their sources; returns whether any is left pending.
+    fn take(&self, fell: &[Fell], ghosts: &mut Ghosts, slot: Slot, upward: [bool; 3]) -> bool {
+        let (n, valid, edge) = (number(upward), self.valid(slot), self.states.set().grid().edge() as usize);
+        ghosts.now.set_valid(valid);
+        ghosts.before.set_valid(valid);
+        self.upwind[n].gather_halo(self.states, slot, BEYOND, &mut ghosts.now);
+        self.plan.gather_halo(&self.before, slot, BEYOND, &mut ghosts.before);
+        let blank = self.states.unwritten(slot);
+        let left = self.states.write(slot, |brick| {
+            if let Some(value) = blank {
+                brick.fill(value);
+            }
+            self.sources[n].take(fell, brick, edge, valid, ghosts)
+        });
+        self.states.refresh_faces(slot);
+        left
+    }
+
+    /// Resolves what it can of the pending voxels of a brick, once the sweep is over.
+    fn resolve(&self, ghosts: &mut Ghosts, slot: Slot, upward: [bool; 3]) -> (bool, bool) {
+        let (valid, edge) = (self.valid(slot), self.states.set().grid().edge() as usize);
+        ghosts.now.set_valid(valid);
+        ghosts.before.set_valid(valid);
+        self.plan.gather_halo(self.states, slot, BEYOND, &mut ghosts.now);
+        self.plan.gather_halo(&self.before, slot, BEYOND, &mut ghosts.before);
+        let sources = &self.sources[number(upward)];
+        let (found, left) = self.states.write(slot, |brick| sources.resolve(brick, edge, valid, ghosts));
+        if found {
+            self.states.refresh_faces(slot);
+        }
+        (found, left)
+    }
+}
+
+impl<P: Precision> Companion<FastSweeping<P, f64>> for TrackedSweeps<'_> {
+    type Work = (Vec<Fell>, Ghosts);
+
+    fn work(edge: usize) -> Self::Work {
+        (Vec::new(), Ghosts::new(edge))
+    }
+
+    fn sweep(
+        &self,
+        Swept { method, tile, work, along: (fell, ghosts) }: Swept<'_, FastSweeping<P, f64>, Self::Work>,
+        slot: Slot,
+        upward: [bool; 3],
+    ) -> Visit {
+        let changed = method.sweep_telling(tile, work, upward, fell);
+        Visit { changed, left: changed && self.take(fell, ghosts, slot, upward) }
+    }
+
+    fn after_wave(&mut self, wave: &[(Slot, Visit)]) -> Result<()> {
+        let mut changed = Vec::new();
+        for &(slot, visit) in wave.iter().filter(|(_, visit)| visit.changed) {
+            self.visits[slot as usize] = visit;
+            changed.push(slot);
+        }
+        for slot in self.exchange.faces(self.states, &changed)? {
+            self.visits[slot as usize].changed = true;
+        }
+        Ok(())
+    }
+
+    fn after_sweep(&mut self, stage: &Stage<'_>, upward: [bool; 3]) -> Result<()> {
+        let slots = 0..self.states.set().len() as Slot;
+        let left: Vec<Slot> = slots.clone().filter(|&slot| self.visits[slot as usize].left).collect();
+        let complete = self.visits.iter().map(|visit| !visit.left).collect();
+        let mut rounds = Rounds::new(self.states, &self.exchange, complete);
+        rounds.begin(&left, false);
+        let edge = self.states.set().grid().edge() as usize;
+        let workers = Workers::new(move || Ghosts::new(edge));
+        rounds.run(stage, &workers, |ghosts, slot| self.resolve(ghosts, slot, upward))?;
+        slots.filter(|&slot| self.visits[slot as usize].changed).for_each(|slot| self.keep_faces(slot));
+        self.visits.fill(Visit::default());
+        Ok(())
+    }
+}

@@ -1,0 +1,10 @@
+//! What a cloud encloses, and the region in which its surface is sought.
+
+pub(crate) mod far_regions;
+pub(crate) mod needs;
+pub(crate) mod pockets;
+pub mod region;
+pub mod search;
+pub(crate) mod sheets;
+pub mod tagging;
+pub mod watershed;

@@ -1,0 +1,348 @@
+//! What a cloud encloses: the distance around it, which side of it voxels are on, and how far the band must reach. The
+//! distance is computed within a reach that grows until something enclosed is found or nothing can be.
+
+use std::sync::Arc;
+
+use super::pockets::pockets;
+use super::region::{Vicinity, voxel_bounds};
+use super::sheets::{Company, hold_sheets};
+use super::tagging::{Basin, tag};
+use super::watershed::{Sides, watershed};
+use crate::error::Result;
+use crate::exec::{Engine, Stage};
+use crate::grid::{Box3, Geometry, digits};
+use crate::kernel::level_set::initial::persistence::PERSISTENCE;
+use crate::pipeline::distance::{Method, Sources, cloud_distance};
+use crate::pipeline::level_set::band::{Band, Reaches, make_band};
+use crate::store::BrickArray;
+
+/// The start surface lies a little beyond the largest saddle, and at least so many smallest spacings from the cloud.
+const ABOVE_SADDLE: f64 = 1.05;
+const SMALLEST_BETA_VOXELS: f64 = 0.75;
+/// The band reaches at least so many mean spacings to either side of the cloud.
+const BAND_VOXELS: f64 = 4.0;
+/// The search begins at so many largest spacings from the cloud.
+const FIRST_REACH_VOXELS: f64 = 6.0;
+
+/// The search goes on while more of the points than this share have one side all around them: a body may be open wider
+/// than the reach.
+const MOST_LOST: f64 = 0.1;
+
+/// An open body is closed by balls of these parts of the reach.
+const POCKET_RADII: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// Where the start surface lies when no beta is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Between the points, each hole closed where it is narrowest.
+    Watershed,
+    /// At one distance from all points, a little beyond the largest hole.
+    Tube,
+}
+
+/// A cloud, and how what it encloses is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Search<'a> {
+    /// The grid; what is found lies on a box of it that may reach past it.
+    pub grid: &'a Geometry,
+    /// World positions.
+    pub cloud: &'a [[f64; 3]],
+    /// Distance method.
+    pub method: Method,
+    /// Distance of the start surface from the cloud; automatic when none.
+    pub beta: Option<f64>,
+    /// Where it lies otherwise.
+    pub start: Start,
+    /// The distance from the cloud within which the search begins.
+    pub first_reach: f64,
+    /// What is added to the names of stages.
+    pub suffix: &'a str,
+}
+
+impl Search<'_> {
+    /// Whether a basin is inside of a start surface at beta. One that was asked for is held against the depth too: then
+    /// basins of any persistence come, and noise is as deep as its saddle.
+    fn holds(&self, basin: &Basin, beta: f64) -> bool {
+        let deep = self.beta.is_none() || f64::from(basin.depth) > beta;
+        f64::from(basin.saddle) < beta && deep
+    }
+
+    /// No space can be deeper than this. On the way out of one along any axis the distance falls to the space's saddle, at
+    /// the latest that far beyond the box around the cloud: half the box and two saddles bound the depth, and a start
+    /// surface that was asked for lies beyond its saddle.
+    fn deepest_possible(&self) -> f64 {
+        let extents = self.extents();
+        match self.beta {
+            Some(beta) => {
+                0.5 * extents.into_iter().fold(f64::INFINITY, f64::min) + 2.0 * beta + self.grid.max_spacing()
+            }
+            None => extents.into_iter().fold(0.0, f64::max),
+        }
+    }
+
+    /// The cloud's extents along x, y, z.
+    fn extents(&self) -> [f64; 3] {
+        let bounds = voxel_bounds(self.cloud, self.grid);
+        std::array::from_fn(|a| bounds.shape()[a] as f64 * self.grid.spacing[a])
+    }
+}
+
+/// The hole through which a cloud would leak first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hole {
+    /// Its width: twice the saddle's distance to the cloud.
+    pub width: f64,
+    /// Where it is, world coordinates.
+    pub place: [f64; 3],
+}
+
+/// The deepest space that a cloud has, whether it is closed enough or not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deepest {
+    /// Its largest hole.
+    pub hole: Hole,
+    /// The largest distance to the cloud in it.
+    pub depth: f64,
+}
+
+impl Deepest {
+    fn of(basins: &[Basin], geometry: &Geometry) -> Option<Self> {
+        let basin = basins.iter().max_by(|a, b| a.depth.total_cmp(&b.depth))?;
+        let hole = Hole { width: 2.0 * f64::from(basin.saddle), place: geometry.position(basin.place) };
+        Some(Self { hole, depth: f64::from(basin.depth) })
+    }
+
+    /// A beta at which the start surface closes the hole and leaves room inside.
+    #[must_use]
+    pub fn beta(&self) -> Option<f64> {
+        // A hair from either end: on the grid both are known to that.
+        digits::shortest_between(0.5 * self.hole.width * 1.005, self.depth * 0.995)
+    }
+}
+
+/// A cloud that encloses something, on a grid that reaches far enough around it.
+pub struct Enclosure {
+    /// The grid of its box.
+    pub geometry: Geometry,
+    /// The box in voxels of the grid that was given.
+    pub window: Box3,
+    /// How far from the cloud the start surface lies; 0 where it runs between the points.
+    pub beta: f64,
+    /// How far the band reaches.
+    pub reaches: Reaches,
+    distance: BrickArray<f32>,
+    inside: BrickArray<u8>,
+    basins: Vec<Basin>,
+    deepest: Option<Deepest>,
+    sheet: Vec<u32>,
+}
+
+/// What a search ends with.
+pub enum Found {
+    /// Something enclosed.
+    Enclosed(Box<Enclosure>),
+    /// Nothing at the beta that was asked for; a larger one would do.
+    Leaks(Deepest),
+    /// Nothing; at most a space that is not deep enough for its holes.
+    Nothing(Option<Deepest>),
+}
+
+/// The reach that a search begins with on a grid, for a beta that was asked for.
+#[must_use]
+pub fn first_reach_for(grid: &Geometry, beta: Option<f64>) -> f64 {
+    let wanted = beta.map_or(0.0, |beta| 2.0 * beta);
+    (FIRST_REACH_VOXELS * grid.max_spacing()).max(wanted + 2.0 * grid.max_spacing())
+}
+
+/// Looks for what the cloud encloses.
+///
+/// # Errors
+/// When scratch runs out or the run is interrupted.
+pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
+    match (search.beta, search.start) {
+        (None, Start::Watershed) => enclose_by_sides(engine, search),
+        _ => enclose_by_flood(engine, search),
+    }
+}
+
+/// The watershed of the distance, within a reach that grows until most points have both sides beside them.
+fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
+    let grid = search.grid;
+    let half_width = BAND_VOXELS * libm::cbrt(grid.voxel_volume());
+    let mut farthest = search.first_reach.max(half_width + 3.0 * grid.max_spacing());
+    let enough = |sides: &Sides| sides.lost.len() as f64 <= MOST_LOST * search.cloud.len() as f64;
+    loop {
+        let around = Around::new(engine, search, farthest)?;
+        let mut sides = around.sides(engine, search, None)?;
+        // No ball fits the box around the cloud that is larger.
+        let all = 2.0 * farthest > search.extents().into_iter().fold(f64::INFINITY, f64::min) + grid.max_spacing();
+        if sides.basins.is_empty() && all {
+            return Ok(Found::Nothing(around.deepest(engine, search)?));
+        }
+        if !sides.basins.is_empty() && all && !enough(&sides) {
+            for part in POCKET_RADII {
+                let closed = around.sides(engine, search, Some((part * farthest, &sides.inside)))?;
+                if closed.lost.len() < sides.lost.len() {
+                    sides = closed;
+                }
+            }
+        }
+        if !sides.basins.is_empty() && (all || enough(&sides)) {
+            let reaches = Reaches { inner: half_width as f32, outer: half_width as f32 };
+            let Sides { inside, basins, lost } = sides;
+            let geometry = &around.vicinity.geometry;
+            let sheet = hold_sheets(geometry, search.cloud, &lost, Company::AT_THE_START, &inside);
+            return Ok(Found::Enclosed(Box::new(around.enclosed(0.0, reaches, inside, basins, sheet))));
+        }
+        farthest *= 2.0;
+    }
+}
+
+/// The flood from outside, to a start surface at one distance from all of the cloud.
+fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
+    let grid = search.grid;
+    let mean = libm::cbrt(grid.voxel_volume());
+    let mut farthest = search.first_reach;
+    loop {
+        let around = Around::new(engine, search, farthest)?;
+        let stage = around.tagging(engine, search);
+        // Whoever names a beta knows how deep the inside is.
+        let ratio = if search.beta.is_some() { 1.0 } else { PERSISTENCE };
+        let mut tagging = tag(&stage, engine, &around.sources(search), &around.distance, ratio)?;
+        let beta = search.beta.or_else(|| automatic_beta(&tagging.basins, grid));
+        let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|basin| search.holds(basin, beta))) else {
+            stage.finish();
+            // The deepest comes first; noise is as deep as its saddle.
+            let deepest = Deepest::of(&tagging.basins, &around.vicinity.geometry);
+            let persists = deepest.filter(|d| d.depth >= f64::from(PERSISTENCE) * 0.5 * d.hole.width);
+            if let (Some(_), Some(deepest)) = (search.beta, persists) {
+                return Ok(Found::Leaks(deepest));
+            }
+            if farthest > search.deepest_possible() {
+                return Ok(Found::Nothing(deepest));
+            }
+            farthest *= 2.0;
+            continue;
+        };
+        let half_width = (2.0 * beta).max(BAND_VOXELS * mean);
+        let outer = (beta + 0.5 * half_width).max(half_width);
+        if half_width.max(outer) + 2.0 * grid.max_spacing() > farthest {
+            stage.finish();
+            farthest = half_width.max(outer) + 3.0 * grid.max_spacing();
+            continue;
+        }
+        let deepest = Deepest::of(&tagging.basins, &around.vicinity.geometry);
+        tagging.basins.retain(|basin| search.holds(basin, beta));
+        let inside = tagging.inside(&stage, engine, beta as f32)?;
+        stage.finish();
+        let reaches = Reaches { inner: half_width as f32, outer: outer as f32 };
+        let enclosure = around.enclosed(beta, reaches, inside, tagging.basins, Vec::new());
+        return Ok(Found::Enclosed(Box::new(Enclosure { deepest, ..enclosure })));
+    }
+}
+
+fn automatic_beta(basins: &[Basin], grid: &Geometry) -> Option<f64> {
+    let saddle = basins.iter().map(|b| f64::from(b.saddle)).reduce(f64::max)?;
+    Some((ABOVE_SADDLE * saddle).max(SMALLEST_BETA_VOXELS * grid.min_spacing()))
+}
+
+/// The distance within some reach of the cloud.
+struct Around {
+    vicinity: Vicinity,
+    distance: BrickArray<f32>,
+}
+
+impl Around {
+    fn new(engine: &Engine, search: &Search<'_>, farthest: f64) -> Result<Self> {
+        let vicinity = Vicinity::new(search.grid, search.cloud, farthest);
+        let set = Arc::new(vicinity.cells.clone());
+        let sources = Sources::cloud(&vicinity.geometry, search.cloud, &vicinity.bins);
+        let stage = engine.stage(&format!("distance{}", search.suffix), 11 * set.len() as u64);
+        stage.voxels((set.len() * set.grid().brick_len()) as u64);
+        let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
+        stage.finish();
+        Ok(Self { vicinity, distance })
+    }
+
+    fn sources<'a>(&'a self, search: &Search<'a>) -> Sources<'a> {
+        Sources::cloud(&self.vicinity.geometry, search.cloud, &self.vicinity.bins)
+    }
+
+    /// The sides of the cloud; with a radius, what is open is closed by a ball of it, what is inside stays so.
+    fn sides(&self, engine: &Engine, search: &Search<'_>, ball: Option<(f64, &BrickArray<u8>)>) -> Result<Sides> {
+        let stage = self.tagging(engine, search);
+        let pockets = ball
+            .map(|(radius, inside)| pockets(&stage, engine, &self.vicinity.geometry, &self.distance, inside, radius))
+            .transpose()?;
+        let sides = watershed(&stage, engine, &self.sources(search), &self.distance, pockets.as_ref())?;
+        stage.finish();
+        Ok(sides)
+    }
+
+    /// The deepest space of a cloud that encloses nothing: what a given beta could start from.
+    fn deepest(&self, engine: &Engine, search: &Search<'_>) -> Result<Option<Deepest>> {
+        let stage = self.tagging(engine, search);
+        let tagging = tag(&stage, engine, &self.sources(search), &self.distance, 1.0)?;
+        stage.finish();
+        Ok(Deepest::of(&tagging.basins, &self.vicinity.geometry))
+    }
+
+    fn tagging<'a>(&self, engine: &'a Engine, search: &Search<'_>) -> Stage<'a> {
+        let set = self.distance.set();
+        let stage = engine.stage(&format!("tagging{}", search.suffix), 0);
+        stage.voxels((set.len() * set.grid().brick_len()) as u64);
+        stage
+    }
+
+    fn enclosed(
+        self,
+        beta: f64,
+        reaches: Reaches,
+        inside: BrickArray<u8>,
+        basins: Vec<Basin>,
+        sheet: Vec<u32>,
+    ) -> Enclosure {
+        let Vicinity { geometry, window, .. } = self.vicinity;
+        let deepest = Deepest::of(&basins, &geometry);
+        Enclosure { geometry, window, beta, reaches, distance: self.distance, inside, basins, deepest, sheet }
+    }
+}
+
+impl Enclosure {
+    /// The cloud's largest hole.
+    #[must_use]
+    pub fn hole(&self) -> Option<Hole> {
+        let basin = self.basins.iter().max_by(|a, b| a.saddle.total_cmp(&b.saddle))?;
+        Some(Hole { width: 2.0 * f64::from(basin.saddle), place: self.geometry.position(basin.place) })
+    }
+
+    /// A beta that the start surface may have, where another one failed: larger than this, and no larger than the
+    /// deepest space has room for.
+    #[must_use]
+    pub fn larger_beta(&self) -> Option<f64> {
+        self.deepest.and_then(|deepest| deepest.beta()).filter(|&beta| beta > self.beta)
+    }
+
+    /// Number of enclosed spaces.
+    #[must_use]
+    pub fn spaces(&self) -> usize {
+        self.basins.len()
+    }
+
+    /// The points that are held as thin shells or slits, in order.
+    #[must_use]
+    pub fn sheet(&self) -> &[u32] {
+        &self.sheet
+    }
+
+    /// Makes the band; the fields of the search go.
+    ///
+    /// # Errors
+    /// When scratch runs out or the run is interrupted.
+    pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<Band> {
+        let stage = engine.stage(&format!("band{suffix}"), self.inside.set().len() as u64);
+        let band = make_band(&stage, engine, &self.distance, &self.inside, self.reaches)?;
+        stage.finish();
+        Ok(band)
+    }
+}

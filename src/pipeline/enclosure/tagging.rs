@@ -1,0 +1,285 @@
+//! Tagging: what the cloud encloses, found by the bottleneck flood (docs/algorithms.md, "Bottleneck flood").
+//!
+//! One flood gives the answer for every threshold at once. Bricks far from the cloud are not stored: all their
+//! voxels lie at the same (largest) distance, so a connected region of them has one flood value.
+
+use super::far_regions::FarRegions;
+use crate::error::Result;
+use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
+use crate::grid::{BrickSet, FACES, Face, Slot};
+use crate::kernel::level_set::initial::basins;
+use crate::kernel::level_set::initial::basins::Piece;
+use crate::kernel::level_set::initial::flood;
+use crate::kernel::level_set::initial::persistence::Joins;
+use crate::pipeline::distance::Sources;
+use crate::store::BrickArray;
+use crate::tile::HaloTile;
+
+/// A space that the cloud encloses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Basin {
+    /// Number of its voxels; of the flood's basins those deeper than the saddle.
+    pub voxels: u64,
+    /// The largest distance to the cloud in it.
+    pub depth: f32,
+    /// The threshold at which the flood enters: half the width of the cloud's largest hole.
+    pub saddle: f32,
+    /// Where the flood enters, a voxel of the grid.
+    pub place: [i64; 3],
+}
+
+/// The flood and what it found.
+pub struct Tagging {
+    /// For each voxel the largest threshold at which the flood reaches it.
+    pub level: BrickArray<f32>,
+    /// The basins that persist, deepest first.
+    pub basins: Vec<Basin>,
+}
+
+impl Tagging {
+    /// 1 where the flood at a threshold does not reach, 0 elsewhere.
+    ///
+    /// # Errors
+    /// When scratch runs out or the run is interrupted.
+    pub fn inside(&self, stage: &Stage<'_>, engine: &Engine, beta: f32) -> Result<BrickArray<u8>> {
+        let set = self.level.set();
+        let mut inside = BrickArray::with_faces(engine.scratch(), set)?;
+        for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
+            inside.set_absent(id, u8::from(self.level.absent(id) < beta));
+        }
+        stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+            self.level.read(slot, |level| {
+                inside.write(slot, |inside| flood::beyond(level, beta, inside));
+            });
+            inside.refresh_faces(slot);
+            Ok(())
+        })?;
+        Ok(inside)
+    }
+}
+
+/// Floods the grid from its border and finds the basins that are so many times as deep as their saddle.
+///
+/// # Errors
+/// When scratch runs out or the run is interrupted.
+pub fn tag(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    sources: &Sources<'_>,
+    distance: &BrickArray<f32>,
+    ratio: f32,
+) -> Result<Tagging> {
+    let mut far = FarRegions::new(distance.set(), distance.absent(0));
+    let level = flood_all(stage, engine, distance, &mut far)?;
+    let (mut basins, pieces) = find_basins(stage, engine, [distance, &level], &far, ratio)?;
+    locate_saddles(stage, sources, [distance, &level], &pieces, &mut basins)?;
+    basins.sort_by(|a, b| b.depth.total_cmp(&a.depth).then(b.voxels.cmp(&a.voxels)));
+    Ok(Tagging { level, basins })
+}
+
+/// For each voxel the largest threshold at which the flood reaches it.
+///
+/// # Errors
+/// When scratch runs out or the run is interrupted.
+pub fn level_of(stage: &Stage<'_>, engine: &Engine, distance: &BrickArray<f32>) -> Result<BrickArray<f32>> {
+    flood_all(stage, engine, distance, &mut FarRegions::new(distance.set(), distance.absent(0)))
+}
+
+/// Relaxes bricks in rounds until nothing rises: even ones, then odd ones, only those beside a change.
+fn flood_all(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    distance: &BrickArray<f32>,
+    far: &mut FarRegions,
+) -> Result<BrickArray<f32>> {
+    let set = distance.set().clone();
+    let mut level = BrickArray::with_faces(engine.scratch(), &set)?;
+    for (region, bricks) in far.bricks.iter().enumerate() {
+        for &id in bricks {
+            level.set_absent(id, far.level[region]);
+        }
+    }
+    let plan = HaloPlan::new(*set.grid(), Reach::Faces);
+    let edge = set.grid().edge() as usize;
+    let workers = Workers::new(move || HaloTile::new(edge));
+    let mut dirty = vec![true; set.len()];
+    let mut rounds = 0;
+    while dirty.iter().any(|&d| d) {
+        let due = checkerboard(&set, |slot| dirty[slot as usize]);
+        for wave in due {
+            for &slot in &wave {
+                dirty[slot as usize] = false;
+            }
+            let risen = stage.run(&wave, &workers, |tile, &slot| {
+                plan.gather(&level, slot, Boundary::Constant(f32::INFINITY), tile);
+                let rose = distance.read(slot, |d| flood::relax(tile, d));
+                if rose {
+                    plan.scatter(tile, &level, slot);
+                }
+                Ok(rose)
+            })?;
+            for (&slot, _) in wave.iter().zip(&risen).filter(|(_, rose)| **rose) {
+                wake_neighbours(&set, slot, &mut level, far, &mut dirty);
+            }
+        }
+        rounds += 1;
+    }
+    stage.iterated(rounds, 0.0);
+    Ok(level)
+}
+
+/// Marks the bricks beside a changed one; a far region that rises wakes every brick around it.
+fn wake_neighbours(set: &BrickSet, slot: Slot, level: &mut BrickArray<f32>, far: &mut FarRegions, dirty: &mut [bool]) {
+    for face in FACES {
+        let Some(id) = set.grid().neighbour(set.id(slot), face.offset()) else { continue };
+        if let Some(neighbour) = set.slot(id) {
+            dirty[neighbour as usize] = true;
+            continue;
+        }
+        let highest = level.read_face(slot, face, flood::highest);
+        let Some((bricks, raised)) = far.raise(id, highest) else { continue };
+        for &far_brick in bricks {
+            level.set_absent(far_brick, raised);
+            for face in FACES {
+                if let Some(woken) = set.grid().neighbour(far_brick, face.offset()).and_then(|n| set.slot(n)) {
+                    dirty[woken as usize] = true;
+                }
+            }
+        }
+    }
+}
+
+/// Labels the basins in each brick, joins the pieces across faces and far regions, keeps those that persist.
+fn find_basins(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    [distance, level]: [&BrickArray<f32>; 2],
+    far: &FarRegions,
+    ratio: f32,
+) -> Result<(Vec<Basin>, Pieces)> {
+    let set = distance.set();
+    let labels: BrickArray<u16> = BrickArray::with_faces(engine.scratch(), set)?;
+    let edge = set.grid().edge() as usize;
+    let found = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+        let valid = set.grid().brick_box(set.id(slot)).shape().map(|n| n as usize);
+        let pieces =
+            distance.read(slot, |d| level.read(slot, |b| labels.write(slot, |l| basins::label(d, b, edge, valid, l))));
+        labels.refresh_faces(slot);
+        Ok(pieces)
+    })?;
+    let first: Vec<u32> = found
+        .iter()
+        .scan(0u32, |next, pieces| {
+            let at = *next;
+            *next += pieces.len() as u32;
+            Some(at)
+        })
+        .collect();
+    let mut pieces: Vec<Piece> = found.into_iter().flatten().collect();
+    let far_first = pieces.len() as u32;
+    let brick_len = set.grid().brick_len() as u64;
+    pieces.extend(far.bricks.iter().zip(&far.level).map(|(bricks, &saddle)| Piece {
+        // A far region at the flood's own level is exterior: depth 0 keeps it out.
+        voxels: bricks.len() as u64 * brick_len,
+        depth: if saddle < far.farthest { far.farthest } else { 0.0 },
+        saddle,
+    }));
+    let mut joins = Joins::new(pieces);
+    join_bricks(&mut joins, &labels, &first, far, far_first);
+    let (whole, basin) = joins.persisting(ratio);
+    let found = |p: &Piece| Basin { voxels: p.voxels, depth: p.depth, saddle: p.saddle, place: [0; 3] };
+    let far = (0..set.grid().len()).map(|id| far_first.wrapping_add(far.region[id as usize])).collect();
+    Ok((whole.iter().map(found).collect(), Pieces { labels, first, far, basin }))
+}
+
+/// Joins the pieces of neighbouring bricks, and those beside a far region with it, where that is a basin.
+fn join_bricks(joins: &mut Joins, labels: &BrickArray<u16>, first: &[u32], far: &FarRegions, far_first: u32) {
+    let set = labels.set();
+    for slot in 0..set.len() as Slot {
+        let here = first[slot as usize];
+        for face in FACES {
+            let Some(id) = set.grid().neighbour(set.id(slot), face.offset()) else { continue };
+            match set.slot(id) {
+                // Faces between stored bricks are seen from below, once.
+                Some(other) if face.upper => labels.read_face(slot, face, |mine| {
+                    labels.read_face(other, face.opposite(), |theirs| {
+                        joins.across([mine, theirs], [here, first[other as usize]]);
+                    });
+                }),
+                Some(_) => {}
+                None => {
+                    let region = far.region[id as usize];
+                    if far.level[region as usize] < far.farthest {
+                        labels.read_face(slot, face, |mine| joins.beyond(mine, here, far_first + region));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The labelled pieces and the basins they belong to.
+struct Pieces {
+    /// Labels within each brick, from 1 on; 0 is no piece.
+    labels: BrickArray<u16>,
+    /// The piece that label 1 of each slot stands for.
+    first: Vec<u32>,
+    /// The piece that each brick which is not stored belongs to; meaningless for stored ones.
+    far: Vec<u32>,
+    /// The basin of each piece, where it persists.
+    basin: Vec<Option<u32>>,
+}
+
+impl Pieces {
+    /// The basin that a label of a slot's brick belongs to.
+    fn basin(&self, slot: Slot, label: u16) -> Option<u32> {
+        (label != 0).then(|| self.basin[(self.first[slot as usize] + u32::from(label) - 1) as usize]).flatten()
+    }
+
+    /// The basin beyond a face of a slot's brick, beside a ghost with the given label.
+    fn basin_beyond(&self, slot: Slot, face: Face, label: u16) -> Option<u32> {
+        let set = self.labels.set();
+        let id = set.grid().neighbour(set.id(slot), face.offset())?;
+        match set.slot(id) {
+            Some(neighbour) => self.basin(neighbour, label),
+            None => self.basin[self.far[id as usize] as usize],
+        }
+    }
+}
+
+/// Finds where the flood enters each basin: the first voxel in grid order that lies beside it and has the saddle's
+/// value both in d and in b. The value alone would not do: equal objects have equal saddles.
+fn locate_saddles(
+    stage: &Stage<'_>,
+    sources: &Sources<'_>,
+    [distance, level]: [&BrickArray<f32>; 2],
+    pieces: &Pieces,
+    basins: &mut [Basin],
+) -> Result<()> {
+    let set = distance.set();
+    let plan = HaloPlan::new(*set.grid(), Reach::Faces);
+    let edge = set.grid().edge() as usize;
+    let saddles: Vec<f32> = basins.iter().map(|b| b.saddle).collect();
+    let found = stage.run(&one_wave(set), &Workers::new(move || HaloTile::new(edge)), |labels, &slot| {
+        if saddles.is_empty() {
+            return Ok(Vec::new());
+        }
+        plan.gather(&pieces.labels, slot, Boundary::Constant(0), labels);
+        let basin = |beyond: Option<Face>, label| match beyond {
+            None => pieces.basin(slot, label),
+            Some(face) => pieces.basin_beyond(slot, face, label),
+        };
+        let entries = distance.read(slot, |d| level.read(slot, |b| basins::entries(labels, d, b, &saddles, basin)));
+        let lo = set.grid().brick_box(set.id(slot)).lo;
+        let placed = |(name, at): (u32, [usize; 3])| (name, std::array::from_fn(|a| lo[a] + at[a] as i64));
+        Ok(entries.into_iter().map(placed).collect::<Vec<(u32, [i64; 3])>>())
+    })?;
+    let order = |v: &[i64; 3]| sources.geometry.domain().offset_of(*v);
+    for (n, basin) in basins.iter_mut().enumerate() {
+        let places = found.iter().flatten().filter(|(name, _)| *name == n as u32);
+        if let Some(place) = places.map(|(_, place)| *place).min_by_key(order) {
+            basin.place = place;
+        }
+    }
+    Ok(())
+}

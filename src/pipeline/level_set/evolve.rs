@@ -1,0 +1,394 @@
+//! The time loop of the level set over the cells of the band (docs/algorithms.md, "Time loop").
+//!
+//! A step assembles the scheme of each cell from the old values and relaxes it, from where the last two steps point to;
+//! cells of even and odd parity take turns, and those that needed corrections, or stand beside one that did, are taken
+//! up again until the corrections are small. A scheme is made again at each visit: most cells are visited once a step,
+//! and writing it to memory and reading it back would cost as much.
+
+use super::band::{Band, read_mask};
+use crate::error::Result;
+use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Stage, Workers, checkerboard};
+use crate::grid::{BrickSet, FACES, Slot};
+use crate::kernel::level_set::cell::{CELL, CELL_LEN, GROWN_LEN};
+use crate::kernel::level_set::scheme::border::Border;
+use crate::kernel::level_set::scheme::covolume::{Planes, assemble};
+use crate::kernel::level_set::scheme::mask::CellMask;
+use crate::kernel::level_set::scheme::sor::{CellSums, Halves, Relaxation, extrapolate, motion, relax};
+use crate::kernel::level_set::scheme::system::SCHEME_LEN;
+use crate::kernel::level_set::scheme::velocity::{Fields, Velocity};
+use crate::store::BrickArray;
+use crate::tile::HaloTile;
+
+/// When the time loop ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stop {
+    /// When the surface moves slower than this (its mean motion per unit of time).
+    Surface(f64),
+    /// When the discrete L2 norm of a step's change falls under this (Kósa 2015).
+    L2(f64),
+}
+
+/// Settings of the time loop and its linear solver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeLoop {
+    /// What moves the surface.
+    pub velocity: Velocity,
+    /// When to stop.
+    pub stop: Stop,
+    /// Steps after which to stop in any case.
+    pub max_steps: u32,
+    /// Over-relaxation.
+    pub omega: f32,
+    /// A step is solved when no cell was left with corrections above this (root mean square), what those beside it
+    /// passed on since counted in.
+    pub solver_tolerance: f64,
+}
+
+/// How the time loop ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evolution {
+    /// Steps taken.
+    pub steps: u32,
+    /// Relaxations of a cell, all steps together, mean over the cells.
+    pub sor_iterations: u64,
+    /// Which rule ended it.
+    pub stopped_by: &'static str,
+    /// What the rule looked at when it ended.
+    pub residual: f64,
+}
+
+/// Relaxations of a cell each time it is taken up: enough to shrink its corrections about tenfold.
+const LOCAL_ITERATIONS: usize = 4;
+/// Visits of a cell in one step at most; only steps far longer than a spacing need more than a few.
+const MAX_VISITS: usize = 1000;
+
+/// Rounds of a step after which nothing is over-relaxed any more. Over-relaxation converges for most systems, but not
+/// for all that are unsymmetric: without curvature, in steps of many spacings, it can go round in circles. Gauss-Seidel
+/// relaxation always ends at the solution, for the matrix is an M-matrix.
+const OVER_RELAXED_ROUNDS: usize = 50;
+
+/// The weight with which a ghost enters the voxel beside it: its coefficient over the diagonal, for steps of up to a
+/// spacing.
+const GHOST_WEIGHT: f64 = 0.5;
+
+struct Worker {
+    u: HaloTile<f32>,
+    older: HaloTile<f32>,
+    border: Border,
+    mask: CellMask,
+    planes: Planes,
+    halves: Halves,
+    scheme: Vec<f32>,
+    /// Distance and edges, where there is no room to keep them.
+    passing: Vec<f32>,
+}
+
+impl Worker {
+    fn new() -> Self {
+        let tile = || HaloTile::new(CELL);
+        Self {
+            u: tile(),
+            older: tile(),
+            border: Border::new(),
+            mask: CellMask::new(),
+            planes: Planes::new(),
+            halves: Halves::new(),
+            scheme: vec![0.0; SCHEME_LEN],
+            passing: vec![0.0; FIXED_LEN],
+        }
+    }
+}
+
+/// What one visit of a cell tells.
+#[derive(Clone, Copy, Debug, Default)]
+struct Visit {
+    sums: CellSums,
+    gradient: f64,
+    /// Solved voxels.
+    count: u32,
+    /// Sum of squares of the last corrections.
+    left: f64,
+    /// Roots of the sums of squared changes beside the six faces.
+    border: [f64; 6],
+}
+
+/// Which cell is taken up when.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    slot: Slot,
+    round: usize,
+    colour: usize,
+}
+
+/// The order of the cells, made once.
+struct Cells {
+    /// Cells of even and of odd parity.
+    colours: [Vec<Slot>; 2],
+    /// The cells across the six faces of each; `Slot::MAX` where there is none.
+    beside: Vec<[Slot; 6]>,
+}
+
+impl Cells {
+    fn new(set: &BrickSet) -> Self {
+        let across = |slot| FACES.map(|face| set.neighbour(slot, face.offset()).unwrap_or(Slot::MAX));
+        Self { colours: checkerboard(set, |_| true), beside: (0..set.len() as Slot).map(across).collect() }
+    }
+}
+
+struct Solver<'a> {
+    engine: &'a Engine,
+    stage: &'a Stage<'a>,
+    band: &'a Band,
+    /// Where the next time level goes.
+    next: &'a BrickArray<f32>,
+    edges: Option<&'a BrickArray<f32>>,
+    settings: &'a TimeLoop,
+    spacing: [f64; 3],
+    all: &'a HaloPlan,
+    faces: &'a HaloPlan,
+    /// What is kept of the cells, where the window has room for it; else it is made again at each visit.
+    kept: Option<&'a BrickArray<f32>>,
+    /// True in the first step, which fills the fixed part of what is kept.
+    first: bool,
+    workers: &'a Workers<Worker>,
+    cells: &'a Cells,
+    exchange: &'a Exchange<'a>,
+}
+
+/// Moves the surface until it rests. The result is in `band.u`.
+///
+/// # Errors
+/// When the run is interrupted.
+pub fn evolve(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    band: &mut Band,
+    edges: Option<&BrickArray<f32>>,
+    spacing: [f64; 3],
+    settings: &TimeLoop,
+) -> Result<Evolution> {
+    let grid = *band.solved.set().grid();
+    let mut done = Evolution { steps: 0, sor_iterations: 0, stopped_by: "max-steps", residual: f64::INFINITY };
+    let [all, faces] = &[HaloPlan::new(grid, Reach::All), HaloPlan::new(grid, Reach::Faces)];
+    let workers = &Workers::new(Worker::new);
+    let kept = room_to_keep(engine, band)?;
+    let cells = &Cells::new(band.solved.set());
+    let exchange = &Exchange::new(engine.comm(), band.solved.set(), all)?;
+    let mut cell_iterations = 0;
+    let owned = crate::exec::one_wave(band.solved.set());
+    exchange.faces(&band.distance, &owned)?;
+    exchange.faces(&band.u, &owned)?;
+    let mut next = second_level(stage, engine, &band.u)?;
+    exchange.faces(&next, &owned)?;
+    while done.steps < settings.max_steps {
+        let (kept, first) = (kept.as_ref(), done.steps == 0);
+        let solver = Solver {
+            engine,
+            stage,
+            band,
+            next: &next,
+            edges,
+            settings,
+            spacing,
+            all,
+            faces,
+            kept,
+            first,
+            workers,
+            cells,
+            exchange,
+        };
+        let (step, visits) = solver.step()?;
+        std::mem::swap(&mut band.u, &mut next);
+        done.steps += 1;
+        cell_iterations += visits * LOCAL_ITERATIONS as u64;
+        let (residual, limit, name) = match settings.stop {
+            Stop::Surface(limit) => (step.speed, limit, "surface"),
+            Stop::L2(limit) => (step.l2, limit, "l2"),
+        };
+        done.residual = residual;
+        if residual < limit {
+            done.stopped_by = name;
+            break;
+        }
+    }
+    // Cells are relaxed as often as they need: reported is the mean over all of them.
+    let sums = [cell_iterations as f64, owned.len() as f64].map(|count| engine.comm().sum(&[count]));
+    let [iterations, cells] = sums;
+    done.sor_iterations = (iterations? / cells?.max(1.0)).ceil() as u64;
+    stage.iterated(done.sor_iterations, done.residual);
+    Ok(done)
+}
+
+/// What is kept of a cell: its distance and its edges with their halos, which never change.
+const FIXED_LEN: usize = 2 * GROWN_LEN;
+pub(crate) const KEPT_LAYERS: usize = FIXED_LEN.div_ceil(CELL_LEN);
+
+/// Bricks to keep all cells' distance and edges in, halos included, if they and the band fit the window together:
+/// streaming them through the disk would cost more than gathering them again, which gives the same bits.
+fn room_to_keep(engine: &Engine, band: &Band) -> Result<Option<BrickArray<f32>>> {
+    // Of every voxel: two time levels, distance and edges with their faces, flags.
+    const BAND_BYTES: u64 = 4 * (4 + 2) + 1;
+    let set = band.solved.set();
+    let voxels = set.len() as u64 * set.grid().brick_len() as u64;
+    let need = voxels * (BAND_BYTES + 4 * KEPT_LAYERS as u64);
+    if need > engine.scratch().window() {
+        return Ok(None);
+    }
+    BrickArray::with_layers(engine.scratch(), set, KEPT_LAYERS).map(Some)
+}
+
+/// A second time level, equal to the start: cells without a solved voxel never change.
+fn second_level(stage: &Stage<'_>, engine: &Engine, u: &BrickArray<f32>) -> Result<BrickArray<f32>> {
+    let set = u.set();
+    let mut next = BrickArray::with_faces(engine.scratch(), set)?;
+    for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
+        next.set_absent(id, u.absent(id));
+    }
+    stage.run(&crate::exec::one_wave(set), &Workers::none(), |(), &slot| {
+        u.read(slot, |from| next.write(slot, |to| to.copy_from_slice(from)));
+        next.refresh_faces(slot);
+        Ok(())
+    })?;
+    Ok(next)
+}
+
+/// What a time step did to the surface.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    /// Mean motion per unit of time.
+    speed: f64,
+    /// Discrete L2 norm of the change.
+    l2: f64,
+}
+
+impl Solver<'_> {
+    /// One time step from `band.u` to `next`; returns its motion and the number of visits.
+    ///
+    /// All cells are taken up once; then again those that were left unsolved or whose neighbours were stirred since.
+    fn step(&self) -> Result<(Step, u64)> {
+        let set = self.band.solved.set();
+        let mut visits = vec![Visit::default(); set.len()];
+        // Beside each face of a cell what moved there since the cell was visited.
+        let mut unknown = vec![[0.0; 6]; set.len()];
+        let mut visited = 0;
+        for round in 0..MAX_VISITS {
+            let mut resting = true;
+            for (colour, cells) in self.cells.colours.iter().enumerate() {
+                let due = |slot: &Slot| round == 0 || self.is_due(&visits, &unknown, *slot);
+                let wave: Vec<Slot> = cells.iter().copied().filter(due).collect();
+                let results =
+                    self.stage.run(&wave, self.workers, |worker, &slot| Ok(self.visit(worker, slot, round, colour)))?;
+                self.exchange.faces(self.next, &wave)?;
+                let borders = wave.iter().copied().zip(results.iter().map(|visit| visit.border));
+                let told = self.exchange.of_faces(borders.clone())?;
+                for (slot, border) in borders.chain(told) {
+                    unknown[slot as usize] = [0.0; 6];
+                    for (face, &beside) in FACES.iter().zip(&self.cells.beside[slot as usize]) {
+                        if beside != Slot::MAX {
+                            unknown[beside as usize][face.opposite().index()] += border[face.index()];
+                        }
+                    }
+                }
+                for (&slot, visit) in wave.iter().zip(results) {
+                    visits[slot as usize] = visit;
+                }
+                visited += wave.len() as u64;
+                resting &= wave.is_empty();
+            }
+            if !self.engine.comm().any(!resting)? {
+                break;
+            }
+        }
+        let volume: f64 = self.spacing.iter().product();
+        let area = self.sum(&visits, |v| v.gradient)? * volume;
+        let swept = self.sum(&visits, |v| v.sums.moved)? * volume;
+        let l2 = (self.sum(&visits, |v| v.sums.moved_squared)? * volume).sqrt();
+        let speed = swept / (area * f64::from(self.settings.velocity.tau)).max(f64::MIN_POSITIVE);
+        Ok((Step { speed, l2 }, visited))
+    }
+
+    /// True when the corrections that a cell was left with, and those for what moved beside it since, which is unknown
+    /// to it, may exceed the tolerance (root mean square).
+    fn is_due(&self, visits: &[Visit], unknown: &[[f64; 6]], slot: Slot) -> bool {
+        let here = &visits[slot as usize];
+        let corrections = here.left.sqrt() + GHOST_WEIGHT * unknown[slot as usize].iter().sum::<f64>();
+        corrections > self.settings.solver_tolerance * f64::from(here.count).sqrt()
+    }
+
+    /// Sums over cells in grid order.
+    fn sum(&self, visits: &[Visit], of: impl Fn(&Visit) -> f64) -> Result<f64> {
+        let owned = self.band.solved.set().owned();
+        let partial: Vec<f64> = visits[owned.start as usize..owned.end as usize].iter().map(of).collect();
+        self.engine.comm().sum(&partial)
+    }
+
+    /// Takes up a cell: makes its scheme, relaxes it, writes it back.
+    fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) -> Visit {
+        let (old, new) = (&self.band.u, self.next);
+        read_mask(&self.band.solved, slot, &mut w.mask);
+        if w.mask.count == 0 {
+            return Visit::default();
+        }
+        let turn = Turn { slot, round, colour };
+        let (gradient, left) = match self.kept {
+            Some(kept) if self.first && round == 0 => kept.write(slot, |fixed| {
+                self.gather_fixed(&mut w.older, slot, fixed);
+                self.solve(w, turn, fixed)
+            }),
+            Some(kept) => kept.read(slot, |fixed| self.solve(w, turn, fixed)),
+            None => {
+                let mut passing = std::mem::take(&mut w.passing);
+                self.gather_fixed(&mut w.older, slot, &mut passing);
+                let done = self.solve(w, turn, &passing);
+                w.passing = passing;
+                done
+            }
+        };
+        self.faces.scatter(&w.u, new, slot);
+        Visit {
+            sums: old.read(slot, |old| motion(w.u.data(), old, &w.mask)),
+            gradient,
+            count: w.mask.count,
+            left,
+            border: w.border.moved(w.u.data()),
+        }
+    }
+
+    /// Makes a cell's scheme and relaxes the cell. Returns the sum of gradient norms and of the squares of the
+    /// last corrections.
+    fn solve(&self, w: &mut Worker, turn: Turn, fixed: &[f32]) -> (f64, f64) {
+        let Turn { slot, round, colour } = turn;
+        let (old, new) = (&self.band.u, self.next);
+        let (d, g) = fixed[..FIXED_LEN].split_at(GROWN_LEN);
+        self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
+        let fields = Fields { u: w.u.data(), d, g };
+        let gradient = assemble(fields, &w.mask, self.spacing, &self.settings.velocity, &mut w.planes, &mut w.scheme);
+        if round > 0 {
+            self.faces.gather(new, slot, Boundary::Mirror, &mut w.u);
+        } else {
+            // The new field still holds the values before the old ones, save where the first colour is done.
+            self.faces.gather(new, slot, Boundary::Mirror, &mut w.older);
+            extrapolate(w.u.data_mut(), w.older.data());
+            if colour == 1 {
+                self.faces.gather_halo(new, slot, Boundary::Mirror, &mut w.u);
+            }
+        }
+        let omega = if round < OVER_RELAXED_ROUNDS { self.settings.omega } else { self.settings.omega.min(1.0) };
+        let iterations = LOCAL_ITERATIONS;
+        let by = Relaxation { scheme: &w.scheme, mask: &w.mask, omega, iterations };
+        w.border.keep(w.u.data());
+        (gradient, relax(w.u.data_mut(), &mut w.halves, by).last)
+    }
+
+    /// Reads distance and edges with the halo across the faces: what the forces are made of.
+    fn gather_fixed(&self, tile: &mut HaloTile<f32>, slot: Slot, fixed: &mut [f32]) {
+        let (d, g) = fixed[..FIXED_LEN].split_at_mut(GROWN_LEN);
+        self.faces.gather(&self.band.distance, slot, Boundary::Mirror, tile);
+        d.copy_from_slice(tile.data());
+        if let Some(edges) = self.edges {
+            self.faces.gather(edges, slot, Boundary::Mirror, tile);
+            g.copy_from_slice(tile.data());
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! The level set over the cells of a band: its start, its time loop, what moves it.
+
+pub mod band;
+pub mod evolve;
+pub mod motion;
+pub(crate) mod ranks;

@@ -1,0 +1,46 @@
+//! The time loop on several ranks: each takes its share of the band's cells, and what they solved is put together.
+
+use std::sync::Arc;
+
+use super::band::Band;
+use super::evolve::{Evolution, TimeLoop, evolve};
+use crate::error::{Error, Result};
+use crate::exec::{Engine, HaloPlan, Ownership, Reach, Stage};
+
+/// Moves the surface until it rests, on all ranks of the stage's engine, each with its own cells; no image pulls at it.
+/// The result is in `band.u`.
+///
+/// # Errors
+/// When scratch runs out, the run is interrupted or a rank ends early.
+pub(crate) fn evolve_on_ranks(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    band: &mut Band,
+    spacing: [f64; 3],
+    settings: &TimeLoop,
+) -> Result<Evolution> {
+    if stage.ranks() == 1 {
+        return evolve(stage, engine, band, None, spacing, settings);
+    }
+    let set = band.solved.set().clone();
+    let ownership = Ownership::balanced(&set, stage.ranks());
+    let plan = HaloPlan::new(*set.grid(), Reach::All);
+    let whole = &*band;
+    let parts = stage.on_ranks(|stage, engine| {
+        let own = Arc::new(ownership.part(&set, engine.comm().rank(), &plan));
+        let mut part = whole.part(engine, &own)?;
+        let done = evolve(stage, engine, &mut part, None, spacing, settings)?;
+        Ok((part.u, done))
+    })?;
+    let mut last = None;
+    for (u, done) in parts {
+        for slot in u.set().owned() {
+            if let Some(to) = set.slot(u.set().id(slot)) {
+                u.read(slot, |from| band.u.write(to, |to| to.copy_from_slice(from)));
+                band.u.refresh_faces(to);
+            }
+        }
+        last = Some(done);
+    }
+    last.ok_or_else(|| Error::failed("no rank has solved the level set"))
+}

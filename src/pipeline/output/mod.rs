@@ -1,0 +1,3 @@
+//! Fields on their way into the store.
+
+pub mod pyramid;

@@ -1,0 +1,4 @@
+//! Do the marks fit the image, and may they be meant otherwise?
+
+pub(crate) mod doubts;
+pub(crate) mod lengths;
