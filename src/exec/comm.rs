@@ -8,8 +8,8 @@ use crate::error::Result;
 
 /// The ranks of a run.
 ///
-/// A kind of ranks is [`Comm::exchange`]; what all ranks agree on is made of it, and may be replaced where there is
-/// something better.
+/// A kind of ranks is [`Comm::post`] and [`Comm::collect`]; what all ranks agree on is made of them, and may be replaced
+/// where there is something better.
 pub trait Comm: Send + Sync {
     /// This rank's number, from 0.
     fn rank(&self) -> usize;
@@ -17,12 +17,28 @@ pub trait Comm: Send + Sync {
     /// Number of ranks.
     fn ranks(&self) -> usize;
 
-    /// Sends to each rank of `with` the message at the same place, and returns the message that it sends here. Each of
-    /// them must call this too, naming this rank; messages of one rank arrive in the order in which it sent them.
+    /// Sends to each rank of `with` the message at the same place, without waiting for it to be taken. Each of them must
+    /// post too, naming this rank, and [`Comm::collect`] follows before the next post; messages of one rank arrive in the
+    /// order in which it sent them.
     ///
     /// # Errors
     /// When another rank is gone.
-    fn exchange(&self, with: &[usize], messages: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>>;
+    fn post(&self, with: &[usize], messages: Vec<Vec<u8>>) -> Result<()>;
+
+    /// Waits for the messages that the ranks of `with` posted to this one, and returns them in the order of `with`.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    fn collect(&self, with: &[usize]) -> Result<Vec<Vec<u8>>>;
+
+    /// Posts and collects at once.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    fn exchange(&self, with: &[usize], messages: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
+        self.post(with, messages)?;
+        self.collect(with)
+    }
 
     /// What all ranks give, in order of their numbers.
     ///
@@ -80,8 +96,12 @@ impl Comm for SelfComm {
         1
     }
 
-    fn exchange(&self, with: &[usize], _messages: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
+    fn post(&self, with: &[usize], _messages: Vec<Vec<u8>>) -> Result<()> {
         debug_assert!(with.is_empty(), "one rank has nobody to talk to");
+        Ok(())
+    }
+
+    fn collect(&self, _with: &[usize]) -> Result<Vec<Vec<u8>>> {
         Ok(Vec::new())
     }
 }

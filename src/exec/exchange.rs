@@ -1,10 +1,11 @@
 //! `Exchange`: what neighbouring ranks tell each other between waves: the faces of bricks that the other's halos read,
-//! and the values that enter the other's bricks. It knows who reads what; [`Comm`] carries it.
+//! and a note about each such brick. It knows who reads what; [`Comm`] carries it.
 //!
 //! ```text
-//! faces   | brick u64 | faces u8, a bit for each | edge^2 values for each of these |  brick ...
-//! values  | brick u64 | f64, or six of them |  brick ...                             little-endian, no padding
+//! brick u64 | f64 for each number of the note | faces u8, a bit for each | edge^2 values for each of these |  brick ...
 //! ```
+//!
+//! Little-endian, no padding.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,6 +17,11 @@ use crate::error::{Error, Result};
 use crate::grid::{BrickId, BrickSet, FACES, Slot};
 use crate::store::{BrickArray, Element};
 
+/// What is said of a brick beside its faces: some numbers, `[f64; N]`.
+pub trait Note: AsRef<[f64]> + AsMut<[f64]> + Default + Send {}
+
+impl<N: AsRef<[f64]> + AsMut<[f64]> + Default + Send> Note for N {}
+
 /// A rank's side of the exchange over one set of bricks.
 pub struct Exchange<'a> {
     comm: &'a dyn Comm,
@@ -24,8 +30,6 @@ pub struct Exchange<'a> {
     peers: Vec<usize>,
     /// Owned bricks that others read: by which peer (its place in `peers`), and which faces.
     readers: BTreeMap<Slot, BTreeMap<usize, u8>>,
-    /// Ghosts, each with the peer that owns it.
-    ghosts: Vec<(Slot, usize)>,
 }
 
 impl<'a> Exchange<'a> {
@@ -40,16 +44,21 @@ impl<'a> Exchange<'a> {
         peers.sort_unstable();
         peers.dedup();
         let peer = |ghost: Slot| peers.partition_point(|&rank| rank < owner(ghost));
-        let ghosts: Vec<(Slot, usize)> = set.ghosts().map(|ghost| (ghost, peer(ghost))).collect();
         let mut readers = BTreeMap::<Slot, BTreeMap<usize, u8>>::new();
-        for &(ghost, peer) in &ghosts {
+        for ghost in set.ghosts() {
             for (offset, face) in plan.reads() {
                 if let Some(slot) = set.neighbour(ghost, offset).filter(|slot| set.owned().contains(slot)) {
-                    *readers.entry(slot).or_default().entry(peer).or_default() |= 1 << face.index();
+                    *readers.entry(slot).or_default().entry(peer(ghost)).or_default() |= 1 << face.index();
                 }
             }
         }
-        Ok(Self { comm, set: set.clone(), peers, readers, ghosts })
+        Ok(Self { comm, set: set.clone(), peers, readers })
+    }
+
+    /// Whether another rank reads a brick of this one.
+    #[must_use]
+    pub fn is_read(&self, slot: Slot) -> bool {
+        self.readers.contains_key(&slot)
     }
 
     /// Tells the others the faces of this rank's `bricks`, and writes what they tell into the faces of ghosts. Returns
@@ -58,96 +67,68 @@ impl<'a> Exchange<'a> {
     /// # Errors
     /// When another rank is gone.
     pub fn faces<T: Element>(&self, array: &BrickArray<T>, bricks: &[Slot]) -> Result<Vec<Slot>> {
+        let written = bricks.iter().copied().filter(|&slot| array.unwritten(slot).is_none());
+        self.post(array, &written.map(|slot| (slot, [0.0; 0])).collect::<Vec<_>>())?;
+        Ok(self.collect::<T, [f64; 0]>(array)?.into_iter().map(|(slot, _)| slot).collect())
+    }
+
+    /// Sends the faces of this rank's bricks and a note about each to the ranks that read them, without waiting. All
+    /// ranks post, and [`Exchange::collect`] before they post again.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    pub fn post<T: Element, N: Note>(&self, array: &BrickArray<T>, bricks: &[(Slot, N)]) -> Result<()> {
         let mut messages = vec![Vec::new(); self.peers.len()];
-        for &slot in bricks.iter().filter(|&&slot| array.unwritten(slot).is_none()) {
-            for (&peer, &faces) in self.readers.get(&slot).into_iter().flatten() {
-                let message = &mut messages[peer];
-                message.extend_from_slice(&self.set.id(slot).to_le_bytes());
+        for (slot, note) in bricks {
+            let written = array.unwritten(*slot).is_none();
+            for (&peer, &faces) in self.readers.get(slot).into_iter().flatten() {
+                let (message, faces) = (&mut messages[peer], if written { faces } else { 0 });
+                message.extend_from_slice(&self.set.id(*slot).to_le_bytes());
+                note.as_ref().iter().for_each(|number| message.extend_from_slice(&number.to_le_bytes()));
                 message.push(faces);
                 for face in FACES.into_iter().filter(|face| faces >> face.index() & 1 == 1) {
-                    array.read_face(slot, face, |values| T::append_bytes(values, message));
+                    array.read_face(*slot, face, |values| T::append_bytes(values, message));
                 }
             }
         }
+        self.comm.post(&self.peers, messages)
+    }
+
+    /// Waits for what the other ranks posted: writes the faces of ghosts, and returns these with the notes about them.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    pub fn collect<T: Element, N: Note>(&self, array: &BrickArray<T>) -> Result<Vec<(Slot, N)>> {
         let mut received = Vec::new();
-        for message in self.comm.exchange(&self.peers, messages)? {
+        for message in self.comm.collect(&self.peers)? {
             let mut message = Message(&message);
             while !message.0.is_empty() {
-                received.push(self.take_faces(array, &mut message)?);
+                let ghost = self.slot(BrickId::from_le_bytes(message.word()?))?;
+                let mut note = N::default();
+                for number in note.as_mut() {
+                    *number = f64::from_le_bytes(message.word()?);
+                }
+                self.take_faces(array, ghost, &mut message)?;
+                received.push((ghost, note));
             }
         }
         Ok(received)
     }
 
     /// Writes the faces of one ghost brick.
-    fn take_faces<T: Element>(&self, array: &BrickArray<T>, message: &mut Message<'_>) -> Result<Slot> {
-        let ghost = self.slot(BrickId::from_le_bytes(message.word()?))?;
+    fn take_faces<T: Element>(&self, array: &BrickArray<T>, ghost: Slot, message: &mut Message<'_>) -> Result<()> {
         let [faces] = message.word()?;
         let area = (self.set.grid().edge() * self.set.grid().edge()) as usize;
         let told = message.take(faces.count_ones() as usize * area * size_of::<T>())?;
-        array.write_faces(ghost, |values| {
-            let sent = FACES.into_iter().filter(|face| faces >> face.index() & 1 == 1);
-            for (face, bytes) in sent.zip(told.chunks_exact(area * size_of::<T>())) {
-                T::fill_from_bytes(&mut values[face.index() * area..][..area], bytes);
-            }
-        });
-        Ok(ghost)
-    }
-
-    /// Lowers the values of this rank's bricks to what the others have for them, where that is less; `values` holds one
-    /// for each slot. What this rank has for ghosts is told to their owners and becomes infinite.
-    ///
-    /// # Errors
-    /// When another rank is gone.
-    pub fn lowest(&self, values: &mut [f64]) -> Result<()> {
-        let mut messages = vec![Vec::new(); self.peers.len()];
-        for &(ghost, peer) in &self.ghosts {
-            let value = std::mem::replace(&mut values[ghost as usize], f64::INFINITY);
-            if value < f64::INFINITY {
-                messages[peer].extend_from_slice(&self.set.id(ghost).to_le_bytes());
-                messages[peer].extend_from_slice(&value.to_le_bytes());
-            }
-        }
-        for message in self.comm.exchange(&self.peers, messages)? {
-            let mut message = Message(&message);
-            while !message.0.is_empty() {
-                let slot = self.slot(BrickId::from_le_bytes(message.word()?))?;
-                let told = f64::from_le_bytes(message.word()?);
-                let value = &mut values[slot as usize];
-                *value = value.min(told);
-            }
+        if faces != 0 {
+            array.write_faces(ghost, |values| {
+                let sent = FACES.into_iter().filter(|face| faces >> face.index() & 1 == 1);
+                for (face, bytes) in sent.zip(told.chunks_exact(area * size_of::<T>())) {
+                    T::fill_from_bytes(&mut values[face.index() * area..][..area], bytes);
+                }
+            });
         }
         Ok(())
-    }
-
-    /// Tells the others six values of each of this rank's `bricks`, one for each face; returns what they tell of
-    /// ghosts.
-    ///
-    /// # Errors
-    /// When another rank is gone.
-    pub fn of_faces(&self, bricks: impl Iterator<Item = (Slot, [f64; 6])>) -> Result<Vec<(Slot, [f64; 6])>> {
-        let mut messages = vec![Vec::new(); self.peers.len()];
-        for (slot, values) in bricks {
-            for &peer in self.readers.get(&slot).into_iter().flat_map(BTreeMap::keys) {
-                messages[peer].extend_from_slice(&self.set.id(slot).to_le_bytes());
-                for value in values {
-                    messages[peer].extend_from_slice(&value.to_le_bytes());
-                }
-            }
-        }
-        let mut told = Vec::new();
-        for message in self.comm.exchange(&self.peers, messages)? {
-            let mut message = Message(&message);
-            while !message.0.is_empty() {
-                let ghost = self.slot(BrickId::from_le_bytes(message.word()?))?;
-                let mut values = [0.0; 6];
-                for value in &mut values {
-                    *value = f64::from_le_bytes(message.word()?);
-                }
-                told.push((ghost, values));
-            }
-        }
-        Ok(told)
     }
 
     fn slot(&self, id: BrickId) -> Result<Slot> {
@@ -289,11 +270,10 @@ mod tests {
     }
 
     #[test]
-    fn the_lowest_value_of_a_brick_reaches_its_owner() {
+    fn notes_about_bricks_reach_those_who_read_them_and_nobody_else() {
+        let dir = tempfile::tempdir().unwrap();
         let grid = BrickGrid::new([3, 3, 4], 1);
         let plan = HaloPlan::new(grid, Reach::Faces);
-        // A brick's value at each rank that knows it.
-        let at = |rank: usize, id: BrickId| f64::from((id * 31 + rank as u64 * 17) as u32 % 23);
         for ranks in [1, 2, 3, 6] {
             on_ranks(
                 grid,
@@ -301,21 +281,17 @@ mod tests {
                 ranks,
                 &plan,
                 |comm, set| {
+                    let array = BrickArray::blank(&Scratch::new(dir.path(), 1 << 30), &set, 7_u32).unwrap();
                     let exchange = Exchange::new(comm, &set, &plan).unwrap();
-                    let mut values: Vec<f64> = set.ids().iter().map(|&id| at(comm.rank(), id)).collect();
-                    exchange.lowest(&mut values).unwrap();
-                    let whole = BrickSet::from_fn(grid, |id| id % 5 != 4);
-                    let ownership = Ownership::balanced(&whole, ranks);
-                    for slot in set.ghosts() {
-                        assert!(values[slot as usize].is_infinite());
-                    }
-                    for slot in set.owned() {
-                        let id = set.id(slot);
-                        let beside = plan.reads().filter_map(|(offset, _)| whole.neighbour(whole.slot(id)?, offset));
-                        let knowing = beside.map(|n| ownership.owner(whole.id(n))).chain([comm.rank()]);
-                        let expected = knowing.map(|rank| at(rank, id)).fold(f64::INFINITY, f64::min);
-                        assert_eq!(values[slot as usize], expected, "brick {id} of rank {} of {ranks}", comm.rank());
-                    }
+                    let odd = |slot: &Slot| set.id(*slot) % 2 == 1;
+                    let note = |slot: Slot| [set.id(slot) as f64, f64::INFINITY];
+                    let told: Vec<_> = set.owned().filter(odd).map(|slot| (slot, note(slot))).collect();
+                    exchange.post(&array, &told).unwrap();
+                    let mut heard = exchange.collect::<u32, [f64; 2]>(&array).unwrap();
+                    heard.sort_by_key(|(ghost, _)| *ghost);
+                    assert_eq!(heard, set.ghosts().filter(odd).map(|ghost| (ghost, note(ghost))).collect::<Vec<_>>());
+                    // Nothing was written, so no face was sent.
+                    assert!(set.ghosts().all(|ghost| array.unwritten(ghost) == Some(7)));
                 },
             );
         }
@@ -331,7 +307,10 @@ mod tests {
             fn ranks(&self) -> usize {
                 2
             }
-            fn exchange(&self, with: &[usize], _messages: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
+            fn post(&self, _with: &[usize], _messages: Vec<Vec<u8>>) -> Result<()> {
+                Ok(())
+            }
+            fn collect(&self, with: &[usize]) -> Result<Vec<Vec<u8>>> {
                 Ok(vec![self.0.clone(); with.len()])
             }
         }

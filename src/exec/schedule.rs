@@ -13,11 +13,20 @@ pub fn one_wave(set: &BrickSet) -> Vec<Slot> {
 
 /// Two waves, the bricks of even and of odd parity: no two bricks of a wave share a face.
 #[must_use]
-pub fn checkerboard(set: &BrickSet, keep: impl Fn(Slot) -> bool) -> [Vec<Slot>; 2] {
-    let mut waves = [Vec::new(), Vec::new()];
-    for slot in set.owned().filter(|&s| keep(s)) {
-        let parity = set.grid().coords(set.id(slot)).iter().sum::<i64>() & 1;
-        waves[parity as usize].push(slot);
+pub fn checkerboard(set: &BrickSet) -> Vec<Vec<Slot>> {
+    coloured(set, 2, |at| at.iter().sum::<i64>() & 1)
+}
+
+/// Eight waves by the parities of bricks along each axis: no two bricks of a wave share a face, an edge or a corner.
+#[must_use]
+pub fn corner_colours(set: &BrickSet) -> Vec<Vec<Slot>> {
+    coloured(set, 8, |at| at.iter().rev().fold(0, |colour, at| colour << 1 | (at & 1)))
+}
+
+fn coloured(set: &BrickSet, colours: usize, colour: impl Fn([i64; 3]) -> i64) -> Vec<Vec<Slot>> {
+    let mut waves = vec![Vec::new(); colours];
+    for slot in set.owned() {
+        waves[colour(set.grid().coords(set.id(slot))) as usize].push(slot);
     }
     waves
 }

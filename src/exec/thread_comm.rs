@@ -40,16 +40,20 @@ impl Comm for ThreadComm {
         self.to.len()
     }
 
-    /// Channels hold any number of messages: all are sent before the first is waited for, so no two ranks can wait for
-    /// each other. A rank that ends, for whatever reason, closes its channels, and whoever waits for it ends too.
-    fn exchange(&self, with: &[usize], messages: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>> {
-        let gone = |rank: usize| Error::failed(format!("rank {rank} ended before the work was done"));
-        for (&rank, message) in with.iter().zip(messages) {
-            self.to[rank].send(message).map_err(|_| gone(rank))?;
-        }
+    /// Channels hold any number of messages, so no two ranks can wait for each other. A rank that ends, for whatever
+    /// reason, closes its channels, and whoever waits for it ends too.
+    fn post(&self, with: &[usize], messages: Vec<Vec<u8>>) -> Result<()> {
+        with.iter().zip(messages).try_for_each(|(&rank, message)| self.to[rank].send(message).map_err(|_| gone(rank)))
+    }
+
+    fn collect(&self, with: &[usize]) -> Result<Vec<Vec<u8>>> {
         let receive = |rank: usize| self.from[rank].lock().unwrap_or_else(PoisonError::into_inner).recv();
         with.iter().map(|&rank| receive(rank).map_err(|_| gone(rank))).collect()
     }
+}
+
+fn gone(rank: usize) -> Error {
+    Error::failed(format!("rank {rank} ended before the work was done"))
 }
 
 #[cfg(test)]

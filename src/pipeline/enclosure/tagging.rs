@@ -5,8 +5,10 @@
 
 use super::far_regions::FarRegions;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
-use crate::grid::{BrickSet, FACES, Face, Slot};
+use crate::exec::{
+    Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, checkerboard, one_wave,
+};
+use crate::grid::{FACES, Face, Slot};
 use crate::kernel::level_set::initial::basins;
 use crate::kernel::level_set::initial::basins::Piece;
 use crate::kernel::level_set::initial::flood;
@@ -85,7 +87,7 @@ pub fn level_of(stage: &Stage<'_>, engine: &Engine, distance: &BrickArray<f32>) 
     flood_all(stage, engine, distance, &mut FarRegions::new(distance.set(), distance.absent(0)))
 }
 
-/// Relaxes bricks in rounds until nothing rises: even ones, then odd ones, only those beside a change.
+/// Relaxes bricks until nothing rises.
 fn flood_all(
     stage: &Stage<'_>,
     engine: &Engine,
@@ -100,50 +102,70 @@ fn flood_all(
         }
     }
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
+    let exchange = &Exchange::new(stage.comm(), &set, &plan)?;
     let edge = set.grid().edge() as usize;
-    let workers = Workers::new(move || HaloTile::new(edge));
-    let mut dirty = vec![true; set.len()];
-    let mut rounds = 0;
-    while dirty.iter().any(|&d| d) {
-        let due = checkerboard(&set, |slot| dirty[slot as usize]);
-        for wave in due {
-            for &slot in &wave {
-                dirty[slot as usize] = false;
-            }
-            let risen = stage.run(&wave, &workers, |tile, &slot| {
-                plan.gather(&level, slot, Boundary::Constant(f32::INFINITY), tile);
-                let rose = distance.read(slot, |d| flood::relax(tile, d));
-                if rose {
-                    plan.scatter(tile, &level, slot);
-                }
-                Ok(rose)
-            })?;
-            for (&slot, _) in wave.iter().zip(&risen).filter(|(_, rose)| **rose) {
-                wake_neighbours(&set, slot, &mut level, far, &mut dirty);
-            }
-        }
-        rounds += 1;
-    }
+    let workers = &Workers::new(move || HaloTile::new(edge));
+    let mut flood = Flood { distance, level, far, plan, dirty: vec![true; set.len()] };
+    let rounds = Waves { stage, exchange, workers, waves: &checkerboard(&set) }.relax(&mut flood, Until::QUIET)?;
     stage.iterated(rounds, 0.0);
-    Ok(level)
+    Ok(flood.level)
 }
 
-/// Marks the bricks beside a changed one; a far region that rises wakes every brick around it.
-fn wake_neighbours(set: &BrickSet, slot: Slot, level: &mut BrickArray<f32>, far: &mut FarRegions, dirty: &mut [bool]) {
-    for face in FACES {
-        let Some(id) = set.grid().neighbour(set.id(slot), face.offset()) else { continue };
-        if let Some(neighbour) = set.slot(id) {
-            dirty[neighbour as usize] = true;
-            continue;
+struct Flood<'a> {
+    distance: &'a BrickArray<f32>,
+    level: BrickArray<f32>,
+    far: &'a mut FarRegions,
+    plan: HaloPlan,
+    dirty: Vec<bool>,
+}
+
+impl Relax for Flood<'_> {
+    type State = f32;
+    type Work = HaloTile<f32>;
+    type Visit = bool;
+    type Note = [f64; 0];
+
+    fn field(&self) -> &BrickArray<f32> {
+        &self.level
+    }
+
+    fn priority(&self, slot: Slot) -> f64 {
+        if self.dirty[slot as usize] { 0.0 } else { f64::INFINITY }
+    }
+
+    fn visit(&self, tile: &mut HaloTile<f32>, slot: Slot, _wave: usize) -> Result<bool> {
+        self.plan.gather(&self.level, slot, Boundary::Constant(f32::INFINITY), tile);
+        let rose = self.distance.read(slot, |d| flood::relax(tile, d));
+        if rose {
+            self.plan.scatter(tile, &self.level, slot);
         }
-        let highest = level.read_face(slot, face, flood::highest);
-        let Some((bricks, raised)) = far.raise(id, highest) else { continue };
-        for &far_brick in bricks {
-            level.set_absent(far_brick, raised);
-            for face in FACES {
-                if let Some(woken) = set.grid().neighbour(far_brick, face.offset()).and_then(|n| set.slot(n)) {
-                    dirty[woken as usize] = true;
-                }
+        Ok(rose)
+    }
+
+    fn note(&self, _slot: Slot, rose: &bool) -> Option<[f64; 0]> {
+        rose.then_some([])
+    }
+
+    fn visited(&mut self, slot: Slot, _rose: bool) {
+        self.dirty[slot as usize] = false;
+    }
+
+    /// Marks the bricks beside one that rose; a far region that rises wakes every brick around it.
+    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+        let set = self.distance.set();
+        let grid = set.grid();
+        for face in FACES {
+            let Some(id) = grid.neighbour(set.id(slot), face.offset()) else { continue };
+            if let Some(neighbour) = set.slot(id) {
+                self.dirty[neighbour as usize] = true;
+                continue;
+            }
+            let highest = self.level.read_face(slot, face, flood::highest);
+            let Some((bricks, raised)) = self.far.raise(id, highest) else { continue };
+            for &far_brick in bricks {
+                self.level.set_absent(far_brick, raised);
+                let around = FACES.iter().filter_map(|face| grid.neighbour(far_brick, face.offset()));
+                around.filter_map(|id| set.slot(id)).for_each(|woken| self.dirty[woken as usize] = true);
             }
         }
     }

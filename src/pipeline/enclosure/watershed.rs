@@ -10,7 +10,9 @@ use std::sync::Arc;
 use super::far_regions::FarRegions;
 use super::tagging::Basin;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
+use crate::exec::{
+    Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, checkerboard, one_wave,
+};
 use crate::grid::{Box3, BrickId, BrickSet, FACES, Face, Slot};
 use crate::kernel::level_set::initial::ascent::{Ascent, OUTSIDE, renumber};
 use crate::kernel::level_set::initial::contacts::{Contact, contacts, count};
@@ -140,33 +142,13 @@ impl Watershed<'_> {
         Ok((of_voxel, regions))
     }
 
-    /// Carries regions down until every voxel has one: even bricks, then odd ones, only those beside a change.
+    /// Carries regions down until every voxel has one.
     fn descend(&self, of_voxel: &BrickArray<u32>) -> Result<()> {
-        let set = self.set();
-        let mut due = vec![true; set.len()];
-        let mut rounds = 0;
-        while due.iter().any(|&due| due) {
-            for wave in checkerboard(set, |slot| due[slot as usize]) {
-                for &slot in &wave {
-                    due[slot as usize] = false;
-                }
-                let changed = self.stage.run(&wave, &self.workers, |w, &slot| {
-                    self.gather_distance(slot, &mut w.d);
-                    self.plan.gather(of_voxel, slot, Boundary::Constant(OUTSIDE), &mut w.regions);
-                    let changed = w.ascent.descend(&w.d, self.spacing, &mut w.regions);
-                    if changed {
-                        self.plan.scatter(&w.regions, of_voxel, slot);
-                    }
-                    Ok(changed)
-                })?;
-                for (&slot, _) in wave.iter().zip(changed).filter(|(_, changed)| *changed) {
-                    let beside = FACES.into_iter().filter_map(|face| set.neighbour(slot, face.offset()));
-                    beside.for_each(|slot| due[slot as usize] = true);
-                }
-            }
-            rounds += 1;
-        }
-        self.stage.iterated(rounds, 0.0);
+        let (stage, set) = (self.stage, self.set());
+        let exchange = &Exchange::new(stage.comm(), set, &self.plan)?;
+        let waves = Waves { stage, exchange, workers: &self.workers, waves: &checkerboard(set) };
+        let mut descent = Descent { watershed: self, of_voxel, dirty: vec![true; set.len()] };
+        stage.iterated(waves.relax(&mut descent, Until::QUIET)?, 0.0);
         Ok(())
     }
 
@@ -204,6 +186,53 @@ impl Watershed<'_> {
             Ok(())
         })?;
         Ok(inside)
+    }
+}
+
+/// Regions on their way down the distance.
+struct Descent<'a> {
+    watershed: &'a Watershed<'a>,
+    of_voxel: &'a BrickArray<u32>,
+    dirty: Vec<bool>,
+}
+
+impl Relax for Descent<'_> {
+    type State = u32;
+    type Work = Worker;
+    type Visit = bool;
+    type Note = [f64; 0];
+
+    fn field(&self) -> &BrickArray<u32> {
+        self.of_voxel
+    }
+
+    fn priority(&self, slot: Slot) -> f64 {
+        if self.dirty[slot as usize] { 0.0 } else { f64::INFINITY }
+    }
+
+    fn visit(&self, w: &mut Worker, slot: Slot, _wave: usize) -> Result<bool> {
+        let Watershed { plan, spacing, .. } = self.watershed;
+        self.watershed.gather_distance(slot, &mut w.d);
+        plan.gather(self.of_voxel, slot, Boundary::Constant(OUTSIDE), &mut w.regions);
+        let changed = w.ascent.descend(&w.d, *spacing, &mut w.regions);
+        if changed {
+            plan.scatter(&w.regions, self.of_voxel, slot);
+        }
+        Ok(changed)
+    }
+
+    fn note(&self, _slot: Slot, changed: &bool) -> Option<[f64; 0]> {
+        changed.then_some([])
+    }
+
+    fn visited(&mut self, slot: Slot, _changed: bool) {
+        self.dirty[slot as usize] = false;
+    }
+
+    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+        let set = self.of_voxel.set();
+        let beside = FACES.into_iter().filter_map(|face| set.neighbour(slot, face.offset()));
+        beside.for_each(|slot| self.dirty[slot as usize] = true);
     }
 }
 

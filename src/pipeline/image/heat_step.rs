@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, checkerboard, one_wave};
+use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Waves, Workers, checkerboard, one_wave};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::image::filter::heat;
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
@@ -65,31 +65,70 @@ fn relax_heat(
     sigma: f64,
 ) -> Result<()> {
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
-    let workers = Workers::new(|| (HaloTile::new(CELL), Halves::new(), CellMask::new(), vec![0.0; SCHEME_LEN]));
-    let waves = checkerboard(set, |_| true);
-    let voxels = (set.len() * CELL_LEN) as f64;
+    let exchange = &Exchange::new(stage.comm(), set, &plan)?;
+    let workers = &Workers::new(|| (HaloTile::new(CELL), Halves::new(), CellMask::new(), vec![0.0; SCHEME_LEN]));
+    let waves = Waves { stage, exchange, workers, waves: &checkerboard(set) };
+    let voxels = stage.comm().sum(&[(set.owned().len() * CELL_LEN) as f64])?;
+    let mut heat = Heat { smoothed, initial, solved, spacing, sigma, plan, squares: vec![0.0; set.len()] };
     for _ in 0..HEAT_ROUNDS {
-        let mut squares = vec![0.0; set.len()];
-        for wave in &waves {
-            let corrections = stage.run(wave, &workers, |(tile, halves, mask, scheme), &slot| {
-                read_mask(solved, slot, mask);
-                close_to_absent(set, slot, mask);
-                initial.read(slot, |values| heat::scheme(values, mask, spacing, sigma, scheme));
-                plan.gather(smoothed, slot, Boundary::Mirror, tile);
-                let by = Relaxation { scheme, mask, omega: HEAT_OMEGA, iterations: HEAT_ITERATIONS };
-                let correction = relax(tile.data_mut(), halves, by);
-                plan.scatter(tile, smoothed, slot);
-                Ok(correction.first)
-            })?;
-            wave.iter().zip(corrections).for_each(|(&slot, c)| squares[slot as usize] = c);
-        }
-        let residual = (squares.iter().sum::<f64>() / voxels).sqrt();
+        waves.round(&mut heat, 0.0)?;
+        let owned = set.owned();
+        let squares = stage.comm().sum(&heat.squares[owned.start as usize..owned.end as usize])?;
+        let residual = (squares / voxels).sqrt();
         stage.iterated(HEAT_ITERATIONS as u64, residual);
         if residual < HEAT_TOLERANCE {
             break;
         }
     }
     Ok(())
+}
+
+struct Heat<'a> {
+    smoothed: &'a BrickArray<f32>,
+    initial: &'a BrickArray<f32>,
+    solved: &'a BrickArray<u8>,
+    spacing: [f64; 3],
+    sigma: f64,
+    plan: HaloPlan,
+    /// Of each cell the sum of the squared corrections when it was last taken up.
+    squares: Vec<f64>,
+}
+
+impl Relax for Heat<'_> {
+    type State = f32;
+    type Work = (HaloTile<f32>, Halves, CellMask, Vec<f32>);
+    type Visit = f64;
+    type Note = [f64; 0];
+
+    fn field(&self) -> &BrickArray<f32> {
+        self.smoothed
+    }
+
+    /// Every cell is taken up in every round.
+    fn priority(&self, _slot: Slot) -> f64 {
+        0.0
+    }
+
+    fn visit(&self, (tile, halves, mask, scheme): &mut Self::Work, slot: Slot, _wave: usize) -> Result<f64> {
+        read_mask(self.solved, slot, mask);
+        close_to_absent(self.smoothed.set(), slot, mask);
+        self.initial.read(slot, |values| heat::scheme(values, mask, self.spacing, self.sigma, scheme));
+        self.plan.gather(self.smoothed, slot, Boundary::Mirror, tile);
+        let by = Relaxation { scheme, mask, omega: HEAT_OMEGA, iterations: HEAT_ITERATIONS };
+        let correction = relax(tile.data_mut(), halves, by);
+        self.plan.scatter(tile, self.smoothed, slot);
+        Ok(correction.first)
+    }
+
+    fn note(&self, _slot: Slot, _visit: &f64) -> Option<[f64; 0]> {
+        Some([])
+    }
+
+    fn visited(&mut self, slot: Slot, squares: f64) {
+        self.squares[slot as usize] = squares;
+    }
+
+    fn told(&mut self, _slot: Slot, _note: &[f64; 0]) {}
 }
 
 /// No flux into cells that are not stored.

@@ -7,7 +7,7 @@
 
 use super::band::{Band, read_mask};
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Stage, Workers, checkerboard};
+use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Waves, Workers, checkerboard, one_wave};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN, GROWN_LEN};
 use crate::kernel::level_set::scheme::border::Border;
@@ -112,18 +112,17 @@ struct Visit {
     border: [f64; 6],
 }
 
-/// Which cell is taken up when.
+/// Which cell is taken up, and by cells of which colour: the second one's neighbours are done.
 #[derive(Clone, Copy, Debug)]
 struct Turn {
     slot: Slot,
-    round: usize,
     colour: usize,
 }
 
 /// The order of the cells, made once.
 struct Cells {
     /// Cells of even and of odd parity.
-    colours: [Vec<Slot>; 2],
+    colours: Vec<Vec<Slot>>,
     /// The cells across the six faces of each; `Slot::MAX` where there is none.
     beside: Vec<[Slot; 6]>,
 }
@@ -131,13 +130,13 @@ struct Cells {
 impl Cells {
     fn new(set: &BrickSet) -> Self {
         let across = |slot| FACES.map(|face| set.neighbour(slot, face.offset()).unwrap_or(Slot::MAX));
-        Self { colours: checkerboard(set, |_| true), beside: (0..set.len() as Slot).map(across).collect() }
+        Self { colours: checkerboard(set), beside: (0..set.len() as Slot).map(across).collect() }
     }
 }
 
+/// One time step from `band.u` to `next`.
 struct Solver<'a> {
     engine: &'a Engine,
-    stage: &'a Stage<'a>,
     band: &'a Band,
     /// Where the next time level goes.
     next: &'a BrickArray<f32>,
@@ -150,9 +149,14 @@ struct Solver<'a> {
     kept: Option<&'a BrickArray<f32>>,
     /// True in the first step, which fills the fixed part of what is kept.
     first: bool,
-    workers: &'a Workers<Worker>,
     cells: &'a Cells,
-    exchange: &'a Exchange<'a>,
+    round: usize,
+    /// The last visit of each cell in this step.
+    visits: Vec<Visit>,
+    /// Beside each face of a cell what moved there since the cell was visited.
+    unknown: Vec<[f64; 6]>,
+    /// How many visits there were.
+    visited: u64,
 }
 
 /// Moves the surface until it rests. The result is in `band.u`.
@@ -175,7 +179,8 @@ pub fn evolve(
     let cells = &Cells::new(band.solved.set());
     let exchange = &Exchange::new(engine.comm(), band.solved.set(), all)?;
     let mut cell_iterations = 0;
-    let owned = crate::exec::one_wave(band.solved.set());
+    let waves = Waves { stage, exchange, workers, waves: &cells.colours };
+    let owned = one_wave(band.solved.set());
     exchange.faces(&band.distance, &owned)?;
     exchange.faces(&band.u, &owned)?;
     let mut next = second_level(stage, engine, &band.u)?;
@@ -184,7 +189,6 @@ pub fn evolve(
         let (kept, first) = (kept.as_ref(), done.steps == 0);
         let solver = Solver {
             engine,
-            stage,
             band,
             next: &next,
             edges,
@@ -194,11 +198,13 @@ pub fn evolve(
             faces,
             kept,
             first,
-            workers,
             cells,
-            exchange,
+            round: 0,
+            visits: vec![Visit::default(); cells.beside.len()],
+            unknown: vec![[0.0; 6]; cells.beside.len()],
+            visited: 0,
         };
-        let (step, visits) = solver.step()?;
+        let (step, visits) = solver.step(&waves)?;
         std::mem::swap(&mut band.u, &mut next);
         done.steps += 1;
         cell_iterations += visits * LOCAL_ITERATIONS as u64;
@@ -245,7 +251,7 @@ fn second_level(stage: &Stage<'_>, engine: &Engine, u: &BrickArray<f32>) -> Resu
     for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
         next.set_absent(id, u.absent(id));
     }
-    stage.run(&crate::exec::one_wave(set), &Workers::none(), |(), &slot| {
+    stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
         u.read(slot, |from| next.write(slot, |to| to.copy_from_slice(from)));
         next.refresh_faces(slot);
         Ok(())
@@ -263,102 +269,41 @@ struct Step {
 }
 
 impl Solver<'_> {
-    /// One time step from `band.u` to `next`; returns its motion and the number of visits.
+    /// Takes the step; returns its motion and the number of visits.
     ///
     /// All cells are taken up once; then again those that were left unsolved or whose neighbours were stirred since.
-    fn step(&self) -> Result<(Step, u64)> {
-        let set = self.band.solved.set();
-        let mut visits = vec![Visit::default(); set.len()];
-        // Beside each face of a cell what moved there since the cell was visited.
-        let mut unknown = vec![[0.0; 6]; set.len()];
-        let mut visited = 0;
-        for round in 0..MAX_VISITS {
-            let mut resting = true;
-            for (colour, cells) in self.cells.colours.iter().enumerate() {
-                let due = |slot: &Slot| round == 0 || self.is_due(&visits, &unknown, *slot);
-                let wave: Vec<Slot> = cells.iter().copied().filter(due).collect();
-                let results =
-                    self.stage.run(&wave, self.workers, |worker, &slot| Ok(self.visit(worker, slot, round, colour)))?;
-                self.exchange.faces(self.next, &wave)?;
-                let borders = wave.iter().copied().zip(results.iter().map(|visit| visit.border));
-                let told = self.exchange.of_faces(borders.clone())?;
-                for (slot, border) in borders.chain(told) {
-                    unknown[slot as usize] = [0.0; 6];
-                    for (face, &beside) in FACES.iter().zip(&self.cells.beside[slot as usize]) {
-                        if beside != Slot::MAX {
-                            unknown[beside as usize][face.opposite().index()] += border[face.index()];
-                        }
-                    }
-                }
-                for (&slot, visit) in wave.iter().zip(results) {
-                    visits[slot as usize] = visit;
-                }
-                visited += wave.len() as u64;
-                resting &= wave.is_empty();
-            }
-            if !self.engine.comm().any(!resting)? {
-                break;
-            }
+    fn step(mut self, waves: &Waves<'_, '_, Worker>) -> Result<(Step, u64)> {
+        while self.round < MAX_VISITS && waves.nearest(&self)?.is_some() {
+            waves.round(&mut self, 0.0)?;
+            self.round += 1;
         }
         let volume: f64 = self.spacing.iter().product();
-        let area = self.sum(&visits, |v| v.gradient)? * volume;
-        let swept = self.sum(&visits, |v| v.sums.moved)? * volume;
-        let l2 = (self.sum(&visits, |v| v.sums.moved_squared)? * volume).sqrt();
+        let area = self.sum(|v| v.gradient)? * volume;
+        let swept = self.sum(|v| v.sums.moved)? * volume;
+        let l2 = (self.sum(|v| v.sums.moved_squared)? * volume).sqrt();
         let speed = swept / (area * f64::from(self.settings.velocity.tau)).max(f64::MIN_POSITIVE);
-        Ok((Step { speed, l2 }, visited))
+        Ok((Step { speed, l2 }, self.visited))
     }
 
     /// True when the corrections that a cell was left with, and those for what moved beside it since, which is unknown
     /// to it, may exceed the tolerance (root mean square).
-    fn is_due(&self, visits: &[Visit], unknown: &[[f64; 6]], slot: Slot) -> bool {
-        let here = &visits[slot as usize];
-        let corrections = here.left.sqrt() + GHOST_WEIGHT * unknown[slot as usize].iter().sum::<f64>();
+    fn is_due(&self, slot: Slot) -> bool {
+        let here = &self.visits[slot as usize];
+        let corrections = here.left.sqrt() + GHOST_WEIGHT * self.unknown[slot as usize].iter().sum::<f64>();
         corrections > self.settings.solver_tolerance * f64::from(here.count).sqrt()
     }
 
     /// Sums over cells in grid order.
-    fn sum(&self, visits: &[Visit], of: impl Fn(&Visit) -> f64) -> Result<f64> {
+    fn sum(&self, of: impl Fn(&Visit) -> f64) -> Result<f64> {
         let owned = self.band.solved.set().owned();
-        let partial: Vec<f64> = visits[owned.start as usize..owned.end as usize].iter().map(of).collect();
+        let partial: Vec<f64> = self.visits[owned.start as usize..owned.end as usize].iter().map(of).collect();
         self.engine.comm().sum(&partial)
-    }
-
-    /// Takes up a cell: makes its scheme, relaxes it, writes it back.
-    fn visit(&self, w: &mut Worker, slot: Slot, round: usize, colour: usize) -> Visit {
-        let (old, new) = (&self.band.u, self.next);
-        read_mask(&self.band.solved, slot, &mut w.mask);
-        if w.mask.count == 0 {
-            return Visit::default();
-        }
-        let turn = Turn { slot, round, colour };
-        let (gradient, left) = match self.kept {
-            Some(kept) if self.first && round == 0 => kept.write(slot, |fixed| {
-                self.gather_fixed(&mut w.older, slot, fixed);
-                self.solve(w, turn, fixed)
-            }),
-            Some(kept) => kept.read(slot, |fixed| self.solve(w, turn, fixed)),
-            None => {
-                let mut passing = std::mem::take(&mut w.passing);
-                self.gather_fixed(&mut w.older, slot, &mut passing);
-                let done = self.solve(w, turn, &passing);
-                w.passing = passing;
-                done
-            }
-        };
-        self.faces.scatter(&w.u, new, slot);
-        Visit {
-            sums: old.read(slot, |old| motion(w.u.data(), old, &w.mask)),
-            gradient,
-            count: w.mask.count,
-            left,
-            border: w.border.moved(w.u.data()),
-        }
     }
 
     /// Makes a cell's scheme and relaxes the cell. Returns the sum of gradient norms and of the squares of the
     /// last corrections.
     fn solve(&self, w: &mut Worker, turn: Turn, fixed: &[f32]) -> (f64, f64) {
-        let Turn { slot, round, colour } = turn;
+        let (Turn { slot, colour }, round) = (turn, self.round);
         let (old, new) = (&self.band.u, self.next);
         let (d, g) = fixed[..FIXED_LEN].split_at(GROWN_LEN);
         self.all.gather(old, slot, Boundary::Mirror, &mut w.u);
@@ -389,6 +334,71 @@ impl Solver<'_> {
         if let Some(edges) = self.edges {
             self.faces.gather(edges, slot, Boundary::Mirror, tile);
             g.copy_from_slice(tile.data());
+        }
+    }
+}
+
+impl Relax for Solver<'_> {
+    type State = f32;
+    type Work = Worker;
+    type Visit = Visit;
+    type Note = [f64; 6];
+
+    fn field(&self) -> &BrickArray<f32> {
+        self.next
+    }
+
+    fn priority(&self, slot: Slot) -> f64 {
+        if self.round == 0 || self.is_due(slot) { 0.0 } else { f64::INFINITY }
+    }
+
+    /// Takes up a cell: makes its scheme, relaxes it, writes it back.
+    fn visit(&self, w: &mut Worker, slot: Slot, colour: usize) -> Result<Visit> {
+        let (old, new) = (&self.band.u, self.next);
+        read_mask(&self.band.solved, slot, &mut w.mask);
+        if w.mask.count == 0 {
+            return Ok(Visit::default());
+        }
+        let turn = Turn { slot, colour };
+        let (gradient, left) = match self.kept {
+            Some(kept) if self.first && self.round == 0 => kept.write(slot, |fixed| {
+                self.gather_fixed(&mut w.older, slot, fixed);
+                self.solve(w, turn, fixed)
+            }),
+            Some(kept) => kept.read(slot, |fixed| self.solve(w, turn, fixed)),
+            None => {
+                let mut passing = std::mem::take(&mut w.passing);
+                self.gather_fixed(&mut w.older, slot, &mut passing);
+                let done = self.solve(w, turn, &passing);
+                w.passing = passing;
+                done
+            }
+        };
+        self.faces.scatter(&w.u, new, slot);
+        Ok(Visit {
+            sums: old.read(slot, |old| motion(w.u.data(), old, &w.mask)),
+            gradient,
+            count: w.mask.count,
+            left,
+            border: w.border.moved(w.u.data()),
+        })
+    }
+
+    fn note(&self, _slot: Slot, visit: &Visit) -> Option<[f64; 6]> {
+        (visit.count > 0).then_some(visit.border)
+    }
+
+    fn visited(&mut self, slot: Slot, visit: Visit) {
+        self.visits[slot as usize] = visit;
+        self.unknown[slot as usize] = [0.0; 6];
+        self.visited += 1;
+    }
+
+    fn told(&mut self, slot: Slot, border: &[f64; 6]) {
+        for (face, &beside) in FACES.iter().zip(&self.cells.beside[slot as usize]) {
+            if beside != Slot::MAX {
+                self.unknown[beside as usize][face.opposite().index()] += border[face.index()];
+            }
         }
     }
 }

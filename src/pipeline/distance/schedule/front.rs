@@ -9,8 +9,9 @@
 //! (rounding; over 420 random clouds 3 units were the most for equal spacings, 10 at a ratio of 4, 32 at 6.2).
 
 use crate::error::Result;
-use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
-use crate::grid::{FACES, Slot};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers};
+use crate::exec::{checkerboard, corner_colours};
+use crate::grid::{Box3, FACES, NEIGHBOURS_26, Slot};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::tile_order::arrival::{leaving, leaving_anywhere};
@@ -29,74 +30,107 @@ pub(crate) fn advance_front<M: DistanceMethod>(
     spacing: [f64; 3],
     farthest: f64,
 ) -> Result<()> {
-    let set = array.set().clone();
-    let grid = *set.grid();
-    let all = method.neighbours() == Neighbours::All;
-    let plan = HaloPlan::new(grid, if all { Reach::All } else { Reach::Faces });
-    let offsets = method.neighbours().offsets();
-    let edge = grid.edge() as usize;
-    let workers = Workers::new(move || (HaloTile::new(edge), M::work(edge)));
-    let width = ROUND_WIDTH * edge as f64 * spacing.iter().copied().fold(f64::INFINITY, f64::min);
-    // Bricks of one colour do not touch.
-    let colour_of = |slot: Slot| {
-        let at = grid.coords(set.id(slot)).map(|at| at & 1);
-        if all { at[0] | at[1] << 1 | at[2] << 2 } else { (at[0] + at[1] + at[2]) & 1 }
+    let set = array.set();
+    let edge = set.grid().edge() as usize;
+    let (reach, waves) = match method.neighbours() {
+        Neighbours::Faces => (Reach::Faces, checkerboard(set)),
+        Neighbours::All => (Reach::All, corner_colours(set)),
     };
-    let mut entering = vec![f64::INFINITY; set.len()];
-    // Nobody was told of the fixed voxels on these bricks' faces yet.
-    let mut untold = vec![false; set.len()];
-    for &slot in start {
-        entering[slot as usize] = 0.0;
-        untold[slot as usize] = true;
-    }
-    let exchange = Exchange::new(stage.comm(), &set, &plan)?;
+    let plan = HaloPlan::new(*set.grid(), reach);
+    let exchange = &Exchange::new(stage.comm(), set, &plan)?;
     exchange.faces(array, start)?;
-    let mut rounds = 0;
-    loop {
-        let least = stage.comm().least(entering.iter().copied().fold(f64::INFINITY, f64::min))?;
-        if least.is_infinite() || least > farthest {
-            break;
-        }
-        for colour in 0..if all { 8 } else { 2 } {
-            let due = |slot: &Slot| entering[*slot as usize] <= least + width && colour_of(*slot) == colour;
-            let wave: Vec<Slot> = set.owned().filter(due).collect();
-            let left = stage.run(&wave, &workers, |(tile, work), &slot| {
-                plan.gather(array, slot, Boundary::Constant(M::UNKNOWN), tile);
-                let part = grid.brick_box(set.id(slot));
-                let changed = method.settle(tile, work, &part);
-                if !changed && !untold[slot as usize] {
-                    return Ok(Vec::new());
-                }
-                let leaving: Vec<Option<f64>> = if all {
-                    offsets.iter().map(|&offset| leaving_anywhere(method, tile, &part, offset)).collect()
-                } else if untold[slot as usize] || array.unwritten(slot).is_some() {
-                    FACES.map(|face| leaving(method, tile, &part, face, None)).to_vec()
-                } else {
-                    let told =
-                        |face| array.read_face(slot, face, |told| leaving(method, tile, &part, face, Some(told)));
-                    FACES.map(told).to_vec()
-                };
-                if changed {
-                    plan.scatter(tile, array, slot);
-                }
-                Ok(leaving)
-            })?;
-            for &slot in &wave {
-                entering[slot as usize] = f64::INFINITY;
-                untold[slot as usize] = false;
-            }
-            for (&slot, leaving) in wave.iter().zip(&left) {
-                for (&offset, value) in offsets.iter().zip(leaving) {
-                    if let (Some(n), Some(value)) = (set.neighbour(slot, offset), value) {
-                        entering[n as usize] = entering[n as usize].min(*value);
-                    }
-                }
-            }
-            exchange.faces(array, &wave)?;
-            exchange.lowest(&mut entering)?;
-        }
-        rounds += 1;
+    let mut front = Front {
+        method,
+        array,
+        plan,
+        offsets: method.neighbours().offsets(),
+        arrival: vec![f64::INFINITY; set.len()],
+        untold: vec![false; set.len()],
+    };
+    for &slot in start {
+        (front.arrival[slot as usize], front.untold[slot as usize]) = (0.0, true);
     }
+    let workers = &Workers::new(move || (HaloTile::new(edge), M::work(edge)));
+    let width = ROUND_WIDTH * edge as f64 * spacing.iter().copied().fold(f64::INFINITY, f64::min);
+    let rounds = Waves { stage, exchange, workers, waves: &waves }.relax(&mut front, Until { width, farthest })?;
     stage.iterated(rounds, 0.0);
     Ok(())
+}
+
+struct Front<'a, M: DistanceMethod> {
+    method: &'a M,
+    array: &'a BrickArray<M::State>,
+    plan: HaloPlan,
+    /// The steps to the bricks that read a brick.
+    offsets: Vec<[i64; 3]>,
+    /// The smallest value that enters each brick since it was visited.
+    arrival: Vec<f64>,
+    /// Nobody was told of the fixed voxels on these bricks' faces yet.
+    untold: Vec<bool>,
+}
+
+/// The smallest value that enters each brick beside one, in the order of `offsets`; infinite where none does.
+type Leaving = [f64; NEIGHBOURS_26.len()];
+
+impl<M: DistanceMethod> Front<'_, M> {
+    fn leaving(&self, tile: &HaloTile<M::State>, slot: Slot, part: &Box3) -> Leaving {
+        let mut values = [f64::INFINITY; NEIGHBOURS_26.len()];
+        let written = !self.untold[slot as usize] && self.array.unwritten(slot).is_none();
+        for (value, (n, &offset)) in values.iter_mut().zip(self.offsets.iter().enumerate()) {
+            let found = match (self.method.neighbours(), written) {
+                (Neighbours::All, _) => leaving_anywhere(self.method, tile, part, offset),
+                (Neighbours::Faces, false) => leaving(self.method, tile, part, FACES[n], None),
+                // Only what is new on a face can lower a voxel beyond it.
+                (Neighbours::Faces, true) => {
+                    self.array.read_face(slot, FACES[n], |told| leaving(self.method, tile, part, FACES[n], Some(told)))
+                }
+            };
+            *value = found.unwrap_or(f64::INFINITY);
+        }
+        values
+    }
+}
+
+impl<M: DistanceMethod> Relax for Front<'_, M> {
+    type State = M::State;
+    type Work = (HaloTile<M::State>, M::Work);
+    type Visit = Option<Leaving>;
+    type Note = Leaving;
+
+    fn field(&self) -> &BrickArray<M::State> {
+        self.array
+    }
+
+    fn priority(&self, slot: Slot) -> f64 {
+        self.arrival[slot as usize]
+    }
+
+    fn visit(&self, (tile, work): &mut Self::Work, slot: Slot, _wave: usize) -> Result<Option<Leaving>> {
+        self.plan.gather(self.array, slot, Boundary::Constant(M::UNKNOWN), tile);
+        let part = self.array.set().grid().brick_box(self.array.set().id(slot));
+        let changed = self.method.settle(tile, work, &part);
+        let leaving = (changed || self.untold[slot as usize]).then(|| self.leaving(tile, slot, &part));
+        if changed {
+            self.plan.scatter(tile, self.array, slot);
+        }
+        Ok(leaving)
+    }
+
+    fn note(&self, _slot: Slot, visit: &Option<Leaving>) -> Option<Leaving> {
+        *visit
+    }
+
+    fn visited(&mut self, slot: Slot, _visit: Option<Leaving>) {
+        (self.arrival[slot as usize], self.untold[slot as usize]) = (f64::INFINITY, false);
+    }
+
+    fn told(&mut self, slot: Slot, leaving: &Leaving) {
+        let set = self.array.set();
+        for (&offset, &value) in self.offsets.iter().zip(leaving) {
+            if let Some(beside) = set.neighbour(slot, offset) {
+                let arrival = &mut self.arrival[beside as usize];
+                *arrival = arrival.min(value);
+            }
+        }
+    }
 }

@@ -2,7 +2,7 @@
 //! number of threads and ranks (docs/algorithms.md, "The sweep schedule").
 
 use crate::error::Result;
-use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers, sweep_waves};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Relax, Stage, Waves, Workers, sweep_waves};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::distance::state::method::OrderedSweeps;
 use crate::kernel::distance::state::neighbours::SWEEPS;
@@ -29,8 +29,8 @@ pub(crate) trait Companion<M: OrderedSweeps>: Sync {
     /// Sweeps a gathered tile.
     fn sweep(&self, visit: Swept<'_, M, Self::Work>, slot: Slot, upward: [bool; 3]) -> Visit;
 
-    /// Bricks of a wave were visited.
-    fn after_wave(&mut self, _wave: &[(Slot, Visit)]) -> Result<()> {
+    /// Bricks of this rank changed in a wave.
+    fn after_wave(&mut self, _changed: &[(Slot, Visit)]) -> Result<()> {
         Ok(())
     }
 
@@ -74,45 +74,25 @@ pub(crate) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
     start: &[Slot],
     iterations: u32,
 ) -> Result<()> {
-    let set = array.set().clone();
-    let grid = *set.grid();
-    let plan = HaloPlan::new(grid, Reach::Faces);
-    let edge = grid.edge() as usize;
-    let workers = Workers::new(move || (HaloTile::new(edge), M::work(edge), C::work(edge)));
-    let mut quiet = vec![true; set.len()];
-    let wake = |quiet: &mut [bool], slot: Slot| {
-        let beside = FACES.iter().filter_map(|face| set.neighbour(slot, face.offset()));
-        beside.for_each(|n| quiet[n as usize] = false);
-    };
-    let exchange = Exchange::new(stage.comm(), &set, &plan)?;
-    let started_elsewhere = exchange.faces(array, start)?;
-    for &slot in start.iter().chain(&started_elsewhere) {
-        quiet[slot as usize] = false;
-        wake(&mut quiet, slot);
+    let set = array.set();
+    let edge = set.grid().edge() as usize;
+    let plan = HaloPlan::new(*set.grid(), Reach::Faces);
+    let exchange = &Exchange::new(stage.comm(), set, &plan)?;
+    let workers = &Workers::new(move || (HaloTile::new(edge), M::work(edge), C::work(edge)));
+    let begun_elsewhere = exchange.faces(array, start)?;
+    let (quiet, changed) = (vec![true; set.len()], Vec::new());
+    let mut sweeps = Sweeps { method, array, companion, plan, upward: SWEEPS[0], quiet, changed };
+    for &slot in start.iter().chain(&begun_elsewhere) {
+        sweeps.quiet[slot as usize] = false;
+        sweeps.told(slot, &[]);
     }
     for _ in 0..iterations {
         let mut resting = true;
         for upward in SWEEPS {
-            for mut wave in sweep_waves(&set, upward) {
-                wave.retain(|&slot| !quiet[slot as usize]);
-                let visited = stage.run(&wave, &workers, |(tile, work, along), &slot| {
-                    plan.gather(array, slot, Boundary::Constant(M::UNKNOWN), tile);
-                    let visit = companion.sweep(Swept { method, tile, work, along }, slot, upward);
-                    if visit.changed {
-                        plan.scatter(tile, array, slot);
-                    }
-                    Ok((slot, visit))
-                })?;
-                for &(slot, visit) in &visited {
-                    quiet[slot as usize] = !visit.changed;
-                }
-                let changed: Vec<Slot> = visited.iter().filter(|(_, v)| v.changed).map(|(slot, _)| *slot).collect();
-                let changed_elsewhere = exchange.faces(array, &changed)?;
-                resting &= changed.is_empty();
-                changed.iter().chain(&changed_elsewhere).for_each(|&slot| wake(&mut quiet, slot));
-                companion.after_wave(&visited)?;
-            }
-            companion.after_sweep(stage, upward)?;
+            sweeps.upward = upward;
+            let waves = &sweep_waves(set, upward);
+            resting &= !Waves { stage, exchange, workers, waves }.round(&mut sweeps, 0.0)?;
+            sweeps.companion.after_sweep(stage, upward)?;
         }
         stage.iterated(1, 0.0);
         if !stage.comm().any(!resting)? {
@@ -120,4 +100,62 @@ pub(crate) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
         }
     }
     Ok(())
+}
+
+struct Sweeps<'a, M: OrderedSweeps, C> {
+    method: &'a M,
+    array: &'a BrickArray<M::State>,
+    companion: &'a mut C,
+    plan: HaloPlan,
+    upward: [bool; 3],
+    /// Bricks that no sweep of any direction could change.
+    quiet: Vec<bool>,
+    /// Those of this rank that changed in the wave.
+    changed: Vec<(Slot, Visit)>,
+}
+
+impl<M: OrderedSweeps, C: Companion<M>> Relax for Sweeps<'_, M, C> {
+    type State = M::State;
+    type Work = (HaloTile<M::State>, M::Work, C::Work);
+    type Visit = Visit;
+    type Note = [f64; 0];
+
+    fn field(&self) -> &BrickArray<M::State> {
+        self.array
+    }
+
+    fn priority(&self, slot: Slot) -> f64 {
+        if self.quiet[slot as usize] { f64::INFINITY } else { 0.0 }
+    }
+
+    fn visit(&self, (tile, work, along): &mut Self::Work, slot: Slot, _wave: usize) -> Result<Visit> {
+        self.plan.gather(self.array, slot, Boundary::Constant(M::UNKNOWN), tile);
+        let visit = self.companion.sweep(Swept { method: self.method, tile, work, along }, slot, self.upward);
+        if visit.changed {
+            self.plan.scatter(tile, self.array, slot);
+        }
+        Ok(visit)
+    }
+
+    fn note(&self, _slot: Slot, visit: &Visit) -> Option<[f64; 0]> {
+        visit.changed.then_some([])
+    }
+
+    fn visited(&mut self, slot: Slot, visit: Visit) {
+        self.quiet[slot as usize] = !visit.changed;
+        if visit.changed {
+            self.changed.push((slot, visit));
+        }
+    }
+
+    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+        let set = self.array.set();
+        let beside = FACES.iter().filter_map(|face| set.neighbour(slot, face.offset()));
+        beside.for_each(|n| self.quiet[n as usize] = false);
+    }
+
+    fn after_wave(&mut self) -> Result<()> {
+        let changed = std::mem::take(&mut self.changed);
+        self.companion.after_wave(&changed)
+    }
 }

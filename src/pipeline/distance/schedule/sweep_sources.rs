@@ -5,9 +5,9 @@
 //! the faces before the next sweep are made the ones now. Distances are swept as they are alone (`sweep`).
 
 use super::sweep::{Companion, Swept, Visit};
-use super::trace::Rounds;
+use super::trace::Missing;
 use crate::error::Result;
-use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Until, Waves, Workers, corner_colours};
 use crate::grid::{FACES, Slot};
 use crate::kernel::distance::methods::fast_sweeping::FastSweeping;
 use crate::kernel::distance::methods::sweep_sources::{Fell, Ghosts, SweepSources};
@@ -26,6 +26,8 @@ pub(crate) struct TrackedSweeps<'a> {
     plan: HaloPlan,
     upwind: [HaloPlan; 8],
     sources: [SweepSources; 8],
+    /// The waves in which what is pending is resolved.
+    waves: Vec<Vec<Slot>>,
     /// What the sweep under way left of each brick; ghosts too.
     visits: Vec<Visit>,
 }
@@ -52,7 +54,8 @@ impl<'a> TrackedSweeps<'a> {
         let before = BrickArray::blank_faces(scratch, set, NO_SOURCE)?;
         let told = exchange.faces(states, start)?;
         let visits = vec![Visit::default(); set.len()];
-        let tracked = Self { states, before, exchange, plan, upwind, sources, visits };
+        let waves = corner_colours(set);
+        let tracked = Self { states, before, exchange, plan, upwind, sources, waves, visits };
         start.iter().chain(&told).for_each(|&slot| tracked.keep_faces(slot));
         Ok(tracked)
     }
@@ -123,12 +126,11 @@ impl<P: Precision> Companion<FastSweeping<P, f64>> for TrackedSweeps<'_> {
         Visit { changed, left: changed && self.take(fell, ghosts, slot, upward) }
     }
 
-    fn after_wave(&mut self, wave: &[(Slot, Visit)]) -> Result<()> {
-        let mut changed = Vec::new();
-        for &(slot, visit) in wave.iter().filter(|(_, visit)| visit.changed) {
+    fn after_wave(&mut self, changed: &[(Slot, Visit)]) -> Result<()> {
+        for &(slot, visit) in changed {
             self.visits[slot as usize] = visit;
-            changed.push(slot);
         }
+        let changed: Vec<Slot> = changed.iter().map(|(slot, _)| *slot).collect();
         for slot in self.exchange.faces(self.states, &changed)? {
             self.visits[slot as usize].changed = true;
         }
@@ -139,11 +141,13 @@ impl<P: Precision> Companion<FastSweeping<P, f64>> for TrackedSweeps<'_> {
         let slots = 0..self.states.set().len() as Slot;
         let left: Vec<Slot> = slots.clone().filter(|&slot| self.visits[slot as usize].left).collect();
         let complete = self.visits.iter().map(|visit| !visit.left).collect();
-        let mut rounds = Rounds::new(self.states, &self.exchange, complete);
-        rounds.begin(&left, false);
         let edge = self.states.set().grid().edge() as usize;
-        let workers = Workers::new(move || Ghosts::new(edge));
-        rounds.run(stage, &workers, |ghosts, slot| self.resolve(ghosts, slot, upward))?;
+        let workers = &Workers::new(move || Ghosts::new(edge));
+        let resolve = |ghosts: &mut Ghosts, slot| self.resolve(ghosts, slot, upward);
+        let mut missing = Missing::new(self.states, complete, resolve);
+        missing.begin(&left, false);
+        let waves = &self.waves;
+        Waves { stage, exchange: &self.exchange, workers, waves }.relax(&mut missing, Until::QUIET)?;
         slots.filter(|&slot| self.visits[slot as usize].changed).for_each(|slot| self.keep_faces(slot));
         self.visits.fill(Visit::default());
         Ok(())

@@ -6,8 +6,10 @@
 //! them. Bricks with a face, edge or corner in common never run at the same time, so what a round does not
 //! depend on threads; what is found does not even depend on the rounds.
 
+use std::marker::PhantomData;
+
 use crate::error::Result;
-use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Workers};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, corner_colours};
 use crate::grid::{Box3, DataSets, Geometry, NEIGHBOURS_26, Slot};
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::distance::state::source::FIXED;
@@ -30,55 +32,64 @@ pub(crate) fn trace_sources<P: Precision, R: Parents>(
     let set = distances.set().clone();
     let plan = HaloPlan::new(*set.grid(), Reach::All);
     let edge = set.grid().edge() as usize;
-    let exchange = Exchange::new(stage.comm(), &set, &plan)?;
+    let exchange = &Exchange::new(stage.comm(), &set, &plan)?;
     exchange.faces(distances, &set.owned().collect::<Vec<_>>())?;
     exchange.faces(states, start)?;
     let tracer = Tracer::<R>::new(geometry, edge);
-    let workers = Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), tracer.clone()));
+    let workers = &Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), tracer.clone()));
+    let waves = &corner_colours(&set);
+    let waves = Waves { stage, exchange, workers, waves };
     let gather = |distance: &mut HaloTile<P>, state: &mut HaloTile<u32>, slot: Slot| {
         plan.gather(distances, slot, Boundary::Constant(P::UNKNOWN), distance);
         plan.gather(states, slot, Boundary::Constant(NO_SOURCE), state);
     };
-    let complete = (0..set.len() as Slot).map(|slot| distances.unwritten(slot).is_some()).collect();
-    let mut rounds = Rounds::new(states, &exchange, complete);
-    rounds.order(middles(distances)?, edge as f64 * geometry.max_spacing());
-    rounds.begin(start, true);
-    rounds.run(stage, &workers, |(distance, state, tracer), slot| {
+    let trace = |(distance, state, tracer): &mut (_, _, Tracer<R>), slot| {
         gather(distance, state, slot);
         let (found, left) = tracer.trace(labelled, distance, state);
         if found {
             plan.scatter(state, states, slot);
         }
         (found, left)
-    })?;
-    let left: Vec<Slot> = set.owned().filter(|&slot| !rounds.complete[slot as usize]).collect();
+    };
+    let complete = (0..set.len() as Slot).map(|slot| distances.unwritten(slot).is_some()).collect();
+    let mut missing = Missing::new(states, complete, trace);
+    missing.far = middles(distances)?;
+    missing.begin(start, true);
+    let window = edge as f64 * geometry.max_spacing();
+    waves.relax(&mut missing, Until { width: window, ..Until::QUIET })?;
+    let complete = missing.complete;
+    let left: Vec<Slot> = set.owned().filter(|&slot| !complete[slot as usize]).collect();
     if !stage.comm().any(!left.is_empty())? {
         return Ok(());
     }
-    rounds.begin(&left, false);
-    rounds.run(stage, &workers, |(distance, state, _), slot| {
+    let fill = |(distance, state, _): &mut (_, _, Tracer<R>), slot| {
         gather(distance, state, slot);
-        let (changed, filled) = fill(distance, state);
+        let (changed, left) = fill(distance, state);
         if changed {
             plan.scatter(state, states, slot);
         }
-        (changed, filled)
-    })
+        (changed, left)
+    };
+    let mut missing = Missing::new(states, complete, fill);
+    missing.begin(&left, false);
+    waves.relax(&mut missing, Until::QUIET)?;
+    Ok(())
 }
 
-/// Rounds over bricks that are due, until none is.
-pub(crate) struct Rounds<'a> {
+/// Bricks in which sources are missing, and how some are found: `visit` finds what it can in a brick; it tells whether
+/// it found anything, and whether anything is left.
+pub(crate) struct Missing<'a, W, F> {
     states: &'a BrickArray<u32>,
-    exchange: &'a Exchange<'a>,
-    /// 0 for bricks that are due, else infinite: what ranks tell each other.
-    due: Vec<f64>,
+    visit: F,
+    /// Bricks in which something may be found.
+    due: Vec<bool>,
     /// Nobody was told of what these bricks hold yet.
     untold: Vec<bool>,
     /// Bricks in which nothing is missing.
     complete: Vec<bool>,
-    /// How far from the sources bricks are, and by how much they may be farther than the nearest that is due.
+    /// How far from the sources bricks are: about in this order they are visited.
     far: Vec<f64>,
-    window: f64,
+    work: PhantomData<fn(W)>,
 }
 
 /// The distance in the middle of each brick of this rank; 0 for others.
@@ -96,63 +107,53 @@ fn middles<P: Precision>(distances: &BrickArray<P>) -> Result<Vec<f64>> {
     Ok(middles)
 }
 
-impl<'a> Rounds<'a> {
-    pub(crate) fn new(states: &'a BrickArray<u32>, exchange: &'a Exchange<'a>, complete: Vec<bool>) -> Self {
+impl<'a, W, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Missing<'a, W, F> {
+    pub(crate) fn new(states: &'a BrickArray<u32>, complete: Vec<bool>, visit: F) -> Self {
         let bricks = complete.len();
-        let (due, untold) = (vec![f64::INFINITY; bricks], vec![false; bricks]);
-        Self { states, exchange, due, untold, complete, far: vec![0.0; bricks], window: 0.0 }
-    }
-
-    /// Visits bricks in about the order of how `far` they are, those within a `window` together.
-    fn order(&mut self, far: Vec<f64>, window: f64) {
-        (self.far, self.window) = (far, window);
+        let (due, untold) = (vec![false; bricks], vec![false; bricks]);
+        Self { states, visit, due, untold, complete, far: vec![0.0; bricks], work: PhantomData }
     }
 
     /// Makes bricks due; with `untold` also those beside them, afterwards, whether anything is found in them or not.
     pub(crate) fn begin(&mut self, start: &[Slot], untold: bool) {
         for &slot in start {
-            (self.due[slot as usize], self.untold[slot as usize]) = (0.0, untold);
+            (self.due[slot as usize], self.untold[slot as usize]) = (true, untold);
         }
     }
+}
 
-    /// `visit` finds what it can in a brick; it tells whether it found anything, and whether anything is left.
-    pub(crate) fn run<W: Send>(
-        &mut self,
-        stage: &Stage<'_>,
-        workers: &Workers<W>,
-        visit: impl Fn(&mut W, Slot) -> (bool, bool) + Sync,
-    ) -> Result<()> {
-        let set = self.states.set().clone();
-        let colour = |slot: Slot| set.grid().coords(set.id(slot)).iter().fold(0, |colour, at| colour << 1 | (at & 1));
-        loop {
-            let due = set.owned().filter(|&slot| self.due[slot as usize] == 0.0);
-            let nearest = due.fold(f64::INFINITY, |least, slot| least.min(self.far[slot as usize]));
-            let nearest = stage.comm().least(nearest)?;
-            if nearest == f64::INFINITY {
-                return Ok(());
-            }
-            for turn in 0..8 {
-                let is_due = |slot: &Slot| {
-                    let at = *slot as usize;
-                    self.due[at] == 0.0 && self.far[at] <= nearest + self.window && colour(*slot) == turn
-                };
-                let wave: Vec<Slot> = set.owned().filter(is_due).collect();
-                let visited = stage.run(&wave, workers, |work, &slot| Ok(visit(work, slot)))?;
-                for (&slot, (found, left)) in wave.iter().zip(visited) {
-                    self.due[slot as usize] = f64::INFINITY;
-                    self.complete[slot as usize] = !left;
-                    if found || std::mem::take(&mut self.untold[slot as usize]) {
-                        let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
-                        beside.for_each(|n| self.due[n as usize] = 0.0);
-                    }
-                }
-                self.exchange.faces(self.states, &wave)?;
-                self.exchange.lowest(&mut self.due)?;
-                for slot in set.owned().filter(|&slot| self.complete[slot as usize]) {
-                    self.due[slot as usize] = f64::INFINITY;
-                }
-            }
-        }
+impl<W: Send, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Relax for Missing<'_, W, F> {
+    type State = u32;
+    type Work = W;
+    type Visit = (bool, bool);
+    type Note = [f64; 0];
+
+    fn field(&self) -> &BrickArray<u32> {
+        self.states
+    }
+
+    fn priority(&self, slot: Slot) -> f64 {
+        let at = slot as usize;
+        if self.due[at] && !self.complete[at] { self.far[at] } else { f64::INFINITY }
+    }
+
+    fn visit(&self, work: &mut W, slot: Slot, _wave: usize) -> Result<(bool, bool)> {
+        Ok((self.visit)(work, slot))
+    }
+
+    fn note(&self, slot: Slot, (found, _): &(bool, bool)) -> Option<[f64; 0]> {
+        (*found || self.untold[slot as usize]).then_some([])
+    }
+
+    fn visited(&mut self, slot: Slot, (_, left): (bool, bool)) {
+        let at = slot as usize;
+        (self.due[at], self.untold[at], self.complete[at]) = (false, false, !left);
+    }
+
+    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+        let set = self.states.set();
+        let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
+        beside.for_each(|n| self.due[n as usize] = true);
     }
 }
 

@@ -5,8 +5,10 @@
 use super::fields::Roots;
 use super::walls::Walls;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
-use crate::grid::{BrickSet, Geometry, NEIGHBOURS_26, Slot};
+use crate::exec::{
+    Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, corner_colours, one_wave,
+};
+use crate::grid::{Geometry, NEIGHBOURS_26, Slot};
 use crate::kernel::image::morphology::gaps::SEED;
 use crate::kernel::image::morphology::geodesic::{Lengths, UNREACHED, relax};
 use crate::store::{BoxSink, BoxSource, BrickArray};
@@ -35,7 +37,7 @@ pub(super) fn share(
         weight: BrickArray::with_faces(engine.scratch(), set)?,
     };
     begin(stage, roots, states, walls, &fields)?;
-    flood(stage, geometry, set, &fields)?;
+    flood(stage, geometry, &fields)?;
     Ok(fields.label)
 }
 
@@ -69,47 +71,64 @@ fn begin(
     Ok(())
 }
 
-/// Relaxes bricks until nothing falls, those beside a change.
-fn flood(stage: &Stage<'_>, geometry: &Geometry, set: &BrickSet, fields: &Fields) -> Result<()> {
+/// Relaxes bricks until nothing falls.
+fn flood(stage: &Stage<'_>, geometry: &Geometry, fields: &Fields) -> Result<()> {
+    let set = fields.cost.set();
     let plan = HaloPlan::new(*set.grid(), Reach::All);
+    let exchange = &Exchange::new(stage.comm(), set, &plan)?;
     let edge = set.grid().edge() as usize;
-    let lengths = Lengths::new(geometry.spacing);
-    let workers = Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), HaloTile::new(edge)));
-    let mut dirty = vec![true; set.len()];
-    let mut rounds = 0;
-    while dirty.iter().any(|&d| d) {
-        for wave in eight_waves(set, |slot| dirty[slot as usize]) {
-            for &slot in &wave {
-                dirty[slot as usize] = false;
-            }
-            let fell = stage.run(&wave, &workers, |(cost, label, weight), &slot| {
-                plan.gather(&fields.cost, slot, Boundary::Constant(UNREACHED), cost);
-                plan.gather(&fields.label, slot, Boundary::Constant(0), label);
-                plan.gather(&fields.weight, slot, Boundary::Constant(0), weight);
-                let fell = relax([cost, label], weight, &lengths);
-                if fell {
-                    plan.scatter(cost, &fields.cost, slot);
-                    plan.scatter(label, &fields.label, slot);
-                }
-                Ok(fell)
-            })?;
-            for (&slot, _) in wave.iter().zip(&fell).filter(|(_, fell)| **fell) {
-                let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
-                beside.for_each(|neighbour| dirty[neighbour as usize] = true);
-            }
-        }
-        rounds += 1;
-    }
+    let workers = &Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), HaloTile::new(edge)));
+    let mut flood = Flood { fields, lengths: Lengths::new(geometry.spacing), plan, dirty: vec![true; set.len()] };
+    let rounds = Waves { stage, exchange, workers, waves: &corner_colours(set) }.relax(&mut flood, Until::QUIET)?;
     stage.iterated(rounds, 0.0);
     Ok(())
 }
 
-/// Eight waves by the parities of bricks along each axis: no two bricks of a wave share a face, an edge or a corner.
-fn eight_waves(set: &BrickSet, keep: impl Fn(Slot) -> bool) -> [Vec<Slot>; 8] {
-    let mut waves: [Vec<Slot>; 8] = Default::default();
-    for slot in set.owned().filter(|&slot| keep(slot)) {
-        let [x, y, z] = set.grid().coords(set.id(slot)).map(|c| (c & 1) as usize);
-        waves[4 * z + 2 * y + x].push(slot);
+struct Flood<'a> {
+    fields: &'a Fields,
+    lengths: Lengths,
+    plan: HaloPlan,
+    dirty: Vec<bool>,
+}
+
+impl Relax for Flood<'_> {
+    type State = u32;
+    type Work = (HaloTile<u32>, HaloTile<u32>, HaloTile<u16>);
+    type Visit = bool;
+    type Note = [f64; 0];
+
+    fn field(&self) -> &BrickArray<u32> {
+        &self.fields.cost
     }
-    waves
+
+    fn priority(&self, slot: Slot) -> f64 {
+        if self.dirty[slot as usize] { 0.0 } else { f64::INFINITY }
+    }
+
+    fn visit(&self, (cost, label, weight): &mut Self::Work, slot: Slot, _wave: usize) -> Result<bool> {
+        let Self { fields, plan, .. } = self;
+        plan.gather(&fields.cost, slot, Boundary::Constant(UNREACHED), cost);
+        plan.gather(&fields.label, slot, Boundary::Constant(0), label);
+        plan.gather(&fields.weight, slot, Boundary::Constant(0), weight);
+        let fell = relax([cost, label], weight, &self.lengths);
+        if fell {
+            plan.scatter(cost, &fields.cost, slot);
+            plan.scatter(label, &fields.label, slot);
+        }
+        Ok(fell)
+    }
+
+    fn note(&self, _slot: Slot, fell: &bool) -> Option<[f64; 0]> {
+        fell.then_some([])
+    }
+
+    fn visited(&mut self, slot: Slot, _fell: bool) {
+        self.dirty[slot as usize] = false;
+    }
+
+    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+        let set = self.fields.cost.set();
+        let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
+        beside.for_each(|slot| self.dirty[slot as usize] = true);
+    }
 }
