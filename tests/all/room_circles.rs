@@ -108,9 +108,7 @@ fn circle(named: &Named) -> Vec<&String> {
         if done.is_empty() {
             return left.keys().filter_map(|name| named.get_key_value(name).map(|(name, _)| name)).collect();
         }
-        done.iter().for_each(|name| {
-            left.remove(name);
-        });
+        left.retain(|name, _| !done.contains(name));
     }
 }
 

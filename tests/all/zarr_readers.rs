@@ -8,7 +8,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 use strandline::grid::{Box3, Geometry};
-use strandline::io::ome_zarr::{ImageSpec, ImageWriter, LabelColor, LabelSpec, StoreWriter};
+use strandline::io::ome_zarr::{Content, ImageSpec, ImageWriter, LabelColor, LabelSpec, StoreWriter};
 use strandline::kernel::image::filter::downsample;
 use strandline::kernel::image::picture::palette::label_color;
 use strandline::store::Element;
@@ -82,7 +82,7 @@ fn write_store(path: &Path, raw: &Path) -> Map<String, Value> {
     let store = StoreWriter::create(path, false).unwrap();
     let mut expected = Map::new();
     let image = |group: &str, geometry: &Geometry, element, window| {
-        store.image(group, &ImageSpec { name: "picture", geometry, element, window }).unwrap()
+        store.image(group, &ImageSpec { name: "picture", geometry, element, content: Content::Grey, window }).unwrap()
     };
     let stack = geometry([321, 270, 37], [0.25, 0.25, 1.0]);
     let root = image("", &stack, u16::TYPE, Some([100.0, 4000.0]));

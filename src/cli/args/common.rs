@@ -9,6 +9,8 @@ use super::values::{
     Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
     solvers_help,
 };
+use crate::error::Result;
+use crate::io::ome_zarr::{Compression, StoreWriter};
 use crate::pipeline::distance::Method;
 use crate::pipeline::marks::Seed;
 use crate::pipeline::segment::FillGaps;
@@ -179,6 +181,10 @@ pub(crate) struct OutputArgs {
     /// Replace outputs that are there already
     #[arg(long)]
     pub(crate) overwrite: bool,
+    /// How the store's chunks are packed: as fast as a disk takes them, small (about a tenth smaller, several times
+    /// slower), or not at all
+    #[arg(long, value_enum, default_value_t = CompressArg::Fast)]
+    pub(crate) compress: CompressArg,
     /// Write the report once more, as a file of its own
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
@@ -197,6 +203,15 @@ impl OutputArgs {
     /// The store's path, where there is to be one.
     pub(crate) fn store(&self) -> Option<&Path> {
         self.output.path()
+    }
+
+    /// Begins the store, where there is to be one.
+    ///
+    /// # Errors
+    /// As [`StoreWriter::create`].
+    pub(crate) fn begin_store(&self) -> Result<Option<StoreWriter>> {
+        let begin = |path| Ok(StoreWriter::create(path, self.overwrite)?.packed(self.compress.into()));
+        self.store().map(begin).transpose()
     }
 }
 
@@ -323,4 +338,22 @@ pub(crate) enum StopArg {
     Surface,
     /// The L2 norm of a step's change falls under the limit
     L2,
+}
+
+/// How chunks are packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CompressArg {
+    None,
+    Fast,
+    Small,
+}
+
+impl From<CompressArg> for Compression {
+    fn from(arg: CompressArg) -> Self {
+        match arg {
+            CompressArg::None => Self::None,
+            CompressArg::Fast => Self::Fast,
+            CompressArg::Small => Self::Small,
+        }
+    }
 }

@@ -144,7 +144,7 @@ impl Job {
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
         let _passes = Unfinished::new(passing.path());
-        let store = output.store().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let store = output.begin_store()?;
         let has_surface = self.middle.is_some();
         let drawing = Drawing::new(store.as_ref().filter(|_| has_surface), mesh, passing.path())?;
         let mut ply = drawing.start(|path| PlyWriter::tagged_on_grid(path, &self.geometry))?;

@@ -28,7 +28,6 @@ use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
 use crate::io::geometry::read::source::Source;
 use crate::io::geometry::write::ply::PlyWriter;
-use crate::io::ome_zarr::StoreWriter;
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct, typical_spacing,
     without_isolated,
@@ -211,7 +210,7 @@ impl Job {
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
         let _passes = Unfinished::new(passing.path());
-        let store = output.store().map(|path| StoreWriter::create(path, output.overwrite)).transpose()?;
+        let store = output.begin_store()?;
         let mesh = Drawing::new(store.as_ref(), self.args.mesh.as_deref(), passing.path())?;
         let mut ply = mesh.start(|path| PlyWriter::on_grid(path, &self.grid))?;
         let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, ply.sink())

@@ -185,10 +185,9 @@ impl Job {
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
         let _passes = Unfinished::new(passing.path());
-        let store = match output.store() {
-            Some(path) => Some(StoreWriter::create(path, output.overwrite)?),
+        let store = match output.begin_store()? {
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
-            None => None,
+            store => store,
         };
         let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())
             .map_err(|error| self.marks.named_in(error))?;

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use super::compression::{Compression, Content};
 use super::files::{write_json, write_whole};
 use super::metadata;
 use super::pyramid::LevelPlan;
@@ -36,9 +37,15 @@ struct Pending {
 
 impl LevelWriter {
     /// Begins the level in `folder`; errors name `store`, what the whole will be called.
-    pub(super) fn create(folder: &Path, store: &Path, plan: LevelPlan, element: ElementType) -> Result<Self> {
+    pub(super) fn create(
+        folder: &Path,
+        store: &Path,
+        plan: LevelPlan,
+        element: ElementType,
+        packed: (Content, Compression),
+    ) -> Result<Self> {
         let layout = ShardLayout::new(plan.geometry.shape, element);
-        let codec = ChunkCodec::new(element)?;
+        let codec = ChunkCodec::new(element, packed.0, packed.1)?;
         write_json(&folder.join("zarr.json"), &metadata::array(plan.geometry.shape, element, layout, &codec))?;
         Ok(Self {
             folder: folder.to_path_buf(),
@@ -160,8 +167,18 @@ mod tests {
     use super::*;
 
     fn level(folder: &Path, shape: [i64; 3], element: ElementType) -> LevelWriter {
+        packed_level(folder, shape, element, (Content::Grey, Compression::Fast))
+    }
+
+    fn packed_level(
+        folder: &Path,
+        shape: [i64; 3],
+        element: ElementType,
+        packed: (Content, Compression),
+    ) -> LevelWriter {
         let geometry = Geometry { shape, spacing: [1.0; 3], origin: [0.0; 3], unit: None };
-        LevelWriter::create(&folder.join("0"), folder, LevelPlan { geometry, factors: [1; 3] }, element).unwrap()
+        LevelWriter::create(&folder.join("0"), folder, LevelPlan { geometry, factors: [1; 3] }, element, packed)
+            .unwrap()
     }
 
     /// The array as the `zarrs` crate reads it, which takes no part in laying out or writing shards.
@@ -193,6 +210,25 @@ mod tests {
         round_trip::<f64>([65, 2, 129], |i| (i as f64).sin());
         // Chunks that hold only zeros are left out of their shard.
         round_trip::<u16>([200, 100, 65], |i| f64::from(u8::from(i % 100_001 == 5)));
+    }
+
+    #[test]
+    fn zarrs_reads_what_is_packed_in_any_way() {
+        let (shape, packed) = ([70, 66, 65], [Content::Grey, Content::Field, Content::Repeated]);
+        let whole: Vec<f32> = (0..70 * 66 * 65).map(|i| (i as f32 / 97.0).floor()).collect();
+        let mut sizes = Vec::new();
+        for compression in [Compression::None, Compression::Fast, Compression::Small] {
+            for content in packed {
+                let folder = tempfile::tempdir().unwrap();
+                let level = packed_level(folder.path(), shape, ElementType::F32, (content, compression));
+                let shard = level.shards().next().unwrap();
+                sizes.push(level.write_shard(&shard, &whole).unwrap());
+                assert_eq!(read_back::<f32>(folder.path()), whole, "{content:?} {compression:?}");
+            }
+        }
+        // Eight chunks of 64^3 numbers as they are, and an index of eight places with its checksum.
+        assert_eq!(sizes[..3], [8 * 4 * 64 * 64 * 64 + 8 * 16 + 4; 3]);
+        assert!(sizes[3..].iter().all(|&size| size < sizes[0] / 4), "{sizes:?}");
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::compression::Content;
 use super::pyramid::LevelPlan;
 use super::shard::{ChunkCodec, ShardLayout};
 use crate::grid::Geometry;
@@ -20,6 +21,8 @@ pub struct ImageSpec<'a> {
     pub geometry: &'a Geometry,
     /// The type of a voxel.
     pub element: ElementType,
+    /// What voxels are, which decides how they are packed.
+    pub content: Content,
     /// The values that viewers show as black and white at first.
     pub window: Option<[f64; 2]>,
 }
@@ -161,7 +164,13 @@ mod tests {
             origin: [123_456_789.012_345, -1e-9, 0.0],
             unit: None,
         };
-        let spec = ImageSpec { name: "far", geometry: &geometry, element: ElementType::F32, window: None };
+        let spec = ImageSpec {
+            name: "far",
+            geometry: &geometry,
+            element: ElementType::F32,
+            content: Content::Field,
+            window: None,
+        };
         let ome = image(&spec, &plan_levels(&geometry));
         let multiscale = &ome["multiscales"][0];
         let placed = &multiscale["datasets"][0]["coordinateTransformations"];
@@ -175,7 +184,13 @@ mod tests {
     fn windows_are_numbers() {
         let geometry = Geometry { shape: [3; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
         let omero = |window| {
-            let spec = ImageSpec { name: "d", geometry: &geometry, element: ElementType::F32, window: Some(window) };
+            let spec = ImageSpec {
+                name: "d",
+                geometry: &geometry,
+                element: ElementType::F32,
+                content: Content::Field,
+                window: Some(window),
+            };
             image(&spec, &plan_levels(&geometry)).remove("omero")
         };
         let found = omero([-1.0, 2.5]).unwrap();

@@ -7,6 +7,7 @@
 //! written. Shards are the unit of writing: each is encoded whole, by one caller, and appears under its name complete.
 
 mod abandoned;
+mod compression;
 mod files;
 mod level;
 mod metadata;
@@ -15,6 +16,7 @@ mod read;
 mod shard;
 mod store;
 
+pub use compression::{Compression, Content};
 pub use level::LevelWriter;
 pub use metadata::{ImageSpec, LabelColor, LabelSpec};
 pub use pyramid::{LevelPlan, plan_levels};

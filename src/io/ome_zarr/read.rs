@@ -124,7 +124,7 @@ fn xyz<T: Copy>(list: &Value, number: impl Fn(&Value) -> Option<T>) -> Option<[T
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::ome_zarr::{ImageSpec, StoreWriter};
+    use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
     use crate::store::ElementType;
 
     #[test]
@@ -138,7 +138,13 @@ mod tests {
             unit: Some("micrometer".into()),
         };
         let store = StoreWriter::create(&path, false).unwrap();
-        let spec = ImageSpec { name: "image", geometry: &geometry, element: ElementType::U16, window: None };
+        let spec = ImageSpec {
+            name: "image",
+            geometry: &geometry,
+            element: ElementType::U16,
+            content: Content::Grey,
+            window: None,
+        };
         let image = store.image("", &spec).unwrap();
         for level in image.levels() {
             for shard in level.shards() {

@@ -7,6 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::TempDir;
 
 use super::abandoned::{self, REPLACED};
+use super::compression::{Compression, Content};
 use super::files::{create_parent, io_error, sync_tree, write_json};
 use super::level::LevelWriter;
 use super::metadata::{self, ImageSpec, LabelSpec};
@@ -21,6 +22,7 @@ const METADATA: &str = "zarr.json";
 pub struct StoreWriter {
     path: PathBuf,
     overwrite: bool,
+    compression: Compression,
     partial: TempDir,
     /// Says so to whoever ends the process.
     unfinished: Unfinished,
@@ -64,9 +66,23 @@ impl StoreWriter {
         // Locked before anything is in it: see `abandoned`.
         let claim = abandoned::claim(partial.path());
         let unfinished = Unfinished::new(partial.path());
-        let store = Self { path, overwrite, partial, unfinished, _claim: claim, labels: Mutex::default() };
+        let store = Self {
+            path,
+            overwrite,
+            compression: Compression::default(),
+            partial,
+            unfinished,
+            _claim: claim,
+            labels: Mutex::default(),
+        };
         store.ensure_groups(Path::new("")).map_err(|error| error.at(&store.path))?;
         Ok(store)
+    }
+
+    /// The same store with chunks packed in another way than fast.
+    #[must_use]
+    pub fn packed(self, compression: Compression) -> Self {
+        Self { compression, ..self }
     }
 
     /// The folder that holds the store until it is finished.
@@ -98,7 +114,7 @@ impl StoreWriter {
     pub fn image(&self, group: &str, spec: &ImageSpec<'_>) -> Result<ImageWriter> {
         let levels = plan_levels(spec.geometry);
         let attributes = metadata::image(spec, &levels);
-        self.multiscale(group, &metadata::group(Some(attributes)), levels, spec.element)
+        self.multiscale(group, &metadata::group(Some(attributes)), levels, (spec.element, spec.content))
             .map_err(|error| error.at(&self.path))
     }
 
@@ -170,7 +186,7 @@ impl StoreWriter {
             &format!("labels/{}", spec.name),
             &metadata::group(Some(attributes)),
             levels,
-            spec.element,
+            (spec.element, Content::Repeated),
         )?;
         // Listed last, under the lock until it is on disk: the list names what is there, whichever thread comes first.
         let mut names = self.lock();
@@ -185,15 +201,16 @@ impl StoreWriter {
         group: &str,
         document: &serde_json::Value,
         levels: Vec<LevelPlan>,
-        element: ElementType,
+        (element, content): (ElementType, Content),
     ) -> Result<ImageWriter> {
         let folder = self.inside(group);
         assert!(!folder.join("0").exists(), "the store holds an image at {group:?} already");
         self.ensure_groups(Path::new(group))?;
-        let levels = levels.into_iter().enumerate();
-        let levels =
-            levels.map(|(level, plan)| LevelWriter::create(&folder.join(level.to_string()), &self.path, plan, element));
-        let levels = levels.collect::<Result<_>>()?;
+        let packed = (content, self.compression);
+        let create = |(level, plan): (usize, LevelPlan)| {
+            LevelWriter::create(&folder.join(level.to_string()), &self.path, plan, element, packed)
+        };
+        let levels = levels.into_iter().enumerate().map(create).collect::<Result<_>>()?;
         write_json(&folder.join(METADATA), document)?;
         Ok(ImageWriter { levels })
     }
@@ -277,7 +294,13 @@ mod tests {
 
     fn write_store(path: &Path, overwrite: bool, value: u8) -> Result<()> {
         let store = StoreWriter::create(path, overwrite)?;
-        let spec = ImageSpec { name: "image", geometry: &geometry(), element: ElementType::U8, window: None };
+        let spec = ImageSpec {
+            name: "image",
+            geometry: &geometry(),
+            element: ElementType::U8,
+            content: Content::Grey,
+            window: None,
+        };
         let image = store.image("", &spec)?;
         let level = &image.levels()[0];
         for shard in level.shards() {
@@ -390,7 +413,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let store = StoreWriter::create(&folder.path().join("out.zarr"), false).unwrap();
         let geometry = geometry();
-        let spec = ImageSpec { name: "u", geometry: &geometry, element: ElementType::F32, window: None };
+        let spec = ImageSpec {
+            name: "u",
+            geometry: &geometry,
+            element: ElementType::F32,
+            content: Content::Field,
+            window: None,
+        };
         store.image("levelset/object-1", &spec).unwrap();
         store.image("levelset/object-2", &spec).unwrap();
         for name in ["segmentation", "border"] {

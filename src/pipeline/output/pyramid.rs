@@ -187,7 +187,7 @@ pub fn write_levels<T: Element>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::ome_zarr::{ImageSpec, StoreWriter};
+    use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 
     #[test]
     fn visits_take_each_chunk_once_shard_by_shard() {
@@ -195,7 +195,12 @@ mod tests {
         let store = StoreWriter::create(&folder.path().join("out.zarr"), false).unwrap();
         let geometry = Geometry { shape: [300, 290, 270], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
         let image = |group, element| {
-            store.image(group, &ImageSpec { name: group, geometry: &geometry, element, window: None }).unwrap()
+            store
+                .image(
+                    group,
+                    &ImageSpec { name: group, geometry: &geometry, element, content: Content::Grey, window: None },
+                )
+                .unwrap()
         };
         let (wide, narrow) = (image("a", ElementType::F32), image("b", ElementType::U8));
         for threads in [1, 2, 64] {

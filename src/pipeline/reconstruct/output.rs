@@ -8,7 +8,7 @@ use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage};
 use crate::grid::{Box3, Geometry, digits};
-use crate::io::ome_zarr::{ImageSpec, StoreWriter};
+use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::enclosure::search::{Deepest, Found, Hole, Search, Start, enclose, first_reach_for};
 use crate::pipeline::enclosure::sheets::{Company, hold_sheets};
@@ -92,7 +92,13 @@ impl Reconstruction {
         let fields: [(&str, &str, &dyn BoxSource<f32>, f64); 2] =
             [("", "levelset", &self.level_set(), 1.0), ("distance", "distance", &self.distance(), farthest)];
         for (group, name, field, high) in fields {
-            let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
+            let spec = ImageSpec {
+                name,
+                geometry,
+                element: ElementType::F32,
+                content: Content::Field,
+                window: Some([0.0, high]),
+            };
             let stage = engine.stage(&format!("write {name}"), 0);
             stage.voxels(geometry.domain().volume());
             write_levels::<f32>(&stage, engine, store.image(group, &spec)?, field, Reduce::Mean)?;

@@ -13,7 +13,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
 use crate::grid::{Geometry, digits};
 use crate::io::geometry::write::ply::PlyWriter;
-use crate::io::ome_zarr::{ImageSpec, StoreWriter};
+use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::Hausdorff;
 use crate::pipeline::enclosure::needs::SOLVE_BYTES;
 use crate::pipeline::enclosure::region::voxel_bounds;
@@ -166,7 +166,13 @@ fn draw(
         let farthest = f64::from(solution.distance.absent(0));
         for (name, field, high) in [("levelset", u, 1.0), ("distance", &solution.distance, farthest)] {
             let group = if several { format!("{name}/object-{label}") } else { name.into() };
-            let spec = ImageSpec { name, geometry, element: ElementType::F32, window: Some([0.0, high]) };
+            let spec = ImageSpec {
+                name,
+                geometry,
+                element: ElementType::F32,
+                content: Content::Field,
+                window: Some([0.0, high]),
+            };
             let stage = engine.stage(&format!("write {name} {label}"), 0);
             write_levels::<f32>(&stage, engine, store.image(&group, &spec)?, field, Reduce::Mean)?;
             stage.finish();

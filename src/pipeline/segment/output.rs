@@ -14,7 +14,7 @@ use super::tissue::{join_objects, write_faces};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, Geometry};
-use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, StoreWriter};
+use crate::io::ome_zarr::{Content, ImageSpec, LabelColor, LabelSpec, StoreWriter};
 use crate::kernel::image::labels;
 use crate::kernel::image::picture::palette::label_color;
 use crate::kernel::surface::Contact;
@@ -194,7 +194,8 @@ fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>
     let stage = engine.stage("write image", 0);
     stage.voxels(geometry.domain().volume());
     let window = Some([image.range.low, image.range.high]);
-    let written = store.image("", &ImageSpec { name: "image", geometry, element: T::TYPE, window })?;
+    let written =
+        store.image("", &ImageSpec { name: "image", geometry, element: T::TYPE, content: Content::Grey, window })?;
     write_levels::<T>(&stage, engine, written, &image.bricks, Reduce::Mean)?;
     stage.finish();
     Ok(())

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use strandline::grid::Geometry;
-use strandline::io::ome_zarr::{ImageSpec, StoreWriter};
+use strandline::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use strandline::store::Element;
 use zarrs::array::Array;
 use zarrs::filesystem::FilesystemStore;
@@ -126,7 +126,7 @@ fn written<T: Element>() -> Files {
     let store = StoreWriter::create(&path, false).expect("a new store");
     let geometry =
         Geometry { shape: [5, 4, 3], spacing: [0.5, 0.5, 2.0], origin: [0.0; 3], unit: Some("micrometer".into()) };
-    let spec = ImageSpec { name: "seed", geometry: &geometry, element: T::TYPE, window: None };
+    let spec = ImageSpec { name: "seed", geometry: &geometry, element: T::TYPE, content: Content::Grey, window: None };
     let image = store.image("", &spec).expect("an image");
     for level in image.levels() {
         for shard in level.shards() {

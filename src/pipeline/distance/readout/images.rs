@@ -5,7 +5,7 @@ use super::tile::Tile;
 use crate::error::Result;
 use crate::exec::{Engine, Stage};
 use crate::grid::{Box3, DataSets, Geometry};
-use crate::io::ome_zarr::{ImageSpec, LabelColor, LabelSpec, LevelWriter, StoreWriter};
+use crate::io::ome_zarr::{Content, ImageSpec, LabelColor, LabelSpec, LevelWriter, StoreWriter};
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::image::picture::palette::label_color;
 use crate::pipeline::output::pyramid::{Pyramid, Reduce, held};
@@ -138,13 +138,13 @@ impl<'a, P: Precision> Images<'a, P> {
 }
 
 fn distance_spec<P: Element>(geometry: &Geometry, window: Option<[f64; 2]>) -> ImageSpec<'_> {
-    ImageSpec { name: "distance", geometry, element: P::TYPE, window }
+    ImageSpec { name: "distance", geometry, element: P::TYPE, content: Content::Field, window }
 }
 
 fn coordinates<T: Element>(engine: &Engine, geometry: &Geometry, store: &StoreWriter) -> Result<[Pyramid<T>; 3]> {
     let image = |name: &str| {
         let group = format!("closest-point/{name}");
-        let spec = ImageSpec { name: &group, geometry, element: T::TYPE, window: None };
+        let spec = ImageSpec { name: &group, geometry, element: T::TYPE, content: Content::Repeated, window: None };
         Pyramid::new(engine, store.image(&group, &spec)?, Reduce::Mean)
     };
     Ok([image("x")?, image("y")?, image("z")?])
