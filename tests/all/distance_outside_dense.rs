@@ -6,7 +6,8 @@
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
 use strandline::pipeline::distance::{DistanceSettings, Method, Schedule};
 
-use super::distance_outside::{plainly, settings, solved_on, to_triangle};
+use super::distance_outside::{plainly, settings, solved_on};
+use crate::common::around::to_triangle;
 use crate::common::lab::PlainGrid;
 use crate::common::random::Random;
 use crate::common::textbook::{position, squared};

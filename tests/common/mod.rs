@@ -1,5 +1,6 @@
 //! Shapes, files and slow plain references that several tests share.
 
+pub(crate) mod around;
 pub(crate) mod ball;
 pub(crate) mod clouds;
 pub(crate) mod damage;
