@@ -2,6 +2,8 @@
 
 use half::f16;
 
+use crate::grid::SourceState;
+
 /// The type of a voxel, known only when a file is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ElementType {
@@ -99,6 +101,7 @@ macro_rules! element {
 element!(u8, U8, f64::from, |v: f64| v.round() as u8);
 element!(u16, U16, f64::from, |v: f64| v.round() as u16);
 element!(u32, U32, f64::from, |v: f64| v.round() as u32);
+element!(SourceState, U32, |s: SourceState| f64::from(s.bits()), |v: f64| SourceState::from_bits(v.round() as u32));
 element!(f16, F16, f64::from, f16::from_f64);
 element!(f32, F32, f64::from, |v: f64| v as f32);
 element!(f64, F64, |v: f64| v, |v: f64| v);

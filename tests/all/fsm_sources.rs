@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use half::f16;
 use proptest::prelude::*;
 use rstar::RTree;
+use strandline::grid::NO_SOURCE;
 use strandline::grid::{Box3, DataSets, Geometry, PointBins, TriangleBins};
-use strandline::kernel::distance::state::source::NO_SOURCE;
 use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources};
 
 use crate::common::clouds::{grid_around, random_cloud, sponge_and_sphere};

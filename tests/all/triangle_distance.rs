@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
+use strandline::grid::NO_SOURCE;
 use strandline::grid::{Box3, BrickGrid, Geometry, TriangleBins, TriangleMesh};
 use strandline::io::geometry::read::source::Source;
 use strandline::io::geometry::read::sources::read_source;
 use strandline::kernel::distance::seeding::triangles::{cut_cells, fix_voxels};
-use strandline::kernel::distance::state::source::NO_SOURCE;
 use strandline::kernel::geometry::winding_number::{WindingTree, solid_angle};
 
 use crate::common::meshes::{cuboid, joined, sphere};

@@ -1,8 +1,8 @@
 //! Distances as the schedules give them: any method of the table on a plain cloud, read back into plain vectors.
 
+use strandline::grid::NO_SOURCE;
 use strandline::grid::{Box3, Geometry, PointBins};
 use strandline::kernel::distance::state::neighbours::Neighbours;
-use strandline::kernel::distance::state::source::NO_SOURCE;
 use strandline::pipeline::distance::{self, Method, Options, Schedule, Sources, Textbook};
 
 use super::lab::{Lab, dense};

@@ -13,7 +13,7 @@ use super::seeding::outside::look_outside;
 use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
-use crate::grid::{BrickSet, DataSets};
+use crate::grid::{BrickSet, DataSets, SourceState};
 use crate::kernel::distance::methods::all_neighbours::AllNeighbours;
 use crate::kernel::distance::methods::dijkstra_pythagoras::DijkstraPythagoras;
 use crate::kernel::distance::methods::fast_marching::FastMarching;
@@ -25,7 +25,6 @@ use crate::kernel::distance::repair::bends::REACH;
 use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::kernel::distance::tracking::parents::{Parents, ShortestWay, UpwindSum};
 use crate::store::BrickArray;
 
@@ -102,9 +101,9 @@ impl<'a> Solving<'_, 'a> {
     }
 
     /// The start of a method that keeps no sources, and a field with those of its fixed voxels.
-    fn start_apart<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, BrickArray<u32>, Seeded)> {
+    fn start_apart<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, BrickArray<SourceState>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
-        let sources = BrickArray::blank(self.engine.scratch(), self.set, NO_SOURCE)?;
+        let sources = BrickArray::blank(self.engine.scratch(), self.set, SourceState::FAR)?;
         let seeded =
             initialise::<M>(self.stage, self.sources, &state, Some(&sources), (Start::Fixed, self.options.farthest))?;
         Ok((state, sources, seeded))
@@ -173,7 +172,7 @@ impl<'a> Solving<'_, 'a> {
     fn trace<P: Precision, R: Parents>(
         &self,
         state: &BrickArray<P>,
-        sources: &BrickArray<u32>,
+        sources: &BrickArray<SourceState>,
         seeded: &Seeded,
     ) -> Result<()> {
         let (geometry, labelled) = (self.sources.geometry, self.labelled());

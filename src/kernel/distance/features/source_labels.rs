@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::grid::DataSets;
-use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::grid::{DataSets, NO_SOURCE};
 use crate::kernel::image::labels::count;
 
 /// Sources whose labels are looked up at once.

@@ -6,8 +6,8 @@
 //! so the tile is not laid out along diagonals, and its end depends on the sweeps' order where sources are lost. In
 //! and out: a grown tile of source indices, the top bit set on fixed voxels. Halo 1, all 26 directions. No scratch.
 
-use super::tracked::{TrackedSource, has_source, source_of};
-use crate::grid::{Box3, NEIGHBOURS_26};
+use super::tracked::TrackedSource;
+use crate::grid::{Box3, NEIGHBOURS_26, NO_SOURCE, SourceState};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Real;
@@ -27,7 +27,7 @@ impl<S: TrackedSource> AllNeighbours<S> {
         Self { sources }
     }
 
-    fn pass(&self, tile: &mut HaloTile<u32>, part: &Box3, upward: [bool; 3]) -> Swept {
+    fn pass(&self, tile: &mut HaloTile<SourceState>, part: &Box3, upward: [bool; 3]) -> Swept {
         let (valid, pitch) = (tile.valid(), tile.pitch() as i64);
         let ordered = |axis: usize| {
             let count = valid[axis] as i64;
@@ -56,13 +56,13 @@ impl<S: TrackedSource> AllNeighbours<S> {
     }
 
     /// The nearest of the kept source and the 26 beside.
-    fn nearest(&self, state: &[u32], at: usize, steps: &[isize; 26], voxel: [i64; 3]) -> u32 {
+    fn nearest(&self, state: &[SourceState], at: usize, steps: &[isize; 26], voxel: [i64; 3]) -> SourceState {
         let here = self.position(voxel);
-        let mut best = (state[at], None);
-        let mut last = state[at];
+        let mut best = (state[at].source(), None);
+        let mut last = best.0;
         for step in steps {
-            let source = source_of(state[at.wrapping_add_signed(*step)]);
-            if !has_source(source) || source == best.0 || source == last {
+            let source = state[at.wrapping_add_signed(*step)].source();
+            if source == NO_SOURCE || source == best.0 || source == last {
                 continue;
             }
             last = source;
@@ -71,14 +71,14 @@ impl<S: TrackedSource> AllNeighbours<S> {
             let nearer = self.sources.is_nearer((squared, source), (kept, best.0));
             best = if nearer { (source, Some(squared)) } else { (best.0, Some(kept)) };
         }
-        best.0
+        SourceState::trial(best.0)
     }
 
     /// The axes along which a voxel of the tile that was passed before is nearer to the source at place `at` than to
     /// its own: of a neighbour's offset the slowest axis decides whether it was.
     fn carried_back(
         &self,
-        state: &[u32],
+        state: &[SourceState],
         (at, voxel): (usize, [i64; 3]),
         steps: &[isize; 26],
         part: &Box3,
@@ -94,7 +94,8 @@ impl<S: TrackedSource> AllNeighbours<S> {
                 continue;
             }
             let there = self.position(there);
-            let [entering, own] = [state[at], own].map(|state| (self.sources.squared(there, state), state));
+            let with_distance = |state: SourceState| (self.sources.squared(there, state.source()), state.source());
+            let [entering, own] = [state[at], own].map(with_distance);
             back |= Swept::from(self.sources.is_nearer(entering, own)) << slowest;
         }
         back
@@ -106,28 +107,28 @@ impl<S: TrackedSource> AllNeighbours<S> {
 }
 
 impl<S: TrackedSource> DistanceMethod for AllNeighbours<S> {
-    type State = u32;
+    type State = SourceState;
     type Work = ();
-    const UNKNOWN: u32 = S::UNKNOWN;
+    const UNKNOWN: SourceState = SourceState::FAR;
 
-    fn fixed(squared: f64, source: u32) -> u32 {
+    fn fixed(squared: f64, source: u32) -> SourceState {
         S::fixed(squared, source)
     }
 
-    fn told(source: u32) -> Option<u32> {
+    fn told(source: u32) -> Option<SourceState> {
         S::told(source)
     }
 
-    fn is_fixed(state: u32) -> bool {
+    fn is_fixed(state: SourceState) -> bool {
         S::is_fixed(state)
     }
 
     fn work(_: usize) {}
 
-    fn settle(&self, tile: &mut HaloTile<u32>, (): &mut (), part: &Box3) -> bool {
+    fn settle(&self, tile: &mut HaloTile<SourceState>, (): &mut (), part: &Box3) -> bool {
         let first = downhill(tile, |at, state| {
             let here = self.position(std::array::from_fn(|a| part.lo[a] + at[a] as i64));
-            self.sources.squared(here, state).f64()
+            self.sources.squared(here, state.source()).f64()
         });
         sweep_until_quiet(first, |upward| self.pass(tile, part, upward))
     }
@@ -136,19 +137,19 @@ impl<S: TrackedSource> DistanceMethod for AllNeighbours<S> {
         Neighbours::All
     }
 
-    fn entering(&self, beside: u32, state: u32, voxel: [i64; 3]) -> Option<f64> {
+    fn entering(&self, beside: SourceState, state: SourceState, voxel: [i64; 3]) -> Option<f64> {
         self.sources.entering(beside, state, voxel)
     }
 
-    fn distance(&self, state: u32, voxel: [i64; 3]) -> f64 {
+    fn distance(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
         self.sources.distance(state, voxel)
     }
 
-    fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
+    fn distance_squared(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
         self.sources.distance_squared(state, voxel)
     }
 
-    fn source(state: u32) -> Option<u32> {
+    fn source(state: SourceState) -> Option<u32> {
         S::source(state)
     }
 }

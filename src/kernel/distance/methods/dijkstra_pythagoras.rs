@@ -10,12 +10,11 @@
 //! on voxels that a source fixed. Halo 1: faces, or all of it where sources are offered to all 26 neighbours. Scratch:
 //! about 20 bytes a voxel. A voxel asks for about five distances.
 
-use super::tracked::{TrackedSource, has_source, source_of};
-use crate::grid::{Box3, Geometry, NEIGHBOURS_26};
+use super::tracked::TrackedSource;
+use crate::grid::{Box3, Geometry, NEIGHBOURS_26, SourceState};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Real;
-use crate::kernel::distance::state::source::FIXED;
 use crate::kernel::distance::tile_order::buckets::Buckets;
 use crate::tile::HaloTile;
 
@@ -45,7 +44,7 @@ pub struct Work<A> {
     valid: [usize; 3],
     neighbours: Neighbours,
     /// The grown tile; ghosts count as fixed.
-    source: Vec<u32>,
+    source: Vec<SourceState>,
     /// Squared distances to the sources; below zero where nobody asked yet.
     squared: Vec<A>,
     /// Coordinates of voxels along the axes, by index from the lower ghost.
@@ -63,7 +62,7 @@ impl<A: Real> Work<A> {
             pitch,
             valid: [edge; 3],
             neighbours: Neighbours::Faces,
-            source: vec![FIXED; len],
+            source: vec![SourceState::FAR.freeze(); len],
             squared: vec![A::default(); len],
             at: std::array::from_fn(|_| vec![A::default(); pitch]),
             queue: Buckets::new(len),
@@ -72,7 +71,7 @@ impl<A: Real> Work<A> {
         }
     }
 
-    fn load<S: TrackedSource<Number = A>>(&mut self, sources: &S, tile: &HaloTile<u32>, part: &Box3) {
+    fn load<S: TrackedSource<Number = A>>(&mut self, sources: &S, tile: &HaloTile<SourceState>, part: &Box3) {
         self.source.copy_from_slice(tile.data());
         self.squared.fill(A::of(-1.0));
         let (valid, pitch) = (tile.valid(), self.pitch);
@@ -86,14 +85,15 @@ impl<A: Real> Work<A> {
             for layer in [0, valid[axis] + 1] {
                 for j in 0..valid[v] + 2 {
                     for i in 0..valid[u] + 2 {
-                        self.source[i * strides[u] + j * strides[v] + layer * strides[axis]] |= FIXED;
+                        let ghost = &mut self.source[i * strides[u] + j * strides[v] + layer * strides[axis]];
+                        *ghost = ghost.freeze();
                     }
                 }
             }
         }
     }
 
-    fn store(&self, tile: &mut HaloTile<u32>) {
+    fn store(&self, tile: &mut HaloTile<SourceState>) {
         let ([nx, ny, nz], pitch) = (tile.valid(), self.pitch);
         for z in 1..=nz {
             for y in 1..=ny {
@@ -107,8 +107,9 @@ impl<A: Real> Work<A> {
     #[inline(always)]
     fn offer<S: TrackedSource<Number = A>>(&mut self, sources: &S, from: usize, at: [usize; 3]) {
         let place = (at[2] * self.pitch + at[1]) * self.pitch + at[0];
-        let (source, kept) = (source_of(self.source[from]), self.source[place]);
-        if kept & FIXED != 0 || kept == source {
+        let (source, state) = (self.source[from].source(), self.source[place]);
+        let kept = state.source();
+        if state.is_frozen() || kept == source {
             return;
         }
         let here = [self.at[0][at[0]], self.at[1][at[1]], self.at[2][at[2]]];
@@ -118,7 +119,7 @@ impl<A: Real> Work<A> {
         let squared = sources.squared(here, source);
         if sources.is_nearer((squared, source), (self.squared[place], kept)) {
             self.squared[place] = squared;
-            self.source[place] = source;
+            self.source[place] = SourceState::trial(source);
             self.fallen.push(place as u32);
         }
     }
@@ -157,7 +158,7 @@ impl<A: Real> Work<A> {
                 let inside = (1..=valid[1]).contains(&y) && (1..=valid[2]).contains(&z);
                 let step = if inside { valid[0] + 1 } else { 1 };
                 for x in (0..valid[0] + 2).step_by(step) {
-                    if has_source(self.source[(z * self.pitch + y) * self.pitch + x]) {
+                    if self.source[(z * self.pitch + y) * self.pitch + x].has_source() {
                         self.offer_to_all(sources, [x, y, z]);
                     }
                 }
@@ -173,7 +174,7 @@ impl<A: Real> Work<A> {
             for y in 1..=valid[1] {
                 let row = z * strides[2] + y * strides[1];
                 for x in 1..=valid[0] {
-                    if has_source(self.source[row + x]) {
+                    if self.source[row + x].has_source() {
                         self.offer_around(sources, [x, y, z]);
                     }
                 }
@@ -188,7 +189,7 @@ impl<A: Real> Work<A> {
                 for j in 1..=valid[v] {
                     for i in 1..=valid[u] {
                         let ghost = i * strides[u] + j * strides[v] + layer * strides[axis];
-                        if has_source(self.source[ghost]) {
+                        if self.source[ghost].has_source() {
                             let mut at = [inner; 3];
                             (at[u], at[v]) = (i, j);
                             self.offer(sources, ghost, at);
@@ -226,19 +227,19 @@ impl<A: Real> Work<A> {
 }
 
 impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
-    type State = u32;
+    type State = SourceState;
     type Work = Work<S::Number>;
-    const UNKNOWN: u32 = S::UNKNOWN;
+    const UNKNOWN: SourceState = SourceState::FAR;
 
-    fn fixed(squared: f64, source: u32) -> u32 {
+    fn fixed(squared: f64, source: u32) -> SourceState {
         S::fixed(squared, source)
     }
 
-    fn told(source: u32) -> Option<u32> {
+    fn told(source: u32) -> Option<SourceState> {
         S::told(source)
     }
 
-    fn is_fixed(state: u32) -> bool {
+    fn is_fixed(state: SourceState) -> bool {
         S::is_fixed(state)
     }
 
@@ -246,7 +247,7 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
         Work::new(edge)
     }
 
-    fn settle(&self, tile: &mut HaloTile<u32>, work: &mut Self::Work, part: &Box3) -> bool {
+    fn settle(&self, tile: &mut HaloTile<SourceState>, work: &mut Self::Work, part: &Box3) -> bool {
         let valid = tile.valid();
         work.load(&self.sources, tile, part);
         work.neighbours = self.neighbours;
@@ -264,19 +265,19 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
         self.neighbours
     }
 
-    fn entering(&self, beside: u32, state: u32, voxel: [i64; 3]) -> Option<f64> {
+    fn entering(&self, beside: SourceState, state: SourceState, voxel: [i64; 3]) -> Option<f64> {
         self.sources.entering(beside, state, voxel)
     }
 
-    fn distance(&self, state: u32, voxel: [i64; 3]) -> f64 {
+    fn distance(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
         self.sources.distance(state, voxel)
     }
 
-    fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
+    fn distance_squared(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
         self.sources.distance_squared(state, voxel)
     }
 
-    fn source(state: u32) -> Option<u32> {
+    fn source(state: SourceState) -> Option<u32> {
         S::source(state)
     }
 }

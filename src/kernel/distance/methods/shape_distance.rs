@@ -6,11 +6,10 @@
 //! where a neighbour's differs from the kept one and from those just asked. Triangles are numbered after points; so of
 //! equal distances the one to the lower label counts, and among those of one label the one kept.
 
-use super::tracked::{TrackedSource, has_source, source_of};
-use crate::grid::{Box3, DataSets, Geometry};
+use super::tracked::TrackedSource;
+use crate::grid::{Box3, DataSets, Geometry, NO_SOURCE, SourceState};
 use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
-use crate::kernel::distance::state::source::FIXED;
-use crate::kernel::distance::state::source::{NO_SOURCE, squared_distance};
+use crate::kernel::distance::state::source::squared_distance;
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
 use crate::kernel::geometry::triangle::Triangle;
 use crate::tile::HaloTile;
@@ -31,9 +30,9 @@ impl<'a> ShapeDistance<'a> {
         Self { geometry, sets, triangles }
     }
 
-    /// Whether the first of two states has a source of a lower label than the second's.
-    pub(crate) fn has_lower_label(&self, state: u32, than: u32) -> bool {
-        has_source(state) && self.sets.label(source_of(state)) < self.sets.label(source_of(than))
+    /// Whether the first of two sources has a lower label than the second.
+    pub(crate) fn has_lower_label(&self, source: u32, than: u32) -> bool {
+        source != NO_SOURCE && self.sets.label(source) < self.sets.label(than)
     }
 
     /// The coordinate of a voxel's centre along an axis.
@@ -43,7 +42,7 @@ impl<'a> ShapeDistance<'a> {
 
     /// The squared distance of a world position to a source; infinite to none.
     pub(crate) fn squared(&self, here: [f64; 3], source: u32) -> f64 {
-        let source = (source & !FIXED) as usize;
+        let source = source as usize;
         if let Some(&point) = self.sets.positions.get(source) {
             return squared_distance(here, point);
         }
@@ -57,11 +56,18 @@ impl<'a> ShapeDistance<'a> {
     }
 
     /// The nearest of the kept source and of those beside that were not asked yet.
-    fn nearest(&self, state: &[u32], asked: &mut Asked, at: usize, strides: [usize; 3], here: [f64; 3]) -> u32 {
+    fn nearest(
+        &self,
+        state: &[SourceState],
+        asked: &mut Asked,
+        at: usize,
+        strides: [usize; 3],
+        here: [f64; 3],
+    ) -> SourceState {
         let due = std::mem::take(&mut asked.due[at]);
-        let (mut best, mut now) = (state[at], [NO_SOURCE; 6]);
+        let (mut best, mut now) = (state[at].source(), [NO_SOURCE; 6]);
         for side in (0..6).filter(|side| due >> side & 1 == 1) {
-            let source = state[beside(at, side, strides)] & !FIXED;
+            let source = state[beside(at, side, strides)].source();
             if source == NO_SOURCE || source == best || now.contains(&source) {
                 continue;
             }
@@ -72,10 +78,10 @@ impl<'a> ShapeDistance<'a> {
                 (best, asked.squared[at]) = (source, squared);
             }
         }
-        best
+        SourceState::trial(best)
     }
 
-    fn pass(&self, tile: &mut HaloTile<u32>, asked: &mut Asked, part: &Box3, upward: [bool; 3]) -> Swept {
+    fn pass(&self, tile: &mut HaloTile<SourceState>, asked: &mut Asked, part: &Box3, upward: [bool; 3]) -> Swept {
         let (valid, pitch) = (tile.valid(), tile.pitch());
         let strides = [1, pitch, pitch * pitch];
         let ordered = |axis: usize| {
@@ -89,7 +95,7 @@ impl<'a> ShapeDistance<'a> {
                 for x in ordered(0) {
                     let (at, state) = (row + x, tile.data_mut());
                     let kept = state[at];
-                    if kept & FIXED != 0 || asked.due[at] == 0 {
+                    if kept.is_frozen() || asked.due[at] == 0 {
                         continue;
                     }
                     let voxel = [part.lo[0] + x as i64, part.lo[1] + y as i64, part.lo[2] + z as i64];
@@ -111,7 +117,7 @@ impl<'a> ShapeDistance<'a> {
     /// than to its own.
     fn carried_back(
         &self,
-        state: &[u32],
+        state: &[SourceState],
         asked: &mut Asked,
         (at, voxel): (usize, [i64; 3]),
         strides: [usize; 3],
@@ -120,14 +126,15 @@ impl<'a> ShapeDistance<'a> {
     ) -> Swept {
         let mut is_nearer = |axis: usize| {
             let before = if upward[axis] { at - strides[axis] } else { at + strides[axis] };
-            if !inside[axis] || state[before] & FIXED != 0 || state[before] == state[at] {
+            if !inside[axis] || state[before].is_frozen() || state[before] == state[at] {
                 return false;
             }
             let mut there = voxel;
             there[axis] += if upward[axis] { -1 } else { 1 };
             let there = self.geometry.position(there);
-            let own = asked.squared(before, || self.squared(there, state[before]));
-            self.is_nearer((self.squared(there, state[at]), state[at]), (own, state[before]))
+            let [carried, kept] = [state[at].source(), state[before].source()];
+            let own = asked.squared(before, || self.squared(there, kept));
+            self.is_nearer((self.squared(there, carried), carried), (own, kept))
         };
         (0..3).map(|axis| u32::from(is_nearer(axis)) << axis).sum()
     }
@@ -172,59 +179,59 @@ fn beside(at: usize, side: usize, strides: [usize; 3]) -> usize {
 }
 
 impl DistanceMethod for ShapeDistance<'_> {
-    type State = u32;
+    type State = SourceState;
     type Work = Asked;
-    const UNKNOWN: u32 = NO_SOURCE;
+    const UNKNOWN: SourceState = SourceState::FAR;
 
-    fn fixed(_: f64, source: u32) -> u32 {
-        source | FIXED
+    fn fixed(_: f64, source: u32) -> SourceState {
+        SourceState::frozen(source)
     }
 
-    fn told(source: u32) -> Option<u32> {
-        Some(source)
+    fn told(source: u32) -> Option<SourceState> {
+        Some(SourceState::trial(source))
     }
 
-    fn is_fixed(state: u32) -> bool {
-        state & FIXED != 0
+    fn is_fixed(state: SourceState) -> bool {
+        state.is_frozen()
     }
 
     fn work(edge: usize) -> Asked {
         Asked::new(edge)
     }
 
-    fn settle(&self, tile: &mut HaloTile<u32>, asked: &mut Asked, part: &Box3) -> bool {
+    fn settle(&self, tile: &mut HaloTile<SourceState>, asked: &mut Asked, part: &Box3) -> bool {
         asked.forget();
         let first = downhill(tile, |at, state| {
-            self.distance_squared(state, std::array::from_fn(|a| part.lo[a] + at[a] as i64))
+            self.distance_squared(state.source(), std::array::from_fn(|a| part.lo[a] + at[a] as i64))
         });
         sweep_until_quiet(first, |upward| self.pass(tile, asked, part, upward))
     }
 
-    fn entering(&self, beside: u32, state: u32, voxel: [i64; 3]) -> Option<f64> {
-        if Self::is_fixed(state) || beside & !FIXED == state {
+    fn entering(&self, beside: SourceState, state: SourceState, voxel: [i64; 3]) -> Option<f64> {
+        let [beside, kept] = [beside.source(), state.source()];
+        if state.is_frozen() || beside == kept {
             return None;
         }
         let here = self.geometry.position(voxel);
         let entering = self.squared(here, beside);
-        let kept = (self.squared(here, state), state);
-        self.is_nearer((entering, beside), kept).then(|| entering.sqrt())
+        self.is_nearer((entering, beside), (self.squared(here, kept), kept)).then(|| entering.sqrt())
     }
 
-    fn distance(&self, state: u32, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(state, voxel).sqrt()
+    fn distance(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
+        self.distance_squared(state.source(), voxel).sqrt()
     }
 
-    fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(state, voxel)
+    fn distance_squared(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
+        self.distance_squared(state.source(), voxel)
     }
 
-    fn source(state: u32) -> Option<u32> {
-        Some(state & !FIXED).filter(|&s| s != NO_SOURCE)
+    fn source(state: SourceState) -> Option<u32> {
+        state.known()
     }
 }
 
 impl OrderedSweeps for ShapeDistance<'_> {
-    fn sweep(&self, tile: &mut HaloTile<u32>, asked: &mut Asked, part: &Box3, upward: [bool; 3]) -> bool {
+    fn sweep(&self, tile: &mut HaloTile<SourceState>, asked: &mut Asked, part: &Box3, upward: [bool; 3]) -> bool {
         asked.forget();
         self.pass(tile, asked, part, upward) & CHANGED != 0
     }
@@ -237,8 +244,8 @@ impl TrackedSource for ShapeDistance<'_> {
         self.coordinate(axis, index)
     }
 
-    fn squared(&self, here: [f64; 3], state: u32) -> f64 {
-        self.squared(here, state)
+    fn squared(&self, here: [f64; 3], source: u32) -> f64 {
+        self.squared(here, source)
     }
 
     #[inline]

@@ -9,10 +9,9 @@
 //! tile; the sources of a brick, `[z][y][x]`; ghosts as they are now and as they were before the sweep. Out: the
 //! brick's sources.
 
-use super::tracked::{has_source, source_of};
 use super::upwind::Upwind;
 use crate::grid::MOST_SOURCES;
-use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::grid::{NO_SOURCE, SourceState};
 use crate::kernel::distance::tile_order::diagonals::MOST_LANES;
 use crate::tile::HaloTile;
 
@@ -44,17 +43,17 @@ impl Fell {
     }
 }
 
-/// The state of a voxel whose source is not known yet: below [`NO_SOURCE`], above all sources.
-fn pending(from: Upwind) -> u32 {
-    NO_SOURCE - 1 - u32::from(from.0)
+/// The state of a voxel whose source is not known yet: its index is below [`NO_SOURCE`] and above all sources.
+fn pending(from: Upwind) -> SourceState {
+    SourceState::trial(NO_SOURCE - 1 - u32::from(from.0))
 }
 
-fn pending_from(state: u32) -> Option<Upwind> {
-    let from = NO_SOURCE.wrapping_sub(1).wrapping_sub(state);
+fn pending_from(state: SourceState) -> Option<Upwind> {
+    let from = NO_SOURCE.wrapping_sub(1).wrapping_sub(state.bits());
     u8::try_from(from).ok().map(Upwind)
 }
 
-fn any_pending(states: &[u32]) -> bool {
+fn any_pending(states: &[SourceState]) -> bool {
     states.iter().fold(false, |any, &state| any | pending_from(state).is_some())
 }
 
@@ -83,9 +82,9 @@ pub struct SweepSources {
 #[derive(Debug)]
 pub struct Ghosts {
     /// Their sources before the sweep.
-    pub before: HaloTile<u32>,
+    pub before: HaloTile<SourceState>,
     /// Their sources now, in tiles that were swept already.
-    pub now: HaloTile<u32>,
+    pub now: HaloTile<SourceState>,
 }
 
 impl Ghosts {
@@ -98,7 +97,7 @@ impl Ghosts {
 
 /// A brick and its ghosts; which tiles were swept.
 struct Around<'a> {
-    brick: &'a mut [u32],
+    brick: &'a mut [SourceState],
     edge: usize,
     valid: [usize; 3],
     ghosts: &'a Ghosts,
@@ -126,7 +125,14 @@ impl SweepSources {
 
     /// Gives the voxels that fell in a brick with room for `edge`^3, `valid` of them in the domain, their sources.
     /// Ghosts now are known in tiles upwind. Returns whether any voxel is left pending.
-    pub fn take(&self, fell: &[Fell], brick: &mut [u32], edge: usize, valid: [usize; 3], ghosts: &Ghosts) -> bool {
+    pub fn take(
+        &self,
+        fell: &[Fell],
+        brick: &mut [SourceState],
+        edge: usize,
+        valid: [usize; 3],
+        ghosts: &Ghosts,
+    ) -> bool {
         let around = Around { brick, edge, valid, ghosts, all: false };
         let step = |way: &Way| {
             let [x, y, z] = way.sum.offset.map(isize::from);
@@ -140,8 +146,9 @@ impl SweepSources {
                 let inside = (0..3).all(|a| voxel[a] > 0 && voxel[a] + 1 < valid[a]);
                 // By far the most are taken without asking where the neighbour lies.
                 let beside = place.wrapping_add_signed(steps[usize::from(from.0)]);
-                let sum = if inside { source_of(around.brick[beside]) } else { NO_SOURCE };
-                let state = if (sum as usize) < MOST_SOURCES { sum } else { self.source(&around, voxel, from) };
+                let sum = if inside { around.brick[beside].thaw() } else { SourceState::FAR };
+                let is_known = (sum.source() as usize) < MOST_SOURCES;
+                let state = if is_known { sum } else { self.source(&around, voxel, from) };
                 left |= pending_from(state).is_some();
                 around.brick[place] = state;
             });
@@ -150,7 +157,7 @@ impl SweepSources {
     }
 
     /// Resolves pending voxels of a brick when all tiles were swept. Returns whether any was, and whether any is left.
-    pub fn resolve(&self, brick: &mut [u32], edge: usize, valid: [usize; 3], ghosts: &Ghosts) -> (bool, bool) {
+    pub fn resolve(&self, brick: &mut [SourceState], edge: usize, valid: [usize; 3], ghosts: &Ghosts) -> (bool, bool) {
         let around = Around { brick, edge, valid, ghosts, all: true };
         let ordered = |axis: usize| {
             let (count, upward) = (valid[axis], self.upward[axis]);
@@ -178,22 +185,22 @@ impl SweepSources {
 
     /// The state of a voxel that fell from those neighbours.
     #[inline]
-    fn source(&self, around: &Around<'_>, voxel: [usize; 3], from: Upwind) -> u32 {
+    fn source(&self, around: &Around<'_>, voxel: [usize; 3], from: Upwind) -> SourceState {
         let way = &self.ways[usize::from(from.0)];
         let sum = self.state(around, voxel, way.sum);
         if pending_from(sum).is_some() {
             return pending(from);
         }
-        if has_source(sum) {
-            return source_of(sum);
+        if sum.has_source() {
+            return sum.thaw();
         }
         let first = self.state(around, voxel, way.first);
-        if pending_from(first).is_some() { pending(from.first_alone()) } else { source_of(first) }
+        if pending_from(first).is_some() { pending(from.first_alone()) } else { first.thaw() }
     }
 
     /// The state of a neighbour at the voxel's turn in the triple loop; pending where it is not known yet.
     #[inline]
-    fn state(&self, around: &Around<'_>, voxel: [usize; 3], neighbour: Neighbour) -> u32 {
+    fn state(&self, around: &Around<'_>, voxel: [usize; 3], neighbour: Neighbour) -> SourceState {
         let at: [isize; 3] = std::array::from_fn(|a| voxel[a] as isize + isize::from(neighbour.offset[a]));
         let [x, y, z] = at.map(|n| n as usize);
         if x < around.valid[0] && y < around.valid[1] && z < around.valid[2] {
@@ -218,16 +225,15 @@ impl Around<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::distance::state::source::FIXED;
 
     #[test]
     fn pending_states_are_no_sources() {
         for code in 0..=u8::MAX {
             assert_eq!(pending_from(pending(Upwind(code))), Some(Upwind(code)));
-            assert!(pending(Upwind(code)) as usize >= MOST_SOURCES);
+            assert!(pending(Upwind(code)).source() as usize >= MOST_SOURCES);
         }
-        assert_eq!(pending_from(NO_SOURCE), None);
-        assert_eq!(pending_from(MOST_SOURCES as u32 - 1), None);
-        assert_eq!(pending_from(7 | FIXED), None);
+        assert_eq!(pending_from(SourceState::FAR), None);
+        assert_eq!(pending_from(SourceState::trial(MOST_SOURCES as u32 - 1)), None);
+        assert_eq!(pending_from(SourceState::frozen(7)), None);
     }
 }

@@ -8,10 +8,10 @@
 //! holds its source's position beside the index, so that sweeps look nothing up.
 
 use super::tracked::TrackedSource;
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, Geometry, SourceState};
 use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::state::precision::Real;
-use crate::kernel::distance::state::source::{FIXED, NO_SOURCE, squared_distance};
+use crate::kernel::distance::state::source::squared_distance;
 use crate::kernel::distance::tile_order::diagonals::{Diagonals, MOST_LANES, Run, has_wide_vectors};
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
 use crate::kernel::distance::tile_order::dirty::Due;
@@ -41,10 +41,10 @@ impl<'a, A: Real> VectorDistance<'a, A> {
         A::of(if A::KEEPS_WORLD { self.geometry.origin[axis] + step } else { step })
     }
 
-    /// The squared distance of a voxel to the source of a state, in f64; infinite to none.
+    /// The squared distance of a voxel to a source, in f64; infinite to none.
     #[inline]
-    pub(crate) fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
-        let position = self.positions.get((state & !FIXED) as usize);
+    pub(crate) fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {
+        let position = self.positions.get(source as usize);
         position.map_or(f64::INFINITY, |&p| squared_distance(self.geometry.position(voxel), p))
     }
 
@@ -58,7 +58,7 @@ impl<'a, A: Real> VectorDistance<'a, A> {
             let mut from = [[f64::INFINITY; AT_A_TIME]; 3];
             let mut here = [0.0; AT_A_TIME];
             for (i, &source) in sources.iter().enumerate() {
-                if let Some(p) = self.positions.get((source & !FIXED) as usize) {
+                if let Some(p) = self.positions.get(source as usize) {
                     (from[0][i], from[1][i], from[2][i]) = (p[0], p[1], p[2]);
                 }
                 here[i] = self.geometry.position([start[0] + (n * AT_A_TIME + i) as i64, 0, 0])[0];
@@ -70,8 +70,8 @@ impl<'a, A: Real> VectorDistance<'a, A> {
         }
     }
 
-    pub(crate) fn point(&self, state: u32) -> [A; 3] {
-        self.points.get((state & !FIXED) as usize).copied().unwrap_or([A::INFINITY; 3])
+    pub(crate) fn point(&self, source: u32) -> [A; 3] {
+        self.points.get(source as usize).copied().unwrap_or([A::INFINITY; 3])
     }
 }
 
@@ -80,7 +80,7 @@ impl<'a, A: Real> VectorDistance<'a, A> {
 pub struct Work<A> {
     layout: Diagonals,
     due: Due,
-    source: Vec<u32>,
+    source: Vec<SourceState>,
     point: [Vec<A>; 3],
     /// Coordinates of voxels along x (from the upper end on), y and z, by index from the lower ghost.
     at: [Vec<A>; 3],
@@ -90,7 +90,7 @@ pub struct Work<A> {
 #[derive(Clone, Copy)]
 struct Nearest<A> {
     squared: A,
-    source: u32,
+    source: SourceState,
     point: [A; 3],
 }
 
@@ -103,13 +103,13 @@ pub(crate) fn squared<A: Real>(here: [A; 3], point: [A; 3]) -> A {
 impl<A: Real> Nearest<A> {
     /// Looks at a source beside the voxel; without branches, so that lanes stay together.
     #[inline(always)]
-    fn look(self, here: [A; 3], free: bool, source: u32, point: [A; 3]) -> Self {
+    fn look(self, here: [A; 3], free: bool, source: SourceState, point: [A; 3]) -> Self {
         let squared = squared(here, point);
         let nearer = (squared < self.squared) & free;
         let pick = |a: A, b: A| if nearer { a } else { b };
         Self {
             squared: pick(squared, self.squared),
-            source: if nearer { source & !FIXED } else { self.source },
+            source: if nearer { source.thaw() } else { self.source },
             point: [pick(point[0], self.point[0]), pick(point[1], self.point[1]), pick(point[2], self.point[2])],
         }
     }
@@ -149,20 +149,20 @@ struct Places<'a, A, const N: usize> {
 /// passed before and is nearer to the source taken than to its own.
 #[inline(always)]
 fn nearest<A: Real, const N: usize, const TURNED: bool>(
-    Lanes { here: source, beside: sources }: Lanes<'_, u32, N>,
+    Lanes { here: source, beside: sources }: Lanes<'_, SourceState, N>,
     point: [Lanes<'_, A, N>; 3],
     places: &Places<'_, A, N>,
     passed: [usize; 3],
 ) -> Swept {
     let (yl, yu) = if TURNED { (3, 2) } else { (2, 3) };
     let [px, py, pz] = point;
-    let mut kept = [0_u32; N];
+    let mut kept = [SourceState::default(); N];
     let mut points = [[A::default(); N]; 3];
     let mut falls = [0_u32; N];
     for i in 0..N {
         let here = [places.x[0][i], places.y[0][i], places.z[0]];
         let point = [px.here[i], py.here[i], pz.here[i]];
-        let free = (source[i] as i32) >= 0;
+        let free = !source[i].is_frozen();
         let at = |side: usize| (sources[side][i], [px.beside[side][i], py.beside[side][i], pz.beside[side][i]]);
         let start = Nearest { squared: squared(here, point), source: source[i], point };
         let [(s0, p0), (s1, p1), (s2, p2)] = [at(0), at(1), at(yl)];
@@ -183,7 +183,7 @@ fn nearest<A: Real, const N: usize, const TURNED: bool>(
         for i in 0..N {
             let there = [places.x[step(0)][i], places.y[step(1)][i], places.z[step(2)]];
             let own = squared(there, [px.beside[side][i], py.beside[side][i], pz.beside[side][i]]);
-            let free = u32::from((sources[side][i] as i32) >= 0);
+            let free = u32::from(!sources[side][i].is_frozen());
             back |= falls[i] & free & u32::from(squared(there, [points[0][i], points[1][i], points[2][i]]) < own);
         }
         swept |= back << axis;
@@ -258,7 +258,7 @@ impl<A: Real> Work<A> {
         Self {
             layout: Diagonals::new(edge),
             due: Due::new(edge),
-            source: vec![FIXED | NO_SOURCE; len],
+            source: vec![SourceState::FAR.freeze(); len],
             point: std::array::from_fn(|_| vec![A::INFINITY; len]),
             at: std::array::from_fn(|_| vec![A::default(); edge + 3 + MOST_LANES]),
         }
@@ -276,19 +276,19 @@ impl<A: Real> Work<A> {
 
 impl<A: Real> VectorDistance<'_, A> {
     /// Brings the tile into the layout that sweeps of direction `upward` want. Ghosts count as fixed.
-    fn lay_out(&self, work: &mut Work<A>, tile: &HaloTile<u32>, part: &Box3, upward: [bool; 3]) {
+    fn lay_out(&self, work: &mut Work<A>, tile: &HaloTile<SourceState>, part: &Box3, upward: [bool; 3]) {
         let valid = tile.valid();
         if work.layout.valid != valid {
-            work.source.fill(FIXED | NO_SOURCE);
+            work.source.fill(SourceState::FAR.freeze());
             work.point.iter_mut().for_each(|p| p.fill(A::INFINITY));
         }
         work.layout = Diagonals { valid, turned: upward[0] != upward[1], ..work.layout };
-        work.layout.load(tile, &mut work.source, |state, ghost| if ghost { state | FIXED } else { state });
+        work.layout.load(tile, &mut work.source, |state, ghost| if ghost { state.freeze() } else { state });
         let Work { layout, source, point: [px, py, pz], at, .. } = work;
         for run in layout.whole_diagonals() {
             let (px, py, pz) = (&mut px[run.clone()], &mut py[run.clone()], &mut pz[run.clone()]);
             for (((x, y), z), &state) in px.iter_mut().zip(py).zip(pz).zip(&source[run]) {
-                [*x, *y, *z] = self.point(state);
+                [*x, *y, *z] = self.point(state.source());
             }
         }
         let last = tile.edge() + 1;
@@ -302,30 +302,30 @@ impl<A: Real> VectorDistance<'_, A> {
 }
 
 impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
-    type State = u32;
+    type State = SourceState;
     type Work = Work<A>;
-    const UNKNOWN: u32 = NO_SOURCE;
+    const UNKNOWN: SourceState = SourceState::FAR;
 
-    fn fixed(_: f64, source: u32) -> u32 {
-        source | FIXED
+    fn fixed(_: f64, source: u32) -> SourceState {
+        SourceState::frozen(source)
     }
 
-    fn told(source: u32) -> Option<u32> {
-        Some(source)
+    fn told(source: u32) -> Option<SourceState> {
+        Some(SourceState::trial(source))
     }
 
-    fn is_fixed(state: u32) -> bool {
-        state & FIXED != 0
+    fn is_fixed(state: SourceState) -> bool {
+        state.is_frozen()
     }
 
     fn work(edge: usize) -> Work<A> {
         Work::new(edge)
     }
 
-    fn settle(&self, tile: &mut HaloTile<u32>, work: &mut Work<A>, part: &Box3) -> bool {
+    fn settle(&self, tile: &mut HaloTile<SourceState>, work: &mut Work<A>, part: &Box3) -> bool {
         let first = downhill(tile, |at, state| {
             let here = std::array::from_fn(|a| self.coordinate(a, part.lo[a] + at[a] as i64));
-            squared(here, self.point(state)).f64()
+            squared(here, self.point(state.source())).f64()
         });
         self.lay_out(work, tile, part, first);
         work.due.all(tile.valid());
@@ -343,36 +343,37 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
         changed
     }
 
-    fn entering(&self, beside: u32, state: u32, voxel: [i64; 3]) -> Option<f64> {
-        if Self::is_fixed(state) || beside & !FIXED == state {
+    fn entering(&self, beside: SourceState, state: SourceState, voxel: [i64; 3]) -> Option<f64> {
+        let [beside, kept] = [beside.source(), state.source()];
+        if state.is_frozen() || beside == kept {
             return None;
         }
         // Judged as a sweep judges it, so that nobody is called for nothing.
         let here: [A; 3] = std::array::from_fn(|a| self.coordinate(a, voxel[a]));
-        let squared = |state| {
-            let p = self.point(state);
+        let squared = |source| {
+            let p = self.point(source);
             let (dx, dy, dz) = (here[0] - p[0], here[1] - p[1], here[2] - p[2]);
             dx * dx + dy * dy + dz * dz
         };
         let entering = squared(beside);
-        (entering < squared(state)).then(|| entering.f64().sqrt())
+        (entering < squared(kept)).then(|| entering.f64().sqrt())
     }
 
-    fn distance(&self, state: u32, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(state, voxel).sqrt()
+    fn distance(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
+        self.distance_squared(state.source(), voxel).sqrt()
     }
 
-    fn distance_squared(&self, state: u32, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(state, voxel)
+    fn distance_squared(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
+        self.distance_squared(state.source(), voxel)
     }
 
-    fn source(state: u32) -> Option<u32> {
-        Some(state & !FIXED).filter(|&s| s != NO_SOURCE)
+    fn source(state: SourceState) -> Option<u32> {
+        state.known()
     }
 }
 
 impl<A: Real> OrderedSweeps for VectorDistance<'_, A> {
-    fn sweep(&self, tile: &mut HaloTile<u32>, work: &mut Work<A>, part: &Box3, upward: [bool; 3]) -> bool {
+    fn sweep(&self, tile: &mut HaloTile<SourceState>, work: &mut Work<A>, part: &Box3, upward: [bool; 3]) -> bool {
         self.lay_out(work, tile, part, upward);
         work.due.all(tile.valid());
         let changed = work.sweep(upward) & CHANGED != 0;
@@ -391,8 +392,8 @@ impl<A: Real> TrackedSource for VectorDistance<'_, A> {
     }
 
     #[inline(always)]
-    fn squared(&self, here: [A; 3], state: u32) -> A {
-        squared(here, self.point(state))
+    fn squared(&self, here: [A; 3], source: u32) -> A {
+        squared(here, self.point(source))
     }
 
     fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {

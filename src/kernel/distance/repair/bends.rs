@@ -21,10 +21,9 @@ use super::distinct::Distinct;
 use super::label_borders::LabelBorders;
 use super::look::Labels;
 use super::look::Look;
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, Geometry, NO_SOURCE, SourceState};
 use crate::kernel::distance::methods::tracked::TrackedSource;
 use crate::kernel::distance::state::precision::Real;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::kernel::distance::state::source::counts_before;
 
 /// How far around a voxel others are asked.
@@ -103,7 +102,7 @@ impl Seen {
             if squared[at] >= counts_below {
                 return;
             }
-            let to = |source| sources.distance_squared(source, voxel);
+            let to = |source| sources.distance_squared(SourceState::trial(source), voxel);
             let limit = (squared[at].sqrt() + close).powi(2).max(squared[at]);
             let nearly = others.iter().map(|&other| (to(other), other)).filter(|other| other.0 <= limit);
             let own = (squared[at], kept[at]);
@@ -135,7 +134,7 @@ impl Seen {
         let label = |source| look.labels.map_or(0, |labels| labels.sets.label(source));
         self.distinct.list(look.known, look.found, &around, &mut self.around);
         for &source in &self.around {
-            let squared = sources.distance_squared(source, voxel);
+            let squared = sources.distance_squared(SourceState::trial(source), voxel);
             let is_tied = squared == best.1 && source != best.0;
             if squared < best.1 || (is_tied && label(source) < label(best.0)) {
                 best = (source, squared);
@@ -333,7 +332,7 @@ mod tests {
             let expected: Vec<u32> = voxels(part).map(|v| whole[all.offset_of(v)]).collect();
             assert_eq!(seen.sources, expected, "{part:?}");
             for ((v, &source), &squared) in voxels(part).zip(&seen.sources).zip(&seen.squared) {
-                assert_eq!(squared.sqrt(), method.distance(source, v), "{v:?}");
+                assert_eq!(squared.sqrt(), method.distance(SourceState::trial(source), v), "{v:?}");
             }
         }
     }

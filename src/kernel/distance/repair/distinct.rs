@@ -4,8 +4,7 @@
 //! lower end there. Voxels that differ from the one before are marked once for all boxes, a bit for each axis; then a row
 //! of a box is one word.
 
-use crate::grid::Box3;
-use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::grid::{Box3, NO_SOURCE};
 
 /// Voxels along x of a box at most: bytes of a word.
 pub(crate) const WIDEST: usize = 8;

@@ -5,9 +5,8 @@
 //! a neighbour's source is hardly farther than the voxel's own.
 
 use super::look::Look;
-use crate::grid::{Box3, DataSets, FACES, Face};
+use crate::grid::{Box3, DataSets, FACES, Face, NO_SOURCE};
 use crate::kernel::distance::features::source_labels;
-use crate::kernel::distance::state::source::NO_SOURCE;
 
 /// Finds them.
 #[derive(Clone, Debug, Default)]

@@ -17,10 +17,10 @@ use rstar::{PointDistance, RTree};
 
 use super::outside_block::{Block, blocks};
 use super::seeds::Seeds;
-use crate::grid::{Box3, DataSets, Geometry};
+use crate::grid::{Box3, DataSets, Geometry, NO_SOURCE};
 use crate::kernel::distance::features::source_trees::Placed;
 use crate::kernel::distance::state::source::counts_before;
-use crate::kernel::distance::state::source::{NO_SOURCE, squared_distance};
+use crate::kernel::distance::state::source::squared_distance;
 
 /// Beyond the last voxel centres by more than this, in voxels, is outside; less is rounding. Below the first ones nothing
 /// is: there a source that lies outside by rounding alone would fix no voxel.

@@ -8,9 +8,8 @@
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, Geometry, NO_SOURCE};
 use crate::kernel::distance::features::source_trees::Placed;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::kernel::distance::state::source::counts_before;
 
 /// Voxels of a block along each axis.

@@ -4,8 +4,9 @@
 //! Arrays are dense `[z][y][x]` over a brick. Of what fixes a voxel and what it is told of it starts from the nearer;
 //! of equal distances from the lower label, then from the lower index.
 
+use crate::grid::NO_SOURCE;
 use crate::kernel::distance::state::method::DistanceMethod;
-use crate::kernel::distance::state::source::{NO_SOURCE, counts_before};
+use crate::kernel::distance::state::source::counts_before;
 
 /// The nearest source of each voxel of a brick, of those that were looked at.
 #[derive(Clone, Debug)]

@@ -1,11 +1,4 @@
-//! What says which source a voxel has: an index below [`NO_SOURCE`], the top bit set where a source fixed the voxel;
-//! and which of two sources is the nearer one.
-
-/// A voxel without a source.
-pub const NO_SOURCE: u32 = u32::MAX >> 1;
-
-/// Set on the source index of a fixed voxel.
-pub const FIXED: u32 = 1 << 31;
+//! Which of two sources is the nearer one.
 
 /// The squared Euclidean distance of two positions.
 #[inline]

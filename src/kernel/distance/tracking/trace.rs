@@ -12,11 +12,8 @@
 //! such voxels, on a way on which distances never fall, it gets the lowest.
 
 use super::parents::{Parent, Parents};
-use crate::grid::{DataSets, Geometry};
-use crate::kernel::distance::methods::tracked::{has_source, source_of};
+use crate::grid::{DataSets, Geometry, NO_SOURCE, SourceState};
 use crate::kernel::distance::state::precision::{Precision, Real};
-use crate::kernel::distance::state::source::FIXED;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::tile::HaloTile;
 
 /// Finds sources in tiles of one size.
@@ -46,7 +43,7 @@ impl<R: Parents> Tracer<R> {
         &mut self,
         labelled: Option<&DataSets>,
         distance: &HaloTile<P>,
-        state: &mut HaloTile<u32>,
+        state: &mut HaloTile<SourceState>,
     ) -> (bool, bool) {
         let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
         let rows = (1..=nz).flat_map(|z| (1..=ny).map(move |y| (z * pitch + y) * pitch + 1));
@@ -60,7 +57,7 @@ impl<R: Parents> Tracer<R> {
         for n in 0..self.rows.len() {
             let row = self.rows[n];
             for place in row..row + nx {
-                if !has_source(state.data()[place]) && distance.data()[place].lane() < P::Lane::INFINITY {
+                if !state.data()[place].has_source() && distance.data()[place].lane() < P::Lane::INFINITY {
                     let known = self.follow(labelled, distance.data(), state.data_mut(), place);
                     found |= known;
                     left |= !known;
@@ -79,7 +76,7 @@ impl<R: Parents> Tracer<R> {
         &mut self,
         labelled: Option<&DataSets>,
         distance: &[P],
-        state: &mut [u32],
+        state: &mut [SourceState],
         from: usize,
     ) -> bool {
         if self.followed[from] {
@@ -90,8 +87,8 @@ impl<R: Parents> Tracer<R> {
             parent.map(|parent| Parent { is_tied: parent.is_tied && labelled.is_some(), ..parent })
         };
         let first = parent(self, from);
-        if let Some(parent) = first.filter(|parent| !parent.is_tied && has_source(state[parent.place])) {
-            state[from] = source_of(state[parent.place]);
+        if let Some(parent) = first.filter(|parent| !parent.is_tied && state[parent.place].has_source()) {
+            state[from] = state[parent.place].thaw();
             return true;
         }
         self.chain.clear();
@@ -99,7 +96,7 @@ impl<R: Parents> Tracer<R> {
         loop {
             let mut source = NO_SOURCE;
             while let Some(at) = next {
-                source = source_of(state[at]);
+                source = state[at].source();
                 if source != NO_SOURCE || self.followed[at] {
                     break;
                 }
@@ -107,7 +104,7 @@ impl<R: Parents> Tracer<R> {
             }
             next = self.leave(labelled, distance, state, source);
             if next.is_none() {
-                return has_source(state[from]);
+                return state[from].has_source();
             }
         }
     }
@@ -125,36 +122,36 @@ impl<R: Parents> Tracer<R> {
         &mut self,
         labelled: Option<&DataSets>,
         distance: &[P],
-        state: &mut [u32],
+        state: &mut [SourceState],
         mut source: u32,
     ) -> Option<usize> {
         while let Some((at, is_tied)) = self.chain.pop() {
             if let Some(sets) = labelled.filter(|_| is_tied) {
                 self.parents.equals(distance, at, &mut self.equals);
-                let is_unknown = |place: &&usize| !has_source(state[**place]);
+                let is_unknown = |place: &&usize| !state[**place].has_source();
                 if let Some(&other) = self.equals.iter().find(|place| is_unknown(place) && !self.followed[**place]) {
                     self.chain.push((at, true));
                     return Some(other);
                 }
-                let all = self.equals.iter().map(|&place| source_of(state[place]));
+                let all = self.equals.iter().map(|&place| state[place].source());
                 let is_known = !self.equals.iter().any(|place| is_unknown(&place));
                 source = all.filter(|_| is_known).min_by_key(|&source| sets.label(source)).unwrap_or(NO_SOURCE);
             }
-            state[at] = source;
+            state[at] = SourceState::trial(source);
         }
         None
     }
 }
 
 /// Whether any of these voxels has no source.
-fn lacks(states: &[u32]) -> bool {
-    states.iter().fold(false, |any, &state| any | !has_source(state))
+fn lacks(states: &[SourceState]) -> bool {
+    states.iter().fold(false, |any, state| any | !state.has_source())
 }
 
 /// Fills voxels that tracing left without a source, as far as that is known in this tile. While it goes on their states
-/// carry the bit of fixed voxels, whose distances have a sign: they may still fall. Returns whether any state changed,
+/// are frozen like those of fixed voxels, whose distances have a sign: they may still fall. Returns whether any state changed,
 /// and whether the tile has such voxels.
-pub fn fill<P: Precision>(distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> (bool, bool) {
+pub fn fill<P: Precision>(distance: &HaloTile<P>, state: &mut HaloTile<SourceState>) -> (bool, bool) {
     let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
     let values = distance.data();
     let steps = [1, pitch as isize, (pitch * pitch) as isize].map(|step| [-step, step]);
@@ -165,7 +162,7 @@ pub fn fill<P: Precision>(distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> 
             (1..=nz).flat_map(|z| (1..=ny).flat_map(move |y| (1..=nx).map(move |x| (z * pitch + y) * pitch + x)))
         {
             let (here, kept) = (values[place].lane(), state.data()[place]);
-            let is_filled = kept == NO_SOURCE || kept & FIXED != 0;
+            let is_filled = kept == SourceState::FAR || kept.is_frozen();
             let has_distance = here < P::Lane::INFINITY && !here.is_marked();
             if !(has_distance && is_filled) {
                 continue;
@@ -173,9 +170,9 @@ pub fn fill<P: Precision>(distance: &HaloTile<P>, state: &mut HaloTile<u32>) -> 
             filled = true;
             let beside = steps.as_flattened().iter().map(|&step| place.wrapping_add_signed(step));
             let told = beside.filter(|&beside| values[beside].lane().magnitude() <= here);
-            let lowest = told.map(|beside| source_of(state.data()[beside])).min().unwrap_or(NO_SOURCE);
-            if lowest < source_of(kept) {
-                state.data_mut()[place] = lowest | FIXED;
+            let lowest = told.map(|beside| state.data()[beside].source()).min().unwrap_or(NO_SOURCE);
+            if lowest < kept.source() {
+                state.data_mut()[place] = SourceState::frozen(lowest);
                 falls = true;
             }
         }

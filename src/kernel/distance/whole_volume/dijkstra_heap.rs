@@ -12,11 +12,10 @@
 
 use super::wavefront::Wavefront;
 use crate::grid::Geometry;
-use crate::kernel::distance::methods::tracked::{TrackedSource, has_source, source_of};
+use crate::grid::{NO_SOURCE, SourceState};
+use crate::kernel::distance::methods::tracked::TrackedSource;
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
-use crate::kernel::distance::state::source::FIXED;
-use crate::kernel::distance::state::source::NO_SOURCE;
 
 /// Bytes of a voxel beside its state: its bound, whether it is frozen, and its entries in the heap.
 pub const SCRATCH_BYTES: u64 = 33;
@@ -26,7 +25,7 @@ pub const SCRATCH_BYTES: u64 = 33;
 pub struct DijkstraHeap<'a, S> {
     front: Wavefront,
     method: &'a S,
-    states: &'a mut [u32],
+    states: &'a mut [SourceState],
     bounds: Vec<f64>,
     /// Steps to neighbours and their lengths.
     steps: Vec<([i64; 3], f64)>,
@@ -35,10 +34,10 @@ pub struct DijkstraHeap<'a, S> {
 impl<'a, S: TrackedSource<Number = f64> + DistanceMethod> DijkstraHeap<'a, S> {
     /// Ready to start from the fixed voxels among `states`; no other has a source.
     #[must_use]
-    pub fn new(geometry: &Geometry, method: &'a S, neighbours: Neighbours, states: &'a mut [u32]) -> Self {
+    pub fn new(geometry: &Geometry, method: &'a S, neighbours: Neighbours, states: &'a mut [SourceState]) -> Self {
         let mut front = Wavefront::new(geometry.shape);
         let mut bounds = vec![f64::INFINITY; states.len()];
-        for (place, &state) in states.iter().enumerate().filter(|(_, state)| **state & FIXED != 0) {
+        for (place, &state) in states.iter().enumerate().filter(|(_, state)| state.is_frozen()) {
             bounds[place] = method.distance(state, front.voxel(place));
             front.push(place, bounds[place]);
         }
@@ -51,11 +50,11 @@ impl<'a, S: TrackedSource<Number = f64> + DistanceMethod> DijkstraHeap<'a, S> {
         for _ in 0..count {
             let Some(place) = self.front.freeze() else { return false };
             let voxel = self.front.voxel(place);
-            let distance = if self.states[place] & FIXED != 0 {
+            let distance = if self.states[place].is_frozen() {
                 self.bounds[place]
             } else {
                 let (source, squared) = self.nearest(voxel);
-                self.states[place] = source;
+                self.states[place] = SourceState::trial(source);
                 squared.sqrt()
             };
             self.offer(voxel, distance);
@@ -69,11 +68,11 @@ impl<'a, S: TrackedSource<Number = f64> + DistanceMethod> DijkstraHeap<'a, S> {
         let mut best = (NO_SOURCE, f64::INFINITY);
         for (offset, _) in &self.steps {
             let beside = self.front.beside(voxel, *offset).filter(|&beside| self.front.is_frozen(beside));
-            let state = beside.map_or(NO_SOURCE, |beside| self.states[beside]);
-            if has_source(state) && source_of(state) != best.0 {
-                let squared = self.method.squared(here, state);
-                if self.method.is_nearer((squared, state), (best.1, best.0)) {
-                    best = (source_of(state), squared);
+            let source = beside.map_or(NO_SOURCE, |beside| self.states[beside].source());
+            if source != NO_SOURCE && source != best.0 {
+                let squared = self.method.squared(here, source);
+                if self.method.is_nearer((squared, source), (best.1, best.0)) {
+                    best = (source, squared);
                 }
             }
         }
@@ -84,7 +83,7 @@ impl<'a, S: TrackedSource<Number = f64> + DistanceMethod> DijkstraHeap<'a, S> {
         for (offset, step) in &self.steps {
             let Some(beside) = self.front.beside(voxel, *offset) else { continue };
             let bound = distance + step;
-            if self.states[beside] & FIXED == 0 && !self.front.is_frozen(beside) && bound < self.bounds[beside] {
+            if !self.states[beside].is_frozen() && !self.front.is_frozen(beside) && bound < self.bounds[beside] {
                 self.bounds[beside] = bound;
                 self.front.push(beside, bound);
             }

@@ -10,11 +10,9 @@
 //! voxel's neighbours end with: the two differ by rounding alone.
 
 use super::wavefront::Wavefront;
-use crate::grid::{DataSets, FACES, Geometry, NEIGHBOURS_26};
-use crate::kernel::distance::methods::tracked::source_of;
+use crate::grid::{DataSets, FACES, Geometry, NEIGHBOURS_26, NO_SOURCE, SourceState};
 use crate::kernel::distance::methods::upwind::{Axes, godunov};
 use crate::kernel::distance::state::precision::{Precision, Real};
-use crate::kernel::distance::state::source::NO_SOURCE;
 
 /// Bytes of a voxel beside its distance and source: whether it is frozen, and its entries in the heap.
 pub const SCRATCH_BYTES: u64 = 25;
@@ -25,8 +23,7 @@ pub struct MarchingHeap<'a, P> {
     front: Wavefront,
     axes: Axes<f64>,
     values: &'a mut [P],
-    /// States of voxels: the source, the top bit set on fixed ones.
-    sources: Option<&'a mut [u32]>,
+    sources: Option<&'a mut [SourceState]>,
     /// What tells which label is lower.
     sets: Option<&'a DataSets>,
     /// Lengths of the 26 steps.
@@ -40,7 +37,7 @@ impl<'a, P: Precision> MarchingHeap<'a, P> {
     pub fn new(
         geometry: &Geometry,
         values: &'a mut [P],
-        sources: Option<&'a mut [u32]>,
+        sources: Option<&'a mut [SourceState]>,
         sets: Option<&'a DataSets>,
     ) -> Self {
         let mut front = Wavefront::new(geometry.shape);
@@ -99,14 +96,14 @@ impl<'a, P: Precision> MarchingHeap<'a, P> {
             let beside = self.front.beside(voxel, *offset);
             let way = self.frozen(beside) + step;
             let Some(beside) = beside.filter(|_| way <= best.0 && way < f64::INFINITY) else { continue };
-            let source = source_of(sources[beside]);
+            let source = sources[beside].source();
             let is_lower = || self.sets.is_some_and(|sets| sets.label(source) < sets.label(best.1));
             if way < best.0 || is_lower() {
                 best = (way, source);
             }
         }
         if let Some(sources) = &mut self.sources {
-            sources[place] = best.1;
+            sources[place] = SourceState::trial(best.1);
         }
     }
 }

@@ -5,10 +5,9 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::exec::Workers;
-use crate::grid::Box3;
+use crate::grid::{Box3, NO_SOURCE};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::precision::Precision;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::store::{BoxSource, BrickArray};
 
 /// A solved distance.

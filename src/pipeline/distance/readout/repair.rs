@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::field::Together;
 use crate::error::Result;
 use crate::exec::Workers;
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, Geometry, NO_SOURCE};
 use crate::kernel::distance::methods::shape_distance::ShapeDistance;
 use crate::kernel::distance::methods::tracked::TrackedSource;
 use crate::kernel::distance::methods::vector_distance::VectorDistance;
@@ -16,7 +16,6 @@ use crate::kernel::distance::repair::bends::{MARGIN, Seen};
 use crate::kernel::distance::repair::look::Labels;
 use crate::kernel::distance::repair::look::Look;
 use crate::kernel::distance::state::precision::Precision;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::pipeline::distance::{Options, Solved, Sources};
 use crate::store::BoxSource;
 

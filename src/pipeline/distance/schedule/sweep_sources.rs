@@ -8,19 +8,18 @@ use super::sweep::{Companion, Swept, Visit};
 use super::trace::Missing;
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Until, Waves, Workers, corner_colours};
-use crate::grid::{FACES, Slot};
+use crate::grid::{FACES, Slot, SourceState};
 use crate::kernel::distance::methods::fast_sweeping::FastSweeping;
 use crate::kernel::distance::methods::sweep_sources::{Fell, Ghosts, SweepSources};
 use crate::kernel::distance::state::neighbours::SWEEPS;
 use crate::kernel::distance::state::precision::Precision;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::store::{BrickArray, Scratch};
 
 /// The sources of a field that is being swept.
 pub(crate) struct TrackedSweeps<'a> {
-    states: &'a BrickArray<u32>,
+    states: &'a BrickArray<SourceState>,
     /// Faces as they were before the sweep.
-    before: BrickArray<u32>,
+    before: BrickArray<SourceState>,
     exchange: Exchange<'a>,
     /// For all ghosts, and for each direction of a sweep those that lie upwind.
     plan: HaloPlan,
@@ -32,7 +31,7 @@ pub(crate) struct TrackedSweeps<'a> {
     visits: Vec<Visit>,
 }
 
-const BEYOND: Boundary<u32> = Boundary::Constant(NO_SOURCE);
+const BEYOND: Boundary<SourceState> = Boundary::Constant(SourceState::FAR);
 
 fn number(upward: [bool; 3]) -> usize {
     (0..3).map(|a| usize::from(!upward[a]) << a).sum()
@@ -43,7 +42,7 @@ impl<'a> TrackedSweeps<'a> {
     pub(crate) fn new(
         stage: &Stage<'a>,
         scratch: &Scratch,
-        states: &'a BrickArray<u32>,
+        states: &'a BrickArray<SourceState>,
         start: &[Slot],
     ) -> Result<Self> {
         let set = states.set();
@@ -51,7 +50,7 @@ impl<'a> TrackedSweeps<'a> {
         let sources = SWEEPS.map(SweepSources::new);
         let upwind = std::array::from_fn(|n| plan.only(|offset| sources[n].is_upwind(offset)));
         let exchange = Exchange::new(stage.comm(), set, &plan)?;
-        let before = BrickArray::blank_faces(scratch, set, NO_SOURCE)?;
+        let before = BrickArray::blank_faces(scratch, set, SourceState::FAR)?;
         let told = exchange.faces(states, start)?;
         let visits = vec![Visit::default(); set.len()];
         let waves = corner_colours(set);

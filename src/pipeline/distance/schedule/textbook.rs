@@ -4,11 +4,10 @@
 
 use crate::error::Result;
 use crate::exec::Engine;
-use crate::grid::{DataSets, Geometry};
+use crate::grid::{DataSets, Geometry, SourceState};
 use crate::kernel::distance::methods::tracked::TrackedSource;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::{Precision, Real};
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::kernel::distance::whole_volume::dijkstra_heap::DijkstraHeap;
 use crate::kernel::distance::whole_volume::marching_heap::MarchingHeap;
 use crate::store::{BoxSink, BoxSource, BrickArray};
@@ -22,13 +21,13 @@ pub(crate) fn heap_dijkstra<S: TrackedSource<Number = f64>>(
     geometry: &Geometry,
     method: &S,
     neighbours: Neighbours,
-    states: &BrickArray<u32>,
+    states: &BrickArray<SourceState>,
 ) -> Result<()> {
     if states.set().owned().is_empty() {
         return Ok(());
     }
     let domain = geometry.domain();
-    let mut dense = vec![NO_SOURCE; domain.len()];
+    let mut dense = vec![SourceState::FAR; domain.len()];
     states.read_box(&domain, &mut dense)?;
     let mut heap = DijkstraHeap::new(geometry, method, neighbours, &mut dense);
     while heap.advance(STRIDE) {
@@ -53,13 +52,13 @@ pub(crate) fn heap_marching<P: Precision, S: TrackedSource>(
     start: &S,
     wanted: Wanted<'_>,
     distances: &BrickArray<P>,
-    states: &BrickArray<u32>,
+    states: &BrickArray<SourceState>,
 ) -> Result<()> {
     if states.set().owned().is_empty() {
         return Ok(());
     }
     let domain = geometry.domain();
-    let mut dense = vec![NO_SOURCE; domain.len()];
+    let mut dense = vec![SourceState::FAR; domain.len()];
     states.read_box(&domain, &mut dense)?;
     let mut values = vec![P::UNKNOWN; domain.len()];
     for (place, (y, z)) in (0..).step_by(domain.shape()[0] as usize).zip(domain.rows()) {

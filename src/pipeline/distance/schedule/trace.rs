@@ -10,10 +10,8 @@ use std::marker::PhantomData;
 
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, corner_colours};
-use crate::grid::{Box3, DataSets, Geometry, NEIGHBOURS_26, Slot};
+use crate::grid::{Box3, DataSets, Geometry, NEIGHBOURS_26, Slot, SourceState};
 use crate::kernel::distance::state::precision::Precision;
-use crate::kernel::distance::state::source::FIXED;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::kernel::distance::tracking::parents::Parents;
 use crate::kernel::distance::tracking::trace::{Tracer, fill};
 use crate::store::{BoxSource, BrickArray};
@@ -26,7 +24,7 @@ pub(crate) fn trace_sources<P: Precision, R: Parents>(
     geometry: &Geometry,
     labelled: Option<&DataSets>,
     distances: &BrickArray<P>,
-    states: &BrickArray<u32>,
+    states: &BrickArray<SourceState>,
     start: &[Slot],
 ) -> Result<()> {
     let set = distances.set().clone();
@@ -39,9 +37,9 @@ pub(crate) fn trace_sources<P: Precision, R: Parents>(
     let workers = &Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), tracer.clone()));
     let waves = &corner_colours(&set);
     let waves = Waves { stage, exchange, workers, waves };
-    let gather = |distance: &mut HaloTile<P>, state: &mut HaloTile<u32>, slot: Slot| {
+    let gather = |distance: &mut HaloTile<P>, state: &mut HaloTile<SourceState>, slot: Slot| {
         plan.gather(distances, slot, Boundary::Constant(P::UNKNOWN), distance);
-        plan.gather(states, slot, Boundary::Constant(NO_SOURCE), state);
+        plan.gather(states, slot, Boundary::Constant(SourceState::FAR), state);
     };
     let trace = |(distance, state, tracer): &mut (_, _, Tracer<R>), slot| {
         gather(distance, state, slot);
@@ -79,7 +77,7 @@ pub(crate) fn trace_sources<P: Precision, R: Parents>(
 /// Bricks in which sources are missing, and how some are found: `visit` finds what it can in a brick; it tells whether
 /// it found anything, and whether anything is left.
 pub(crate) struct Missing<'a, W, F> {
-    states: &'a BrickArray<u32>,
+    states: &'a BrickArray<SourceState>,
     visit: F,
     /// Bricks in which something may be found.
     due: Vec<bool>,
@@ -108,7 +106,7 @@ fn middles<P: Precision>(distances: &BrickArray<P>) -> Result<Vec<f64>> {
 }
 
 impl<'a, W, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Missing<'a, W, F> {
-    pub(crate) fn new(states: &'a BrickArray<u32>, complete: Vec<bool>, visit: F) -> Self {
+    pub(crate) fn new(states: &'a BrickArray<SourceState>, complete: Vec<bool>, visit: F) -> Self {
         let bricks = complete.len();
         let (due, untold) = (vec![false; bricks], vec![false; bricks]);
         Self { states, visit, due, untold, complete, far: vec![0.0; bricks], work: PhantomData }
@@ -123,12 +121,12 @@ impl<'a, W, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Missing<'a, W, F> {
 }
 
 impl<W: Send, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Relax for Missing<'_, W, F> {
-    type State = u32;
+    type State = SourceState;
     type Work = W;
     type Visit = (bool, bool);
     type Note = [f64; 0];
 
-    fn field(&self) -> &BrickArray<u32> {
+    fn field(&self) -> &BrickArray<SourceState> {
         self.states
     }
 
@@ -158,7 +156,7 @@ impl<W: Send, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Relax for Missing<'_, 
 }
 
 /// A field of states, read as the indices of sources.
-pub(crate) struct SourceField(pub(crate) BrickArray<u32>);
+pub(crate) struct SourceField(pub(crate) BrickArray<SourceState>);
 
 impl BoxSource<u32> for SourceField {
     fn shape(&self) -> [i64; 3] {
@@ -166,10 +164,10 @@ impl BoxSource<u32> for SourceField {
     }
 
     fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
-        self.0.read_box(part, out)?;
-        for state in out {
-            *state &= !FIXED;
-        }
+        // Two words of 32 bits for each voxel of a small box; the states themselves are not what is handed out.
+        let mut states = vec![SourceState::FAR; out.len()];
+        self.0.read_box(part, &mut states)?;
+        out.iter_mut().zip(states).for_each(|(out, state)| *out = state.source());
         Ok(())
     }
 }

@@ -4,6 +4,7 @@
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::Slot;
+use crate::grid::SourceState;
 use crate::kernel::distance::methods::shape_distance::ShapeDistance;
 use crate::kernel::distance::seeding::initialise::fix_voxels;
 use crate::kernel::distance::seeding::seeds::{Seeds, write_states};
@@ -50,7 +51,7 @@ pub(crate) fn initialise<M: DistanceMethod>(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
     array: &BrickArray<M::State>,
-    kept: Option<&BrickArray<u32>>,
+    kept: Option<&BrickArray<SourceState>>,
     (start, farthest): (Start, f64),
 ) -> Result<Seeded> {
     let set = array.set();

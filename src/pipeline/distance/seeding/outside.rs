@@ -4,10 +4,9 @@
 
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
-use crate::grid::Slot;
+use crate::grid::{NO_SOURCE, Slot};
 use crate::kernel::distance::seeding::seeds::Seeds;
 use crate::kernel::distance::state::method::DistanceMethod;
-use crate::kernel::distance::state::source::NO_SOURCE;
 use crate::pipeline::distance::Sources;
 use crate::store::BrickArray;
 
