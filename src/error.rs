@@ -1,6 +1,7 @@
 //! The one error type of the crate: what happened, where, and which exit code it deserves.
 //!
-//! A message is one sentence for the user: what is wrong, where (file, page, line, brick), what to do about it.
+//! A message is one sentence for the user: what is wrong, where (file, page, line, brick), what to do about it. It tells
+//! all there is to tell; what the operating system or another library said is kept beside it, as the error's source.
 //! Kernels return no errors; storage, input, output and pipelines do.
 
 use std::fmt;
@@ -37,7 +38,11 @@ pub struct Error {
     kind: ErrorKind,
     message: String,
     path: Option<PathBuf>,
+    source: Option<Source>,
 }
+
+/// The error of another library, or of the operating system, that an [`Error`] came of.
+type Source = Box<dyn std::error::Error + Send + Sync>;
 
 impl Error {
     /// A wrong setting or argument.
@@ -74,7 +79,23 @@ impl Error {
     /// An input/output failure of the operating system while doing `what`.
     #[must_use]
     pub fn from_io(what: &str, error: &io::Error) -> Self {
-        Self::failed(format!("{what}: {error}"))
+        Self::failed(format!("{what}: {error}")).caused_by_io(error)
+    }
+
+    /// Keeps the error that this one came of, whose words are part of the message already.
+    #[must_use]
+    pub fn caused_by(mut self, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        self.source.get_or_insert_with(|| source.into());
+        self
+    }
+
+    /// The same of an error of the operating system that is only lent: what is kept says the same, and has its number.
+    #[must_use]
+    pub fn caused_by_io(self, error: &io::Error) -> Self {
+        self.caused_by(match error.raw_os_error() {
+            Some(number) => io::Error::from_raw_os_error(number),
+            None => io::Error::new(error.kind(), error.to_string()),
+        })
     }
 
     fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
@@ -84,7 +105,7 @@ impl Error {
         if kind != ErrorKind::Partly {
             message = one_line(message);
         }
-        Self { kind, message, path: None }
+        Self { kind, message, path: None, source: None }
     }
 
     /// Names the file that the error concerns; the first name given stays.
@@ -134,11 +155,28 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.source.as_ref().map(|source| -> &(dyn std::error::Error + 'static) { source.as_ref() })
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_an_error_came_of_is_kept() {
+        use std::error::Error as _;
+        let missing = std::fs::read("/there is no such file").unwrap_err();
+        let error = Error::from_io("cannot be read", &missing).at(Path::new("a.tif"));
+        let source = error.source().and_then(|source| source.downcast_ref::<io::Error>()).unwrap();
+        assert_eq!((source.kind(), source.raw_os_error()), (io::ErrorKind::NotFound, missing.raw_os_error()));
+        assert_eq!(error.to_string(), format!("a.tif: cannot be read: {missing}"));
+        let made = Error::from_io("cannot be read", &io::Error::new(io::ErrorKind::InvalidData, "no UTF-8"));
+        assert_eq!(made.source().unwrap().to_string(), "no UTF-8");
+        assert!(Error::input("is empty").source().is_none());
+    }
 
     #[test]
     fn messages_are_one_line_whatever_they_quote() {

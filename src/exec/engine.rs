@@ -188,7 +188,7 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
         .num_threads(threads)
         .thread_name(|n| format!("strandline-{n}"))
         .build()
-        .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")))
+        .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")).caused_by(e))
 }
 
 /// A stage under way.

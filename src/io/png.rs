@@ -15,7 +15,9 @@ use crate::error::{Error, Result};
 /// When `pixels` does not fit the size.
 pub fn write_rgb(path: &Path, width: u32, height: u32, pixels: &[u8]) -> Result<()> {
     assert_eq!(pixels.len() as u64, 3 * u64::from(width) * u64::from(height), "the pixels do not fit the size");
-    let fault = |error: png::EncodingError| Error::failed(format!("the picture cannot be written: {error}")).at(path);
+    let fault = |error: png::EncodingError| {
+        Error::failed(format!("the picture cannot be written: {error}")).caused_by(error).at(path)
+    };
     let file = File::create(path).map_err(|error| fault(error.into()))?;
     encode(file, width, height, pixels).map_err(|error| {
         // The first error is the one to report.

@@ -79,7 +79,7 @@ pub(super) fn first_binary_byte(head: &[u8]) -> Option<usize> {
 
 /// An error of the operating system while a file was read.
 pub(super) fn unreadable(error: &io::Error) -> Error {
-    Error::input(format!("cannot be read: {error}"))
+    Error::input(format!("cannot be read: {error}")).caused_by_io(error)
 }
 
 /// Text from a file for use in a message: short and without control characters.

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 pub(super) fn io_error(what: &str, error: &std::io::Error) -> Error {
     match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            Error::failed(format!("{what}: {error}; free some space or write to another disk"))
+            Error::failed(format!("{what}: {error}; free some space or write to another disk")).caused_by_io(error)
         }
         _ => Error::from_io(what, error),
     }

@@ -77,19 +77,22 @@ impl ImageReader {
     }
 
     fn read<T: ElementOwned + Into<f64>>(&self, level: &StoredLevel, part: &Box3) -> Result<Vec<f64>> {
-        let fault = |error: &dyn std::fmt::Display| Error::input(format!("cannot be read: {error}")).at(&self.folder);
-        let store = FilesystemStore::new(&self.folder).map_err(|e| fault(&e))?;
-        let array = Array::open(Arc::new(store), &format!("/{}", level.path)).map_err(|e| fault(&e))?;
+        let store = FilesystemStore::new(&self.folder).map_err(|e| self.unreadable(e))?;
+        let array = Array::open(Arc::new(store), &format!("/{}", level.path)).map_err(|e| self.unreadable(e))?;
         let ranges = [2, 1, 0].map(|a| part.lo[a] as u64..part.hi[a] as u64);
         let subset = ArraySubset::new_with_ranges(&ranges);
-        let values = array.retrieve_array_subset::<Vec<T>>(&subset).map_err(|e| fault(&e))?;
+        let values = array.retrieve_array_subset::<Vec<T>>(&subset).map_err(|e| self.unreadable(e))?;
         Ok(values.into_iter().map(Into::into).collect())
+    }
+
+    fn unreadable(&self, error: impl std::error::Error + Send + Sync + 'static) -> Error {
+        Error::input(format!("cannot be read: {error}")).caused_by(error).at(&self.folder)
     }
 }
 
 fn read_json(path: &Path) -> Result<Value> {
-    let text = std::fs::read(path).map_err(|e| Error::input(format!("cannot be read: {e}")).at(path))?;
-    serde_json::from_slice(&text).map_err(|e| Error::input(format!("is no JSON: {e}")).at(path))
+    let text = std::fs::read(path).map_err(|e| Error::input(format!("cannot be read: {e}")).caused_by(e).at(path))?;
+    serde_json::from_slice(&text).map_err(|e| Error::input(format!("is no JSON: {e}")).caused_by(e).at(path))
 }
 
 /// The unit of the axes, where they have one; none when the axes are not z, y, x.

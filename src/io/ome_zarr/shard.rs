@@ -95,7 +95,7 @@ impl ChunkCodec {
     fn encode(&self, bytes: Vec<u8>) -> Result<Vec<u8>> {
         let Some(codec) = &self.packing.codec else { return Ok(bytes) };
         encode_with(codec.as_ref(), &bytes)
-            .map_err(|error| Error::failed(format!("a chunk cannot be compressed: {error}")))
+            .map_err(|error| Error::failed(format!("a chunk cannot be compressed: {error}")).caused_by(error))
     }
 }
 
@@ -140,7 +140,7 @@ pub(super) fn write_shard(sink: &mut dyn Write, chunks: &[Option<Vec<u8>>]) -> R
         return Ok(0);
     }
     let index = encode_with(&Crc32cCodec::new(), &index)
-        .map_err(|error| Error::failed(format!("a shard's index cannot be encoded: {error}")))?;
+        .map_err(|error| Error::failed(format!("a shard's index cannot be encoded: {error}")).caused_by(error))?;
     sink.write_all(&index).map_err(io)?;
     Ok(offset + index.len() as u64)
 }

@@ -168,7 +168,9 @@ fn scratch_file(folder: &Path) -> io::Result<NamedTempFile> {
 }
 
 fn unwritable(error: &io::Error, path: &Path) -> Error {
-    Error::failed(format!("the mesh cannot be written: {error}; check the folder and its free space")).at(path)
+    Error::failed(format!("the mesh cannot be written: {error}; check the folder and its free space"))
+        .caused_by_io(error)
+        .at(path)
 }
 
 #[cfg(test)]

@@ -227,7 +227,7 @@ fn read_range(file: &mut File, start: u64, bytes: u64) -> std::io::Result<Vec<u8
 }
 
 fn unreadable(path: &Path, error: &std::io::Error) -> Error {
-    Error::input(format!("cannot be read: {error}")).at(path)
+    Error::input(format!("cannot be read: {error}")).caused_by_io(error).at(path)
 }
 
 fn damaged(path: &Path, reason: &str) -> Error {

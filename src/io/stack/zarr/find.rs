@@ -103,7 +103,7 @@ fn series(path: &Path, image: Option<u32>) -> Result<Found> {
 /// An array: a level of the group around it where that names it, else one that tells nothing of itself.
 fn array(path: &Path, node: &Node) -> Result<Found> {
     // The folder above is found by its real name, so that `.` has one too.
-    let real = path.canonicalize().map_err(|e| Error::input(format!("cannot be read: {e}")).at(path))?;
+    let real = path.canonicalize().map_err(|e| Error::input(format!("cannot be read: {e}")).caused_by(e).at(path))?;
     for (up, folder) in real.ancestors().enumerate().skip(1).take(2) {
         let Some(around) = Node::read(folder).unwrap_or_default() else { continue };
         let name = real.strip_prefix(folder).unwrap_or(&real);

@@ -48,7 +48,7 @@ fn document(path: &Path) -> Result<Option<Value>> {
     if !path.is_file() {
         return Ok(None);
     }
-    let unreadable = |e: std::io::Error| Error::input(format!("cannot be read: {e}")).at(path);
+    let unreadable = |e: std::io::Error| Error::input(format!("cannot be read: {e}")).caused_by(e).at(path);
     let mut text = Vec::new();
     File::open(path).map_err(unreadable)?.take(LONGEST + 1).read_to_end(&mut text).map_err(unreadable)?;
     if text.len() as u64 > LONGEST {
@@ -57,7 +57,7 @@ fn document(path: &Path) -> Result<Option<Value>> {
     // Editors of Windows put a byte order mark first.
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
     let parsed = serde_json::from_slice(text).or_else(|e| serde_json::from_slice(&without_nan(text)).map_err(|_| e));
-    let value: Value = parsed.map_err(|e| Error::input(format!("is no JSON: {e}")).at(path))?;
+    let value: Value = parsed.map_err(|e| Error::input(format!("is no JSON: {e}")).caused_by(e).at(path))?;
     if value.is_object() { Ok(Some(value)) } else { Err(Error::input("is no JSON object").at(path)) }
 }
 

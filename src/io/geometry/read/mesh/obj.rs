@@ -92,7 +92,9 @@ impl Shape {
             if self.highest.is_none_or(|(highest, _)| vertex > highest) {
                 self.highest = Some((vertex, line));
             }
-            self.faces.push_index(vertex).map_err(|error| Error::input(format!("line {line}: {error}")))?;
+            self.faces
+                .push_index(vertex)
+                .map_err(|error| Error::input(format!("line {line}: {error}")).caused_by(error))?;
         }
         self.faces.end(|| format!("line {line}"));
         Ok(())

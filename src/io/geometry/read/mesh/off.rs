@@ -119,7 +119,8 @@ pub(crate) fn read(input: &mut Input) -> Result<Source> {
     let mut faces = Faces::new(vertex_count);
     for n in 0..face_count {
         let line = element(&mut lines, "faces", face_count, n)?;
-        face(&line, &mut faces).map_err(|error| Error::input(format!("line {}: {error}", lines.number)))?;
+        face(&line, &mut faces)
+            .map_err(|error| Error::input(format!("line {}: {error}", lines.number)).caused_by(error))?;
         faces.end(|| format!("line {}", lines.number));
     }
     input.tell_rest(&format!("the {face_count} faces that it declares"))?;

@@ -95,10 +95,10 @@ fn read_lists<R: BufRead>(
                 ))
             })?;
             text_face(&line, face, corners, into)
-                .map_err(|error| Error::input(format!("line {}: {error}", body.line)))?;
+                .map_err(|error| Error::input(format!("line {}: {error}", body.line)).caused_by(error))?;
             into.end(&|| format!("line {}", body.line));
         } else {
-            let numbered = |error| Error::input(format!("face {number} (counted from 0): {error}"));
+            let numbered = |error| Error::input(format!("face {number} (counted from 0): {error}")).caused_by(error);
             binary_face(body, face, corners, into).map_err(numbered)?;
             into.end(&|| format!("face {number} (counted from 0)"));
         }

@@ -64,7 +64,7 @@ fn read_text<R: BufRead>(
         let number = body.line;
         let position = position_in(&text, vertex, place)
             .ok_or_else(|| Error::input(format!("line {number}, {}, is not a vertex as declared", quoted(&text))))?;
-        push(positions, position).map_err(|error| Error::input(format!("line {number}: {error}")))?;
+        push(positions, position).map_err(|error| Error::input(format!("line {number}: {error}")).caused_by(error))?;
     }
     Ok(())
 }

@@ -166,7 +166,7 @@ fn holds_numbers(text: &str, separator: Separator, comment: &str) -> bool {
 }
 
 fn named(names: &[&str], line: u64) -> Result<Columns> {
-    Columns::named(names).map_err(|error| Error::input(format!("line {line} {error}")))
+    Columns::named(names).map_err(|error| Error::input(format!("line {line} {error}")).caused_by(error))
 }
 
 /// The separator that a line `sep=;` tells.

@@ -43,7 +43,7 @@ pub(crate) fn read_roi(input: &mut Input) -> Result<PointFile> {
 /// Reads the ROIs of an archive.
 pub(crate) fn read_zip(input: &mut Input) -> Result<PointFile> {
     let bytes = input.read_whole(LONGEST)?;
-    let damaged = |e: zip::result::ZipError| Error::input(format!("is a damaged ZIP archive: {e}"));
+    let damaged = |e: zip::result::ZipError| Error::input(format!("is a damaged ZIP archive: {e}")).caused_by(e);
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
     let (mut rois, mut others, mut left) = (Vec::new(), 0, LONGEST);
     for n in 0..archive.len() {
@@ -60,13 +60,16 @@ pub(crate) fn read_zip(input: &mut Input) -> Result<PointFile> {
         entry
             .take(left + 1)
             .read_to_end(&mut content)
-            .map_err(|e| Error::input(format!("{} in it cannot be read: {e}", quoted(&name))))?;
+            .map_err(|e| Error::input(format!("{} in it cannot be read: {e}", quoted(&name))).caused_by(e))?;
         left = left
             .checked_sub(content.len() as u64)
             .ok_or_else(|| Error::input(format!("holds more than {} MiB of ROIs; divide it", LONGEST >> 20)))?;
         let stem = name.rsplit('/').next().unwrap_or_default();
         let stem = &stem[..stem.len() - ".roi".len()];
-        rois.push(Roi::decode(&content, stem).map_err(|e| Error::input(format!("{} in it {e}", quoted(&name))))?);
+        rois.push(
+            Roi::decode(&content, stem)
+                .map_err(|e| Error::input(format!("{} in it {e}", quoted(&name))).caused_by(e))?,
+        );
     }
     if rois.is_empty() {
         return Err(Error::input(

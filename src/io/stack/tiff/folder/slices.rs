@@ -95,7 +95,8 @@ struct Listed {
 
 /// The slices in a folder.
 fn list(folder: &Path) -> Result<Listed> {
-    let unreadable = |e: std::io::Error| Error::input(format!("the folder cannot be read: {e}")).at(folder);
+    let unreadable =
+        |e: std::io::Error| Error::input(format!("the folder cannot be read: {e}")).caused_by(e).at(folder);
     let (mut slices, mut pictures, mut folders) = (Vec::new(), 0, Vec::new());
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();

@@ -77,7 +77,8 @@ fn size_of(kind: u16) -> Option<u64> {
 impl TiffFile {
     /// Opens a file and reads its header.
     pub(crate) fn open(path: &Path) -> Result<Self> {
-        let unreadable = |e: std::io::Error| Error::input(format!("the file cannot be opened: {e}")).at(path);
+        let unreadable =
+            |e: std::io::Error| Error::input(format!("the file cannot be opened: {e}")).caused_by(e).at(path);
         let file = File::open(path).map_err(unreadable)?;
         let len = file.metadata().map_err(unreadable)?.len();
         let mut this = Self { file, path: path.to_path_buf(), len, order: ByteOrder::Little, big: false, first: 0 };
@@ -114,7 +115,7 @@ impl TiffFile {
                 "bytes {offset} to {end} are needed but the file ends at {len}: it is truncated or damaged"
             )));
         }
-        self.file.read_exact_at(out, offset).map_err(|e| self.error(format!("cannot be read: {e}")))
+        self.file.read_exact_at(out, offset).map_err(|e| self.error(format!("cannot be read: {e}")).caused_by(e))
     }
 
     fn read_up_to(&self, offset: u64, most: u64) -> Result<Vec<u8>> {
