@@ -1,4 +1,4 @@
-//! Numbers in sentences: as many digits as matter, wherever a sentence is made.
+//! Numbers and sizes in sentences: as many digits as matter, wherever a sentence is made.
 
 /// A number with four significant digits, no trailing zeros.
 #[must_use]
@@ -50,9 +50,53 @@ pub fn shortest_between(low: f64, high: f64) -> Option<f64> {
     })
 }
 
+/// A whole number in groups of three digits.
+#[must_use]
+pub fn grouped(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Bytes in the unit that gives the shortest number.
+#[must_use]
+pub fn bytes(value: u64) -> String {
+    let units = [("TiB", 40), ("GiB", 30), ("MiB", 20), ("KiB", 10)];
+    match units.iter().find(|(_, shift)| value >> shift > 0) {
+        Some((unit, shift)) => {
+            let tenths = (value as f64 / 2f64.powi(*shift) * 10.0).round();
+            format!("{} {unit}", number(tenths / 10.0))
+        }
+        None => format!("{value} bytes"),
+    }
+}
+
+/// `(x, y, z)`.
+#[must_use]
+pub fn triple(values: [f64; 3]) -> String {
+    let [x, y, z] = values.map(number);
+    format!("({x}, {y}, {z})")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_are_short() {
+        assert_eq!(bytes(1023), "1023 bytes");
+        assert_eq!(bytes(1536), "1.5 KiB");
+        assert_eq!(bytes(3 << 30), "3 GiB");
+        assert_eq!(bytes((1 << 20) + (1 << 19)), "1.5 MiB");
+        assert_eq!(grouped(1_234_567), "1 234 567");
+        assert_eq!(grouped(12), "12");
+    }
 
     #[test]
     fn numbers_are_short_and_right() {

@@ -3,7 +3,9 @@
 pub mod distance;
 pub mod enclosure;
 pub mod image;
+pub mod laying;
 pub mod level_set;
+pub mod limits;
 pub mod marks;
 pub mod middle;
 pub mod output;

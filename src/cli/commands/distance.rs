@@ -22,16 +22,14 @@ use crate::cli::report::run_report::{Ran, Report};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals;
-use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
+use crate::cli::terminal::text::{bytes, duration, grouped, place, triple};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
-use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
+use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
-use crate::kernel::distance::seeding::outside::count_outside;
-use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
-use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, Textbook, distance};
+use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, check_iterations, distance, outside_note};
 use crate::pipeline::middle::{MiddleSettings, middle};
 use crate::store::{MeshSink, Unfinished};
 
@@ -107,7 +105,7 @@ impl Job {
     }
 
     fn run<P: Precision>(&self) -> Result<()> {
-        check_range::<P>(&self.geometry, &self.sets)?;
+        self.settings.check_on::<P>(&self.geometry, &self.sets)?;
         let (threads, ranks) = (self.resources.threads, self.args.job.ranks);
         let needs = match self.middle_settings() {
             Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks),
@@ -186,7 +184,6 @@ impl Job {
 
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, needs: &Needs) -> Result<u64> {
-        self.refuse_too_many_bricks()?;
         let window = Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
             let name = self.settings.method.name();
             let textbook = if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {
@@ -238,20 +235,6 @@ impl Job {
         self.geometry.domain().volume().saturating_mul(element + labels + places).saturating_mul(8) / 7
     }
 
-    /// Refuses more bricks than there are numbers for.
-    fn refuse_too_many_bricks(&self) -> Result<()> {
-        let bricks = BrickGrid::new(self.geometry.shape, self.settings.brick).len();
-        if bricks < u64::from(Slot::MAX) {
-            return Ok(());
-        }
-        Err(Error::usage(format!(
-            "a grid of {} voxels falls into {} bricks, more than can be numbered; give a larger --brick or a coarser \
-             grid",
-            grouped(self.geometry.domain().volume()),
-            grouped(bricks)
-        )))
-    }
-
     /// What the run will take, in a few lines.
     fn plan(&self, needs: &Needs) -> String {
         let (g, s) = (&self.geometry, &self.settings);
@@ -297,25 +280,8 @@ impl Job {
 /// The settings that the flags mean.
 fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
     let field = &args.job.field;
-    let row = field.method.solver::<f32>();
     let sweeps = field.schedule == ScheduleArg::Sweep;
-    if field.neighbours == Neighbours::All && !row.takes_all_neighbours {
-        return Err(Error::usage(format!("--method {} looks at 6 neighbours; leave --neighbours out", row.name)));
-    }
-    if sweeps && field.neighbours == Neighbours::All && row.textbook == Textbook::Sweeps {
-        return Err(Error::usage("sweeps by bricks cannot keep the order of 26 neighbours; leave --schedule out"));
-    }
-    if sweeps && field.max_distance.is_some() {
-        return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
-    }
-    settings::check_ranks(args.job.ranks)?;
-    if field.iterations == 0 {
-        return Err(Error::usage("--iterations is 0; give 1 or more"));
-    }
-    if let Some(far) = field.max_distance.filter(|d| !(d.is_finite() && *d > 0.0)) {
-        return Err(Error::usage(format!("--max-distance is {far}; give a length, more than 0")));
-    }
-    Ok(DistanceSettings {
+    let settings = DistanceSettings {
         method: field.method,
         schedule: if sweeps { Schedule::Sweep { iterations: field.iterations } } else { Schedule::Front },
         neighbours: field.neighbours,
@@ -328,50 +294,10 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
         signed: args.choice.signed,
         labels: args.choice.labels,
         closest_point: args.choice.closest_point,
-        brick: settings::brick(args.job.resources.brick.unwrap_or(row.brick))?,
-    })
-}
-
-/// Says how many sources lie outside of the grid: it may not be where it was meant to be.
-fn outside_note(geometry: &Geometry, sets: &DataSets) -> Option<String> {
-    let (outside, all) = (count_outside(geometry, sets), sets.len() as u64);
-    let which = match outside {
-        0 => return None,
-        1 if all == 1 => "the only source lies outside of the grid or reaches".into(),
-        _ if outside == all => format!("all {} sources lie outside of the grid or reach", grouped(all)),
-        1 => format!("1 of {} sources lies outside of the grid or reaches", grouped(all)),
-        _ => format!("{} of {} sources lie outside of the grid or reach", grouped(outside), grouped(all)),
+        brick: args.job.resources.brick.unwrap_or(field.method.solver::<f32>().brick),
     };
-    Some(format!(
-        "{which} out of it; such sources count like all others (--origin, --shape and --spacing say where it lies)"
-    ))
-}
-
-/// How far a voxel may be from the nearest source where all of them lie outside: half of the grid's diagonal more than its
-/// middle is.
-fn farthest_outside(geometry: &Geometry, sets: &DataSets, diagonal: f64) -> f64 {
-    let [lo, hi] = [geometry.position([0; 3]), geometry.position(geometry.shape.map(|n| n - 1))];
-    let middle: [f64; 3] = std::array::from_fn(|a| f64::midpoint(lo[a], hi[a]));
-    let away = |p: &[f64; 3]| (0..3).map(|a| (p[a] - middle[a]).powi(2)).sum::<f64>();
-    let corners = (0..sets.mesh.len()).map(|n| sets.mesh.corners(n)[0]);
-    let nearest = sets.positions.iter().copied().chain(corners).map(|p| away(&p)).fold(f64::INFINITY, f64::min);
-    nearest.sqrt() + 0.5 * diagonal
-}
-
-/// Refuses distances that the type cannot hold.
-fn check_range<P: Precision>(geometry: &Geometry, sets: &DataSets) -> Result<()> {
-    let diagonal = (0..3).map(|a| (geometry.shape[a] as f64 * geometry.spacing[a]).powi(2)).sum::<f64>().sqrt();
-    let is_outside = count_outside(geometry, sets) > 0;
-    let diagonal = if is_outside { diagonal.max(farthest_outside(geometry, sets, diagonal)) } else { diagonal };
-    let smallest = geometry.min_spacing();
-    // Below 2^-14 half precision loses digits.
-    if diagonal < P::MAX && smallest > P::LEAST {
-        return Ok(());
-    }
-    Err(Error::usage(format!(
-        "distances from {} to {} do not fit --precision {}; choose a wider one, or another unit of length",
-        number(smallest),
-        number(diagonal),
-        P::TYPE.name()
-    )))
+    settings.check()?;
+    settings::check_ranks(args.job.ranks)?;
+    check_iterations(field.iterations)?;
+    Ok(settings)
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::cli::args::grid::GridArgs;
 use crate::cli::args::reconstruct::{CloudGridArgs, ReconstructArgs};
-use crate::cli::inputs::grid::{asked_grid, check_counts};
+use crate::cli::inputs::grid::asked_grid;
 use crate::cli::inputs::noted::read_told;
 use crate::cli::inputs::settings;
 use crate::cli::inputs::settings::Resources;
@@ -29,7 +29,7 @@ use crate::grid::Geometry;
 use crate::io::geometry::read::source::Source;
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::pipeline::reconstruct::{
-    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, least_memory, reconstruct, typical_spacing,
+    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct, refuse_too_fine, typical_spacing,
     without_isolated,
 };
 use crate::store::Unfinished;
@@ -275,21 +275,6 @@ fn far_strays(alone: usize, all: usize) -> Error {
         grouped(alone as u64),
         grouped(all as u64)
     ))
-}
-
-/// Refuses a grid whose cells alone would not fit the memory, before any is taken for them.
-fn refuse_too_fine(grid: &Geometry, memory: u64) -> Result<()> {
-    check_counts(grid.shape.map(|n| n as f64))?;
-    let least = least_memory(grid);
-    if least <= memory {
-        return Ok(());
-    }
-    Err(Error::usage(format!(
-        "a grid of {} voxels needs {} of memory for its cells alone, but {} are allowed; give a larger --spacing",
-        grouped(grid.domain().volume()),
-        bytes(least),
-        bytes(memory)
-    )))
 }
 
 fn describe_found(found: &Reconstruction) -> String {

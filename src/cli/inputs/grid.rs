@@ -2,14 +2,10 @@
 
 use super::image::open_stack;
 use crate::cli::args::grid::GridArgs;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::grid::Geometry;
-
-/// Voxels along the longest side where no spacing is given.
-const DEFAULT_VOXELS: f64 = 256.0;
-
-/// The room around sources where none is given, in parts of their largest extent (Kósa & Mikula 2023).
-const DEFAULT_PADDING: f64 = 1.0 / 6.0;
+use crate::pipeline::laying;
+use crate::pipeline::laying::{check_grid, check_spacing};
 
 /// The grid that was asked for where no source is needed to tell it: that of an image, or one typed in full. Adds what the
 /// user should know to `notes`.
@@ -21,7 +17,11 @@ pub(crate) fn given(args: &GridArgs, notes: &mut Vec<String>) -> Result<Option<G
     }
     check_spacing("--spacing", args.spacing)?;
     match (args.filled.shape, args.filled.origin, args.spacing) {
-        (Some(shape), Some(origin), Some(spacing)) => exact(shape, origin, spacing).map(Some),
+        (Some(shape), Some(origin), Some(spacing)) => {
+            let geometry = Geometry { shape, spacing, origin, unit: None };
+            check_grid(&geometry)?;
+            Ok(Some(geometry))
+        }
         _ => Ok(None),
     }
 }
@@ -33,41 +33,7 @@ pub(crate) fn asked_grid(args: &GridArgs, bounds: ([f64; 3], [f64; 3]), notes: &
 
 /// The grid around sources, of which `bounds` is the box.
 pub(crate) fn around(args: &GridArgs, (low, high): ([f64; 3], [f64; 3])) -> Result<Geometry> {
-    let padding = args.filled.padding;
-    if let Some(padding) = padding.filter(|p| !(p.is_finite() && *p >= 0.0)) {
-        return Err(Error::usage(format!("--padding is {padding}; give a length, 0 or more")));
-    }
-    let extent: [f64; 3] = std::array::from_fn(|a| high[a] - low[a]);
-    let largest = extent.iter().copied().fold(0.0, f64::max);
-    if !largest.is_finite() {
-        return Err(Error::input("the coordinates reach farther than numbers do; scale them down"));
-    }
-    if largest == 0.0 && (args.spacing.is_none() || padding.is_none()) {
-        return Err(Error::input(
-            "all sources lie in one point, which tells no scale; give --spacing and --padding, or --origin and --shape",
-        ));
-    }
-    let padding = padding.unwrap_or(DEFAULT_PADDING * largest);
-    let spacing = args.spacing.unwrap_or([(largest + 2.0 * padding) / DEFAULT_VOXELS; 3]);
-    // One voxel more than the room needs, as the papers' grids have it.
-    let count = |a: usize| ((extent[a] + 2.0 * padding) / spacing[a]).floor() + 2.0;
-    let counts = [count(0), count(1), count(2)];
-    check_counts(counts)?;
-    let origin = low.map(|v| v - padding);
-    Ok(Geometry { shape: counts.map(|n| n as i64), spacing, origin, unit: None })
-}
-
-fn exact(shape: [i64; 3], origin: [f64; 3], spacing: [f64; 3]) -> Result<Geometry> {
-    if shape.iter().any(|&n| n < 1) {
-        let [x, y, z] = shape;
-        return Err(Error::usage(format!("--shape is {x},{y},{z}; give three numbers of voxels, each 1 or more")));
-    }
-    if origin.iter().any(|v| !v.is_finite()) {
-        let [x, y, z] = origin;
-        return Err(Error::usage(format!("--origin is {x},{y},{z}; give three finite coordinates")));
-    }
-    check_counts(shape.map(|n| n as f64))?;
-    Ok(Geometry { shape, spacing, origin, unit: None })
+    laying::around([low, high], args.spacing, args.filled.padding)
 }
 
 impl GridArgs {
@@ -75,28 +41,6 @@ impl GridArgs {
     pub(crate) fn is_asked_for(&self) -> bool {
         self.spacing.is_some() || self.filled.is_given() || self.like.is_some()
     }
-}
-
-/// Refuses a spacing that is none.
-pub(crate) fn check_spacing(flag: &str, spacing: Option<[f64; 3]>) -> Result<()> {
-    match spacing.filter(|h| h.iter().any(|h| !(h.is_finite() && *h > 0.0))) {
-        Some([x, y, z]) => {
-            Err(Error::usage(format!("{flag} is {x},{y},{z}; give one length or three, each more than 0")))
-        }
-        None => Ok(()),
-    }
-}
-
-/// Refuses what no index could count.
-pub(crate) fn check_counts(counts: [f64; 3]) -> Result<()> {
-    let voxels: f64 = counts.iter().product();
-    if counts.iter().any(|&n| n >= 1e9) || voxels >= 1e18 {
-        let [x, y, z] = counts;
-        return Err(Error::usage(format!(
-            "the grid would have {x:.3e} x {y:.3e} x {z:.3e} voxels; give a larger --spacing or a smaller --shape"
-        )));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -16,8 +16,9 @@ use crate::pipeline::distance::Method;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::level_set::evolve::Stop;
 use crate::pipeline::level_set::motion::Motion;
+use crate::pipeline::limits::{ABOVE_ZERO, check, check_given};
 use crate::pipeline::reconstruct::ReconstructSettings;
-use crate::pipeline::segment::{FillGaps, ImageModel, Overlap, SegmentSettings, Start};
+use crate::pipeline::segment::{ImageModel, Overlap, SegmentSettings, Start};
 use crate::store::Scratch;
 
 /// What a run may use.
@@ -38,7 +39,6 @@ impl Resources {
 }
 
 const L2_TOLERANCE: f64 = 1e-3;
-const BRICKS: std::ops::RangeInclusive<i64> = 16..=512;
 const MOST_THREADS: usize = 1024;
 
 /// The settings of a segmentation.
@@ -46,11 +46,11 @@ pub(crate) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
     let defaults = SegmentSettings::default();
     let (image, pull) = (&args.picture, &args.pull);
     let edges = Motion {
-        rho: checked("--rho", pull.rho.unwrap_or(defaults.motion.rho), AT_LEAST_ZERO)?,
+        rho: pull.rho.unwrap_or(defaults.motion.rho),
         normalised: image.edge == Edge::Normalised,
         ..defaults.motion
     };
-    Ok(SegmentSettings {
+    let settings = SegmentSettings {
         method: args.distance.method,
         image: match image.model {
             _ if pull.rho == Some(0.0) => ImageModel::None,
@@ -66,59 +66,52 @@ pub(crate) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
             StartArg::Auto | StartArg::Flood => Start::Flood,
         },
         cross_validate: image.cross_validate,
-        motion: motion(&args.motion, edges)?,
+        motion: motion(&args.motion, edges),
         theta: args.motion.theta,
         rho: pull.rho,
-        k: checked("--k", pull.k.unwrap_or(defaults.k), AT_LEAST_ZERO)?,
+        k: pull.k.unwrap_or(defaults.k),
         smoothing: match image.smoothing {
             SmoothingArg::Gaussian => Smoothing::Gaussian,
             SmoothingArg::Heat => Smoothing::Heat,
         },
-        sigma: optional("--sigma", pull.sigma, AT_LEAST_ZERO)?,
-        beta: optional("--beta", args.motion.beta, ABOVE_ZERO)?,
+        sigma: pull.sigma,
+        beta: args.motion.beta,
         caps: !image.no_caps,
-        percentiles: percentiles(image.percentiles)?,
+        percentiles: image.percentiles,
         overlap: match image.overlap {
             OverlapArg::Smaller => Overlap::Smaller,
             OverlapArg::Larger => Overlap::Larger,
             OverlapArg::First => Overlap::First,
             OverlapArg::Last => Overlap::Last,
         },
-        fill_gaps: image.fill_gaps.map(fill_gaps).transpose()?,
-        brick: brick(args.resources.brick.unwrap_or(defaults.brick))?,
-    })
-}
-
-fn fill_gaps(given: FillGaps) -> Result<FillGaps> {
-    match given {
-        FillGaps::Width(width) => checked("--fill-gaps", width, ABOVE_ZERO).map(FillGaps::Width),
-        FillGaps::Auto => Ok(FillGaps::Auto),
-    }
+        fill_gaps: image.fill_gaps,
+        brick: args.resources.brick.unwrap_or(defaults.brick),
+    };
+    settings.check()?;
+    Ok(settings)
 }
 
 /// The settings of a reconstruction.
 pub(crate) fn reconstruct_settings(args: &MotionArgs, method: Method) -> Result<ReconstructSettings> {
     let defaults = ReconstructSettings::default();
-    Ok(ReconstructSettings {
-        method,
-        motion: motion(args, defaults.motion)?,
-        beta: optional("--beta", args.beta, ABOVE_ZERO)?,
-        keeps_grid: false,
-    })
+    let settings =
+        ReconstructSettings { method, motion: motion(args, defaults.motion), beta: args.beta, keeps_grid: false };
+    settings.check()?;
+    Ok(settings)
 }
 
 /// How the surface is to move; what was not typed as in `defaults`.
-fn motion(args: &MotionArgs, defaults: Motion) -> Result<Motion> {
-    Ok(Motion {
-        theta: checked("--theta", args.theta.unwrap_or(defaults.theta), AT_LEAST_ZERO)?,
-        delta: optional("--delta", args.delta, AT_LEAST_ZERO)?,
-        tau: optional("--tau", args.tau, ABOVE_ZERO)?,
-        epsilon: optional("--epsilon", args.epsilon, ABOVE_ZERO)?,
-        omega: checked("--omega", args.omega.unwrap_or(defaults.omega), BETWEEN_ZERO_AND_TWO)?,
-        stop: stop(args, defaults.stop)?,
+fn motion(args: &MotionArgs, defaults: Motion) -> Motion {
+    Motion {
+        theta: args.theta.unwrap_or(defaults.theta),
+        delta: args.delta,
+        tau: args.tau,
+        epsilon: args.epsilon,
+        omega: args.omega.unwrap_or(defaults.omega),
+        stop: stop(args, defaults.stop),
         max_steps: args.max_steps.unwrap_or(defaults.max_steps),
         ..defaults
-    })
+    }
 }
 
 /// More ranks than this are no use in one process.
@@ -134,56 +127,21 @@ pub(crate) fn check_ranks(ranks: usize) -> Result<()> {
 
 /// A number above 0, or none.
 pub(crate) fn above_zero(flag: &str, value: Option<f64>) -> Result<Option<f64>> {
-    optional(flag, value, ABOVE_ZERO)
+    check_given(flag, value, ABOVE_ZERO)?;
+    Ok(value)
 }
 
-/// A range of numbers and how to say it.
-type Range = (fn(f64) -> bool, &'static str);
-const AT_LEAST_ZERO: Range = (|v| v >= 0.0, "0 or more");
-const ABOVE_ZERO: Range = (|v| v > 0.0, "more than 0");
-const BETWEEN_ZERO_AND_TWO: Range = (|v| 0.0 < v && v < 2.0, "between 0 and 2");
-
-fn checked(flag: &str, value: f64, (holds, range): Range) -> Result<f64> {
-    // Lengths and weights are computed with in single precision.
-    if value.is_finite() && (value as f32).is_finite() && holds(value) {
-        return Ok(value);
+fn stop(args: &MotionArgs, default: Stop) -> Stop {
+    match (args.stop, default) {
+        (StopArg::Surface, Stop::Surface(limit)) => Stop::Surface(args.tol.unwrap_or(limit)),
+        (StopArg::Surface, Stop::L2(_)) => Stop::Surface(args.tol.unwrap_or(0.02)),
+        (StopArg::L2, _) => Stop::L2(args.tol.unwrap_or(L2_TOLERANCE)),
     }
-    Err(Error::usage(format!("{flag} is {value}; it must be a number, {range}")))
-}
-
-fn optional(flag: &str, value: Option<f64>, range: Range) -> Result<Option<f64>> {
-    value.map(|value| checked(flag, value, range)).transpose()
-}
-
-fn stop(args: &MotionArgs, default: Stop) -> Result<Stop> {
-    let tolerance = optional("--tol", args.tol, ABOVE_ZERO)?;
-    Ok(match (args.stop, default) {
-        (StopArg::Surface, Stop::Surface(limit)) => Stop::Surface(tolerance.unwrap_or(limit)),
-        (StopArg::Surface, Stop::L2(_)) => Stop::Surface(tolerance.unwrap_or(0.02)),
-        (StopArg::L2, _) => Stop::L2(tolerance.unwrap_or(L2_TOLERANCE)),
-    })
-}
-
-fn percentiles([low, high]: [f64; 2]) -> Result<[f64; 2]> {
-    if 0.0 <= low && low < high && high <= 100.0 {
-        return Ok([low, high]);
-    }
-    Err(Error::usage(format!(
-        "--percentiles is {low},{high}; give two percentages, the lower one first, such as 0.1,99.9"
-    )))
-}
-
-/// The edge of bricks that was asked for.
-pub(crate) fn brick(edge: i64) -> Result<i64> {
-    if BRICKS.contains(&edge) && edge % 16 == 0 {
-        return Ok(edge);
-    }
-    Err(Error::usage(format!("--brick is {edge}; give a multiple of 16 from {} to {}", BRICKS.start(), BRICKS.end())))
 }
 
 /// A spacing from the command line.
 pub(crate) fn spacing(flag: &str, given: Option<[f64; 3]>) -> Result<Option<[f64; 3]>> {
-    if let Some([x, y, z]) = given.filter(|h| h.iter().any(|&v| checked("", v, ABOVE_ZERO).is_err())) {
+    if let Some([x, y, z]) = given.filter(|h| h.iter().any(|&v| check("", v, ABOVE_ZERO).is_err())) {
         return Err(Error::usage(format!("{flag} is {x},{y},{z}; give lengths, each more than 0")));
     }
     Ok(given)
@@ -221,6 +179,7 @@ mod tests {
 
     use super::*;
     use crate::cli::args::command_line::{Cli, Command};
+    use crate::pipeline::segment::FillGaps;
 
     fn typed(flags: &str) -> Box<SegmentArgs> {
         let words = "strandline segment image.tif --points marks.csv -o none".split(' ');

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::grid::check_spacing;
 use super::image::{chosen_notes, open_stack};
 use super::marks::{Reading, placed};
 use super::noted::read_in_unit;
@@ -21,6 +20,8 @@ use crate::io::geometry::read::sources::read_parts;
 use crate::io::stack::label_volume::{LabelVolume, is_label_volume, labels_of};
 use crate::kernel::geometry::solid::Solid;
 use crate::pipeline::distance::seeding::label_borders::label_borders;
+use crate::pipeline::distance::without_inside;
+use crate::pipeline::laying::check_spacing;
 
 /// Labels that have fewer voxels in the mean are grey values.
 const FEWEST_VOXELS: u64 = 16;
@@ -125,10 +126,6 @@ fn refuse_other_unit(volume: &Geometry, unit: &mut Option<LengthUnit>) -> Result
         "its lengths are in {}, those of the files before it in {}; name it first, so that points are told in its unit",
         own.name, before.name
     )))
-}
-
-fn without_inside(what: &str) -> Error {
-    Error::input(format!("holds {what}, which have no inside here; --signed needs triangle meshes"))
 }
 
 fn open_volume(path: &Path, args: &GridArgs, console: &Console) -> Result<LabelVolume> {

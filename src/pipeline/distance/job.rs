@@ -68,7 +68,8 @@ impl DistanceSettings {
 /// Computes the distance to `sets` on a grid, stored as `P`; `store` gets the fields, none when it is absent.
 ///
 /// # Errors
-/// When the output cannot be written, scratch runs out, or the run is interrupted.
+/// When the method cannot do what is asked for in that order, the output cannot be written, scratch runs out, or the run is
+/// interrupted.
 pub fn distance<P: Precision>(
     engine: &Engine,
     geometry: &Geometry,
@@ -87,7 +88,8 @@ pub fn distance<P: Precision>(
 /// are the same sources, sorted: with them labels are looked at closer, where these are tracked.
 ///
 /// # Errors
-/// When scratch runs out or the run is interrupted, or by what it is handed to.
+/// When the method cannot do what is asked for in that order, scratch runs out or the run is interrupted, or by what it is
+/// handed to.
 pub fn solve_sets<P: Precision, R>(
     engine: &Engine,
     geometry: &Geometry,
@@ -96,6 +98,7 @@ pub fn solve_sets<P: Precision, R>(
     settings: &DistanceSettings,
     then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
 ) -> Result<R> {
+    settings.check_order()?;
     let grid = BrickGrid::new(geometry.shape, settings.brick);
     let set = Arc::new(BrickSet::dense(grid));
     let stage = engine.stage("sort sources", 0);

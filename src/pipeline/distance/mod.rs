@@ -4,6 +4,7 @@
 //! The set need not cover the domain: a value within the set's reach of the cloud is reached only through smaller
 //! values, so leaving far bricks out changes none of the near ones.
 
+mod checks;
 mod job;
 mod needs;
 mod ranks;
@@ -15,6 +16,7 @@ mod solving;
 
 use std::sync::Arc;
 
+pub use checks::{check_iterations, outside_note, without_inside};
 pub use job::{DistanceSettings, Init, distance, solve_sets};
 pub use needs::Needs;
 pub(crate) use needs::tree_bytes;

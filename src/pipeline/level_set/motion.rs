@@ -2,8 +2,10 @@
 //! from the grid's spacing.
 
 use super::evolve::{Stop, TimeLoop};
+use crate::error::Result;
 use crate::grid::Geometry;
 use crate::kernel::level_set::scheme::velocity::Velocity;
+use crate::pipeline::limits::{ABOVE_ZERO, AT_LEAST_ZERO, BETWEEN_ZERO_AND_TWO, check, check_given};
 
 /// What the user may set; `None` leaves a length to the spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +55,21 @@ const EPSILON_PER_VOXEL: f64 = 1e-2;
 const SOLVER_TOLERANCE: f64 = 1e-3;
 
 impl Motion {
+    /// Refuses numbers with which no surface moves.
+    ///
+    /// # Errors
+    /// With the setting and what it may be.
+    pub fn check(&self) -> Result<()> {
+        check("--rho", self.rho, AT_LEAST_ZERO)?;
+        check("--theta", self.theta, AT_LEAST_ZERO)?;
+        check_given("--delta", self.delta, AT_LEAST_ZERO)?;
+        check_given("--tau", self.tau, ABOVE_ZERO)?;
+        check_given("--epsilon", self.epsilon, ABOVE_ZERO)?;
+        check("--omega", self.omega, BETWEEN_ZERO_AND_TWO)?;
+        let (Stop::Surface(tolerance) | Stop::L2(tolerance)) = self.stop;
+        check("--tol", tolerance, ABOVE_ZERO)
+    }
+
     /// The curvature's weight on a grid.
     #[must_use]
     pub fn delta_on(&self, geometry: &Geometry) -> f64 {

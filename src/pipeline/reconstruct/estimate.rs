@@ -1,6 +1,8 @@
 //! What a reconstruction will take, told before it starts: that of its cells as the search begins with them.
 
 use super::settings::ReconstructSettings;
+use crate::error::{Error, Result};
+use crate::grid::digits::{bytes, grouped};
 use crate::grid::{BrickGrid, Geometry};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
 use crate::pipeline::enclosure::needs::{
@@ -8,6 +10,7 @@ use crate::pipeline::enclosure::needs::{
 };
 use crate::pipeline::enclosure::region::Vicinity;
 use crate::pipeline::enclosure::search::first_reach_for;
+use crate::pipeline::laying::check_counts;
 
 /// What a run is expected to take; of a cloud whose holes are wider than the search's first reach it takes more.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,9 +34,26 @@ const SIDES_BYTES: u64 = 13;
 const SECONDS_PER_NEAR_VOXEL: f64 = 6e-7;
 
 /// Bytes of memory that a grid takes for its cells alone, told without taking any.
-#[must_use]
-pub fn least_memory(grid: &Geometry) -> u64 {
+fn least_memory(grid: &Geometry) -> u64 {
     BrickGrid::new(grid.shape, CELL as i64).len().saturating_mul(GRID_CELL_BYTES)
+}
+
+/// Refuses a grid whose cells alone would not fit the memory, before any is taken for them.
+///
+/// # Errors
+/// With the memory that it takes, or the number of voxels where there are more than can be counted.
+pub fn refuse_too_fine(grid: &Geometry, memory: u64) -> Result<()> {
+    check_counts(grid.shape.map(|n| n as f64))?;
+    let least = least_memory(grid);
+    if least <= memory {
+        return Ok(());
+    }
+    Err(Error::usage(format!(
+        "a grid of {} voxels needs {} of memory for its cells alone, but {} are allowed; give a larger --spacing",
+        grouped(grid.domain().volume()),
+        bytes(least),
+        bytes(memory)
+    )))
 }
 
 /// Estimates a reconstruction on a grid with so many threads; `writes` says whether there is an output.

@@ -1,8 +1,10 @@
 //! Settings of `reconstruct`, and what they are when the user gives none. Lengths are physical.
 
+use crate::error::Result;
 use crate::pipeline::distance::Method;
 use crate::pipeline::level_set::evolve::Stop;
 use crate::pipeline::level_set::motion::Motion;
+use crate::pipeline::limits::{ABOVE_ZERO, check_given};
 
 /// What the user may set.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,5 +30,16 @@ impl Default for ReconstructSettings {
             beta: None,
             keeps_grid: false,
         }
+    }
+}
+
+impl ReconstructSettings {
+    /// Refuses numbers that no surface can start from, or move by.
+    ///
+    /// # Errors
+    /// With the setting and what it may be.
+    pub fn check(&self) -> Result<()> {
+        self.motion.check()?;
+        check_given("--beta", self.beta, ABOVE_ZERO)
     }
 }

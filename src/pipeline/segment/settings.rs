@@ -3,10 +3,12 @@
 use super::labels::Overlap;
 use super::neighbours::FillGaps;
 use super::object_report::Refused;
+use crate::error::{Error, Result};
 use crate::grid::Geometry;
 use crate::pipeline::distance::Method;
 use crate::pipeline::image::terms::{EdgeSettings, Smoothing};
 use crate::pipeline::level_set::motion::Motion;
+use crate::pipeline::limits::{ABOVE_ZERO, AT_LEAST_ZERO, check, check_brick, check_given};
 use crate::pipeline::marks::ObjectMarks;
 
 /// What the image shows at the border of the objects.
@@ -122,6 +124,34 @@ impl Default for SegmentSettings {
 const SIGMA_VOXELS: f64 = 2.0;
 
 impl SegmentSettings {
+    /// Refuses numbers with which nothing is found; lengths are held against an image by [`super::check_lengths`].
+    ///
+    /// # Errors
+    /// With the setting and what it may be.
+    pub fn check(&self) -> Result<()> {
+        check_given("--theta", self.theta, AT_LEAST_ZERO)?;
+        check_given("--rho", self.rho, AT_LEAST_ZERO)?;
+        self.motion.check()?;
+        check("--k", self.k, AT_LEAST_ZERO)?;
+        check_given("--sigma", self.sigma, AT_LEAST_ZERO)?;
+        check_given("--beta", self.beta, ABOVE_ZERO)?;
+        self.check_percentiles()?;
+        if let Some(FillGaps::Width(width)) = self.fill_gaps {
+            check("--fill-gaps", width, ABOVE_ZERO)?;
+        }
+        check_brick(self.brick)
+    }
+
+    fn check_percentiles(&self) -> Result<()> {
+        let [low, high] = self.percentiles;
+        if 0.0 <= low && low < high && high <= 100.0 {
+            return Ok(());
+        }
+        Err(Error::usage(format!(
+            "--percentiles is {low},{high}; give two percentages, the lower one first, such as 0.1,99.9"
+        )))
+    }
+
     /// True where the image has a say.
     #[must_use]
     pub fn uses_image(&self) -> bool {
