@@ -20,6 +20,12 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// So many voxels along x, y and z, these so far apart, the first one there; in a unit that is not told.
+    #[must_use]
+    pub fn new(shape: [i64; 3], spacing: [f64; 3], origin: [f64; 3]) -> Self {
+        Self { shape, spacing, origin, unit: None }
+    }
+
     /// The box of all voxels.
     #[must_use]
     pub fn domain(&self) -> Box3 {

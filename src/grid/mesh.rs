@@ -1,5 +1,7 @@
 //! Sources of a distance: the triangles of a mesh in the world (docs/algorithms.md, "Triangles").
 
+use std::borrow::Cow;
+
 use super::Weld;
 use crate::error::{Error, Result};
 
@@ -38,6 +40,18 @@ impl BoundaryEdges {
     #[must_use]
     pub fn is_oriented(self) -> bool {
         self.flipped == 0
+    }
+}
+
+impl From<TriangleMesh> for Cow<'_, TriangleMesh> {
+    fn from(mesh: TriangleMesh) -> Self {
+        Self::Owned(mesh)
+    }
+}
+
+impl<'a> From<&'a TriangleMesh> for Cow<'a, TriangleMesh> {
+    fn from(mesh: &'a TriangleMesh) -> Self {
+        Self::Borrowed(mesh)
     }
 }
 

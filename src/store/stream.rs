@@ -23,6 +23,20 @@ pub trait BoxSource<T: Element>: Sync {
     }
 }
 
+impl<T: Element, S: BoxSource<T> + ?Sized> BoxSource<T> for &S {
+    fn shape(&self) -> [i64; 3] {
+        (**self).shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
+        (**self).read_box(part, out)
+    }
+
+    fn constant_in(&self, part: &Box3) -> Option<T> {
+        (**self).constant_in(part)
+    }
+}
+
 /// Something into which any box of a volume can be written, from any thread.
 pub trait BoxSink<T: Element>: Sync {
     /// Voxels along each axis, `[x, y, z]`.

@@ -21,7 +21,8 @@ const ROOMS: &[(&str, u8)] = &[
     ("exec", 3),
     ("io", 3),
     ("pipeline", 4),
-    ("cli", 5),
+    ("job", 5),
+    ("cli", 6),
 ];
 
 /// Words that only the named rooms may use.

@@ -10,7 +10,6 @@ use crate::cli::args::distance::MiddleChoice;
 use crate::cli::args::distance::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
 use crate::cli::inputs::grid;
 use crate::cli::inputs::settings;
-use crate::cli::inputs::settings::Resources;
 use crate::cli::inputs::sources::{Read, read_sets};
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::disk::Disk;
@@ -28,6 +27,7 @@ use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
+use crate::job::resources::Resources;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, check_iterations, distance, outside_note};
 use crate::pipeline::middle::{MiddleSettings, middle};
@@ -121,7 +121,7 @@ impl Job {
             return Ok(());
         }
         self.console.say(&plan);
-        let engine = self.resources.engine(window, &self.cancel, &self.console)?;
+        let engine = self.resources.engine(window, &self.cancel, self.console.clone())?;
         let engine = engine.with_ranks(self.args.job.ranks);
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();

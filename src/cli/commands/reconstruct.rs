@@ -12,7 +12,6 @@ use crate::cli::args::reconstruct::{CloudGridArgs, ReconstructArgs};
 use crate::cli::inputs::grid::asked_grid;
 use crate::cli::inputs::noted::read_told;
 use crate::cli::inputs::settings;
-use crate::cli::inputs::settings::Resources;
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::disk::Disk;
 use crate::cli::outputs::drawing::Drawing;
@@ -28,6 +27,7 @@ use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
 use crate::io::geometry::read::source::Source;
 use crate::io::geometry::write::ply::PlyWriter;
+use crate::job::resources::Resources;
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct, refuse_too_fine, typical_spacing,
     without_isolated,
@@ -194,7 +194,7 @@ impl Job {
     }
 
     fn run(&self, window: u64, estimate: &Estimate) -> Result<()> {
-        let engine = self.resources.engine(window, &self.cancel, &self.console)?.with_ranks(self.args.ranks);
+        let engine = self.resources.engine(window, &self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
         engine.reserve(estimate.held)?;
         let result = self.solve_and_write(&engine);
         self.console.clear();

@@ -11,7 +11,6 @@ use crate::cli::args::common::SegmentArgs;
 use crate::cli::inputs::image::{chosen_notes, crop_box, open_stack};
 use crate::cli::inputs::marks::{Marks, Objects, Reading, look_at_marks, read_marks};
 use crate::cli::inputs::settings;
-use crate::cli::inputs::settings::Resources;
 use crate::cli::outputs::checks::{Outputs, numbered};
 use crate::cli::outputs::files::{export_mesh, mesh_format, tell_of_anchor};
 use crate::cli::print;
@@ -25,6 +24,7 @@ use crate::exec::{Cancel, Engine, Progress};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stack::volume::Stack;
+use crate::job::resources::Resources;
 use crate::pipeline::segment::{
     Estimate, Grids, Guides, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing, segment,
 };
@@ -160,7 +160,7 @@ impl Job {
         if self.console.is_verbose() {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
-        let engine = self.resources.engine(window, &self.cancel, &self.console)?;
+        let engine = self.resources.engine(window, &self.cancel, self.console.clone())?;
         engine.reserve(estimate.held)?;
         let result = self.solve_and_write(&engine);
         self.console.clear();

@@ -12,8 +12,8 @@ use crate::grid::{Geometry, PointCloud};
 use crate::io::geometry::read::point_file::{PointFile, Scale};
 use crate::io::geometry::read::points::{LengthUnit, read_points};
 use crate::pipeline::marks::{ObjectMarks, Seed, split_and_seed};
-use crate::pipeline::segment::doubts;
-use crate::pipeline::segment::{Grids, Refused, check_marks, crossed, open_outlines, same_place, spans_slices};
+use crate::pipeline::segment;
+use crate::pipeline::segment::{Grids, Looked, Refused, same_place};
 
 /// What decides how the numbers of a file are read.
 pub(crate) struct Reading<'a> {
@@ -196,54 +196,16 @@ impl Objects {
 pub(crate) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: &[Seed], console: &Console) -> Result<Objects> {
     let (seeded, marked): (Vec<_>, Vec<_>) =
         split_and_seed(&marks.cloud, seeds).into_iter().partition(|object| object.seed.is_some());
-    let (mut fit, mut refused, mut first_error) = (Vec::new(), Vec::new(), None);
-    for object in &marked {
-        let label = object.object;
-        match check_marks(object, grids) {
-            Ok(notes) => {
-                let doubts = if marks.unsure.contains(&label) { doubts(object, grids.whole) } else { Vec::new() };
-                notes.iter().chain(&doubts).for_each(|note| console.note(note));
-                fit.push(object.clone());
-            }
-            Err(error) => {
-                refused.push(Refused { label, reason: error.to_string() });
-                first_error.get_or_insert(error.at(&marks.files[&label]));
-            }
-        }
-        for number in crossed(object, grids.part) {
-            console.note(&format!("outline {number} of object {label} crosses itself: are its marks in order?"));
-        }
-        if object.drawn && object.contours.len() == 1 {
-            console.note(&format!(
-                "object {label} has one outline: how far it goes on beyond it is guessed; mark it on more slices"
-            ));
-        }
-        let open = open_outlines(object);
-        if !open.is_empty() {
-            let numbers: Vec<String> = open.iter().take(MOST_NAMED).map(i64::to_string).collect();
-            let more = if open.len() > MOST_NAMED { ", ..." } else { "" };
-            console.note(&format!(
-                "outlines of object {label} are open ({}{more}): their ends, far from each other, are joined by a straight line",
-                numbers.join(", ")
-            ));
-        }
-        for (number, slices) in spans_slices(object, grids.whole) {
-            console.note(&format!(
-                "outline {number} of object {label} has marks on {slices} slices: give each slice's outline a number of its own"
-            ));
-        }
-    }
+    let looked = segment::look_at_marks(&marked, grids, &marks.unsure, &|text| console.note(text));
+    let Looked { mut fit, refused, first_error } = looked;
     tell_twice_marked(&marked, marks, grids.whole, console);
     fit.extend(seeded);
     // One of several that does not fit is refused by itself.
     match first_error {
-        Some(error) if fit.is_empty() => Err(error),
+        Some((label, error)) if fit.is_empty() => Err(error.at(&marks.files[&label])),
         _ => Ok(Objects { fit, refused }),
     }
 }
-
-/// Outlines that a note names, at most.
-const MOST_NAMED: usize = 8;
 
 /// Pairs of objects that are compared, at most: it is looked at for people's files, not for thousands of cells.
 const MOST_PAIRS: usize = 1 << 20;

@@ -1,17 +1,12 @@
 //! What was typed becomes what is meant: settings checked one by one and together, budgets resolved.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::thread::available_parallelism;
+use std::path::Path;
 
 use crate::cli::args::common::{
     Edge, ImageArg, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, SmoothingArg, StartArg, StopArg,
 };
-use crate::cli::outputs::files::folder_of;
-use crate::cli::terminal::console::Console;
-use crate::cli::terminal::text::bytes;
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Engine, Progress, machine_memory};
+use crate::job::resources::Resources;
 use crate::pipeline::distance::Method;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::level_set::evolve::Stop;
@@ -19,27 +14,8 @@ use crate::pipeline::level_set::motion::Motion;
 use crate::pipeline::limits::{ABOVE_ZERO, check, check_given};
 use crate::pipeline::reconstruct::ReconstructSettings;
 use crate::pipeline::segment::{ImageModel, Overlap, SegmentSettings, Start};
-use crate::store::Scratch;
-
-/// What a run may use.
-#[derive(Clone, Debug)]
-pub(crate) struct Resources {
-    pub(crate) memory: u64,
-    pub(crate) threads: usize,
-    pub(crate) scratch: PathBuf,
-}
-
-impl Resources {
-    /// An engine that keeps to them, with a window of so many bytes of scratch pages.
-    pub(crate) fn engine(&self, window: u64, cancel: &Cancel, console: &Arc<Console>) -> Result<Engine> {
-        let scratch = Scratch::new(&self.scratch, window);
-        let progress: Arc<dyn Progress> = console.clone();
-        Engine::new(self.threads, scratch, Budget { total: self.memory }, cancel.clone(), progress)
-    }
-}
 
 const L2_TOLERANCE: f64 = 1e-3;
-const MOST_THREADS: usize = 1024;
 
 /// The settings of a segmentation.
 pub(crate) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
@@ -53,7 +29,6 @@ pub(crate) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
     let settings = SegmentSettings {
         method: args.distance.method,
         image: match image.model {
-            _ if pull.rho == Some(0.0) => ImageModel::None,
             ImageArg::Auto => ImageModel::Auto,
             ImageArg::Level => ImageModel::Level,
             ImageArg::Wall => ImageModel::Wall,
@@ -61,9 +36,8 @@ pub(crate) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
             ImageArg::None => ImageModel::None,
         },
         start: match image.start {
-            // Where the start lies is what a beta tells the flood.
-            StartArg::Auto if args.motion.beta.is_none() => Start::Auto,
-            StartArg::Auto | StartArg::Flood => Start::Flood,
+            StartArg::Auto => Start::Auto,
+            StartArg::Flood => Start::Flood,
         },
         cross_validate: image.cross_validate,
         motion: motion(&args.motion, edges),
@@ -87,6 +61,7 @@ pub(crate) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
         fill_gaps: image.fill_gaps,
         brick: args.resources.brick.unwrap_or(defaults.brick),
     };
+    let settings = settings.together();
     settings.check()?;
     Ok(settings)
 }
@@ -149,28 +124,7 @@ pub(crate) fn spacing(flag: &str, given: Option<[f64; 3]>) -> Result<Option<[f64
 
 /// Memory, threads and scratch; `output` is what lies nearest to large free disks when nothing else is said.
 pub(crate) fn resources(args: &ResourceArgs, output: Option<&Path>) -> Result<Resources> {
-    let threads = args.threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
-    if !(1..=MOST_THREADS).contains(&threads) {
-        return Err(Error::usage(format!("--threads is {threads}; give 1 to {MOST_THREADS}")));
-    }
-    let there = machine_memory();
-    let memory = args.memory.unwrap_or(there / 2);
-    if memory > there {
-        return Err(Error::usage(format!(
-            "--memory is {}, but the machine or its control group has {}; give less, or leave it out",
-            bytes(memory),
-            bytes(there)
-        )));
-    }
-    let from_environment = || std::env::var_os("TMPDIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
-    let beside_output = || output.map(|path| folder_of(path).to_path_buf());
-    let scratch = args.scratch.clone().or_else(from_environment).or_else(beside_output);
-    let scratch = scratch.unwrap_or_else(std::env::temp_dir);
-    if !scratch.is_dir() {
-        let what = "the folder for temporary fields does not exist; create it, or name another with --scratch";
-        return Err(Error::usage(what).at(&scratch));
-    }
-    Ok(Resources { memory, threads, scratch })
+    Resources::new(args.memory, args.threads, args.scratch.as_deref(), output)
 }
 
 #[cfg(test)]

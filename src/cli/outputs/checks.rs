@@ -5,10 +5,10 @@ use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use super::files::folder_of;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::sources::is_standard_input;
 use crate::io::ome_zarr::is_store;
+use crate::job::resources::folder_of;
 
 /// What a run reads and writes.
 pub(crate) struct Outputs<'a> {

@@ -3,11 +3,11 @@
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-use super::files::folder_of;
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::text::bytes;
 use crate::error::{Error, Result};
 use crate::exec::Progress;
+use crate::job::resources::folder_of;
 use crate::store::free_space;
 
 /// What a run puts on disks.

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::exec::Progress;
 use crate::grid::Geometry;
 use crate::io::geometry::write::export::{FORMATS, Format};
+use crate::job::resources::folder_of;
 use crate::store::Unfinished;
 
 /// Writes a file through `write`; it gets its name, and replaces what had it, only when all is written.
@@ -57,9 +58,4 @@ pub(crate) fn mesh_format(path: &Path) -> Result<&'static Format> {
         let endings: Vec<String> = FORMATS.iter().map(|format| format!(".{}", format.extension)).collect();
         Error::usage(format!("ends like no format of meshes; give a name that ends in {}", endings.join(", "))).at(path)
     })
-}
-
-/// The folder that a path lies in.
-pub(crate) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -7,11 +7,11 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::neighbours::{Contact, Neighbours, fill_gaps};
-use crate::cli::inputs::settings::Resources;
 use crate::cli::terminal::console::Console;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, StageReport, peak_resident};
 use crate::grid::Geometry;
+use crate::job::resources::Resources;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::level_set::evolve::Stop;
 use crate::pipeline::level_set::motion::Motion;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::readout::found::DistanceFound;
 use super::readout::images::Wanted;
+use super::readout::kept::Kept;
 use super::readout::visit::ReadOut;
 use super::seeding::contiguous::contiguous_margin;
 use super::{Method, Options, Schedule, Solved, Sources, solve};
@@ -77,10 +78,25 @@ pub fn distance<P: Precision>(
     settings: &DistanceSettings,
     store: Option<&StoreWriter>,
 ) -> Result<DistanceFound> {
+    distance_kept::<P>(engine, geometry, sets, settings, store, None)
+}
+
+/// The same; `kept` gets the fields, beside the store.
+///
+/// # Errors
+/// As [`distance`].
+pub fn distance_kept<P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    settings: &DistanceSettings,
+    store: Option<&StoreWriter>,
+    kept: Option<&Kept<P>>,
+) -> Result<DistanceFound> {
     let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));
     solve_sets::<P, _>(engine, geometry, sets, trees.as_ref(), settings, |solved, _| {
         let wanted = Wanted { labels: settings.labels, borders: false, closest_point: settings.closest_point };
-        ReadOut { geometry, sets, solved: &solved, is_signed: settings.signed, wanted }.run(engine, store)
+        ReadOut { geometry, sets, solved: &solved, is_signed: settings.signed, wanted, kept }.run(engine, store)
     })
 }
 

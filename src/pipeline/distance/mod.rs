@@ -17,13 +17,14 @@ mod solving;
 use std::sync::Arc;
 
 pub use checks::{check_iterations, outside_note, without_inside};
-pub use job::{DistanceSettings, Init, distance, solve_sets};
+pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets};
 pub use needs::Needs;
 pub(crate) use needs::tree_bytes;
 pub use ranks::solve;
 pub use readout::field::{Solved, Together};
 pub use readout::found::DistanceFound;
 pub(crate) use readout::images::Wanted;
+pub use readout::kept::Kept;
 pub(crate) use readout::visit::ReadOut;
 pub use seeding::sources::Sources;
 pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};

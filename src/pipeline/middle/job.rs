@@ -15,7 +15,7 @@ use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::surface::{Measures, Pair};
-use crate::pipeline::distance::{DistanceFound, DistanceSettings, ReadOut, Wanted, solve_sets};
+use crate::pipeline::distance::{DistanceFound, DistanceSettings, Kept, ReadOut, Wanted, solve_sets};
 use crate::store::MeshSink;
 
 /// What a job found.
@@ -43,6 +43,21 @@ pub fn middle<P: Precision>(
     store: Option<&StoreWriter>,
     mesh: &mut dyn MeshSink,
 ) -> Result<MiddleFound> {
+    middle_kept::<P>(engine, geometry, sets, settings, (store, None), mesh)
+}
+
+/// The same; the fields go into the store and stay in what is kept, as far as these are there.
+///
+/// # Errors
+/// As [`middle`].
+pub fn middle_kept<P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    settings: &MiddleSettings,
+    (store, kept): (Option<&StoreWriter>, Option<&Kept<P>>),
+    mesh: &mut dyn MeshSink,
+) -> Result<MiddleFound> {
     refuse(sets, settings.surface)?;
     let distance = DistanceSettings { labels: true, ..settings.distance };
     let trees = SourceTrees::new(sets);
@@ -62,7 +77,7 @@ pub fn middle<P: Precision>(
         let (measures, pairs) = draw(&stage, &labelled, settings.surface, mesh)?;
         stage.finish();
         let wanted = Wanted { labels: true, borders: store.is_some(), closest_point: distance.closest_point };
-        let read_out = ReadOut { geometry, sets, solved: &solved, is_signed: distance.signed, wanted };
+        let read_out = ReadOut { geometry, sets, solved: &solved, is_signed: distance.signed, wanted, kept };
         let found = read_out.run(engine, store)?;
         if let Some(store) = store {
             let path = store.file("meshes/pairs.csv")?;

@@ -11,6 +11,6 @@ pub(crate) mod settings;
 mod surface;
 mod table;
 
-pub use job::{MiddleFound, middle};
+pub use job::{MiddleFound, middle, middle_kept};
 pub use settings::{LabelMode, MiddleSettings};
 pub use surface::SurfaceKind;

@@ -9,6 +9,7 @@
 pub(crate) mod begun;
 pub mod checks;
 mod estimate;
+mod kept;
 mod labels;
 mod neighbours;
 mod object;
@@ -24,11 +25,13 @@ mod tissue;
 
 pub use checks::doubts::{doubts, open_outlines, same_place, spans_slices};
 pub use checks::lengths::{Grids, check_lengths, check_marks, check_seed, check_smoothing};
+pub use checks::look::{Looked, look_at_marks};
 pub use estimate::{Estimate, estimate};
+pub use kept::{Kept, KeptObject};
 pub use labels::{Overlap, Placed};
 pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_faces, join};
 pub use object_report::Refused;
 pub use object_report::{CrossValidation, ObjectReport};
 pub use outlined::outlines::crossed;
-pub use output::{LARGEST_WHOLE, Outcome, segment};
+pub use output::{LARGEST_WHOLE, Outcome, segment, segment_kept};
 pub use settings::{Guides, ImageModel, SegmentSettings, Start};

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::begun::Solution;
+use super::kept::{Kept, labels_of, objects_of};
 use super::labels::Placed;
 use super::neighbours::{Found, Joined};
 use super::object_report::ObjectReport;
@@ -59,7 +60,23 @@ pub fn segment(
     settings: &SegmentSettings,
     store: Option<&StoreWriter>,
 ) -> Result<Outcome> {
-    stack.element().with_samples(Job { engine, stack, crop, guides, settings, store })
+    let job = Job { engine, stack, crop, guides, settings, store, keeps: false };
+    stack.element().with_samples(job).map(|(outcome, _)| outcome)
+}
+
+/// The same of a whole stack; its fields are kept beside what is written.
+///
+/// # Errors
+/// As [`segment`].
+pub fn segment_kept(
+    engine: &Engine,
+    stack: &dyn VolumeSource,
+    guides: &Guides<'_>,
+    settings: &SegmentSettings,
+    store: Option<&StoreWriter>,
+) -> Result<(Outcome, Option<Kept>)> {
+    let crop = &guides.geometry.domain();
+    stack.element().with_samples(Job { engine, stack, crop, guides, settings, store, keeps: true })
 }
 
 /// What there is to segment, and where it goes.
@@ -70,18 +87,20 @@ struct Job<'a> {
     guides: &'a Guides<'a>,
     settings: &'a SegmentSettings,
     store: Option<&'a StoreWriter>,
+    /// Fields stay in memory or scratch.
+    keeps: bool,
 }
 
 impl SampleWork for Job<'_> {
-    type Output = Result<Outcome>;
+    type Output = Result<(Outcome, Option<Kept>)>;
 
-    fn on<T: Sample>(self) -> Result<Outcome> {
+    fn on<T: Sample>(self) -> Self::Output {
         run::<T>(&self)
     }
 }
 
-fn run<T: Sample>(job: &Job<'_>) -> Result<Outcome> {
-    let Job { engine, stack, crop, guides, settings, store } = *job;
+fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
+    let Job { engine, stack, crop, guides, settings, store, keeps } = *job;
     let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();
@@ -113,13 +132,18 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<Outcome> {
         _ => write_faces(engine, guides.geometry, &joined, settings, store)?,
     };
     let neighbours = joined.found.clone();
+    let labels = keeps.then(|| labels_of(engine, guides.geometry, &joined)).transpose()?;
     drop(joined);
     if let Some(store) = store {
         write_image(engine, guides.geometry, &image, store)?;
     }
-    let objects = solved.into_iter().map(|(_, report)| report).collect();
+    let (objects, reports) = objects_of(solved);
+    let kept = labels.map(|labels| Kept { objects, labels });
     let (geometry, extremes) = (guides.geometry.clone(), image.extremes);
-    Ok(Outcome { geometry, element: T::TYPE, extremes, objects, refused, label_voxels, neighbours, contacts })
+    let objects = reports;
+    let outcome =
+        Outcome { geometry, element: T::TYPE, extremes, objects, refused, label_voxels, neighbours, contacts };
+    Ok((outcome, kept))
 }
 
 /// The objects on the image's grid.

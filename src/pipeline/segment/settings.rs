@@ -142,6 +142,20 @@ impl SegmentSettings {
         check_brick(self.brick)
     }
 
+    /// The settings as they mean one another: an image that weighs nothing is not looked at, and a beta is where the flood
+    /// starts.
+    #[must_use]
+    pub fn together(&self) -> Self {
+        let mut settings = self.clone();
+        if settings.rho == Some(0.0) {
+            settings.image = ImageModel::None;
+        }
+        if settings.beta.is_some() {
+            settings.start = Start::Flood;
+        }
+        settings
+    }
+
     fn check_percentiles(&self) -> Result<()> {
         let [low, high] = self.percentiles;
         if 0.0 <= low && low < high && high <= 100.0 {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::found::DistanceFound;
 use super::images::{Buffers, Images, Wanted};
+use super::kept::Kept;
 use super::tile::Tile;
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
@@ -20,13 +21,15 @@ use crate::pipeline::distance::Solved;
 use crate::pipeline::output::pyramid::{visits, visits_of};
 
 /// What is read out, and how.
-pub(crate) struct ReadOut<'a, 'b, P> {
+pub(crate) struct ReadOut<'a, 'b, P: Precision> {
     pub(crate) geometry: &'a Geometry,
     pub(crate) sets: &'a DataSets,
     pub(crate) solved: &'a Solved<'b, P>,
     /// Distances are negative inside meshes.
     pub(crate) is_signed: bool,
     pub(crate) wanted: Wanted,
+    /// What stays with who asked for it.
+    pub(crate) kept: Option<&'a Kept<P>>,
 }
 
 /// What one thread reads into.
@@ -74,6 +77,9 @@ impl<P: Precision> ReadOut<'_, '_, P> {
         let measured = stage.run(&visits, &workers, |(voxels, buffers), visit| {
             visit.iter().try_fold(Measured::default(), |before, part| {
                 let measured = self.look(part, inside.as_ref(), voxels)?;
+                if let Some(kept) = self.kept {
+                    kept.put(&voxels.tile(part, &closest))?;
+                }
                 if let Some(images) = &images {
                     images.put(&voxels.tile(part, &closest), buffers)?;
                 }

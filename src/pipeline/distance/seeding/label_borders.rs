@@ -7,16 +7,45 @@ use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
 use crate::exec::Cancel;
-use crate::grid::{Box3, refuse_too_many};
+use crate::grid::{Box3, Geometry, refuse_too_many};
 use crate::io::stack::label_volume::LabelVolume;
 use crate::kernel::image::labels::{border, labelled};
+
+/// A volume of labels, read by the boxes in which it is stored.
+pub trait Labels {
+    /// Where its voxels lie.
+    fn geometry(&self) -> &Geometry;
+
+    /// The boxes in which it is stored, x fastest, laid on a regular grid.
+    fn natural_boxes(&self) -> Box<dyn Iterator<Item = Box3> + '_>;
+
+    /// Reads the labels of a box into `out`, dense `[z][y][x]`; 0 is what has none.
+    ///
+    /// # Errors
+    /// When it cannot be read, or holds what is no label.
+    fn read_box(&self, part: &Box3, out: &mut Vec<u32>) -> Result<()>;
+}
+
+impl Labels for LabelVolume {
+    fn geometry(&self) -> &Geometry {
+        self.geometry()
+    }
+
+    fn natural_boxes(&self) -> Box<dyn Iterator<Item = Box3> + '_> {
+        Box::new(self.natural_boxes())
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut Vec<u32>) -> Result<()> {
+        self.read_box(part, out)
+    }
+}
 
 /// World positions of the border voxels of each label but 0, in the order of the voxels, z slowest.
 ///
 /// # Errors
 /// When a box cannot be read, a voxel holds no label, there are more border voxels than can be numbered, or the run is
 /// interrupted.
-pub fn label_borders(volume: &LabelVolume, cancel: &Cancel) -> Result<BTreeMap<u32, Vec<[f64; 3]>>> {
+pub fn label_borders(volume: &dyn Labels, cancel: &Cancel) -> Result<BTreeMap<u32, Vec<[f64; 3]>>> {
     let geometry = volume.geometry();
     let [width, height, _] = geometry.shape;
     let domain = geometry.domain();

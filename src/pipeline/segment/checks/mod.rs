@@ -2,3 +2,4 @@
 
 pub(crate) mod doubts;
 pub(crate) mod lengths;
+pub(crate) mod look;

@@ -1,0 +1,199 @@
+//! `DistanceField`: the distance to points, triangle meshes and the borders of labels, on a grid of any size.
+
+use super::field::{Field, check_part};
+use super::run::{finish_store, run_setters};
+use super::task::{Ready, Task, task_setters};
+use super::words::in_builders_words;
+use crate::error::{Error, Result};
+use crate::grid::{Box3, DataSets, Geometry};
+use crate::kernel::distance::features::source_labels;
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::distance::state::source::NO_SOURCE;
+use crate::kernel::geometry::triangle::Triangle;
+use crate::pipeline::distance::{DistanceFound, Kept, distance_kept};
+use crate::store::{BoxSource, BrickArray};
+
+/// The distance to points, triangle meshes and the borders of labels.
+///
+/// ```
+/// use strandline::DistanceField;
+///
+/// # fn main() -> strandline::Result<()> {
+/// let cloud = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]];
+/// let found = DistanceField::new().points(&cloud).spacing([0.25; 3]).labels().solve()?;
+/// let voxel = found.geometry().to_voxels([1.0, 0.5, 0.0]).map(|v| v.round() as i64);
+/// assert!((found.distance().at(voxel)? - 1.25_f32.sqrt()).abs() < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Default)]
+#[must_use]
+pub struct DistanceField<'a> {
+    task: Task<'a>,
+}
+
+impl<'a> DistanceField<'a> {
+    /// A distance to nothing yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    task_setters!();
+
+    /// As far as that, a length; voxels farther away hold this distance.
+    pub fn max_distance(mut self, farthest: f64) -> Self {
+        self.task.settings.farthest = Some(farthest);
+        self
+    }
+
+    /// Negative inside of the meshes, which then are the only sources.
+    pub fn signed(mut self) -> Self {
+        self.task.settings.signed = true;
+        self
+    }
+
+    /// Also tells the label of the nearest data set of each voxel.
+    pub fn labels(mut self) -> Self {
+        self.task.settings.labels = true;
+        self
+    }
+
+    run_setters!(task.run);
+
+    /// Computes the distance, in single precision.
+    ///
+    /// # Errors
+    /// When sources, grid or settings make no sense, what is needed does not fit the memory, the store cannot be written, or
+    /// the run is cancelled.
+    pub fn solve(self) -> Result<SolvedDistance<f32>> {
+        self.solve_as()
+    }
+
+    /// Computes the distance, stored as `P`: `f32`, `f64` or `half::f16`.
+    ///
+    /// # Errors
+    /// As [`DistanceField::solve`].
+    pub fn solve_as<P: Precision>(self) -> Result<SolvedDistance<P>> {
+        in_builders_words(self.solved())
+    }
+
+    fn solved<P: Precision>(&self) -> Result<SolvedDistance<P>> {
+        let ready = self.task.ready::<P>()?;
+        let Ready { sets, geometry, settings, .. } = &ready;
+        let needs = settings.needs::<P>(geometry, sets, ready.resources.threads, 1);
+        let engine = ready.engine::<P>(&self.task.run, &needs, false)?;
+        let store = self.task.run.begin_store()?;
+        let kept = Kept::new(&engine, geometry, settings.keeps_sources())?;
+        let found = distance_kept(&engine, geometry, sets, settings, store.as_ref(), Some(&kept))?;
+        finish_store(&engine, store)?;
+        Ok(SolvedDistance::new(ready, found, kept))
+    }
+}
+
+/// A distance that was computed.
+pub struct SolvedDistance<P: Precision> {
+    geometry: Geometry,
+    sets: DataSets,
+    asked: Asked,
+    found: DistanceFound,
+    notes: Vec<String>,
+    kept: Kept<P>,
+}
+
+/// What was asked for beside the distance.
+struct Asked {
+    labels: bool,
+    closest_point: bool,
+}
+
+impl<P: Precision> SolvedDistance<P> {
+    pub(super) fn new(ready: Ready, found: DistanceFound, kept: Kept<P>) -> Self {
+        let Ready { sets, geometry, settings, notes, .. } = ready;
+        let asked = Asked { labels: settings.labels, closest_point: settings.closest_point };
+        Self { geometry, sets, asked, found, notes, kept }
+    }
+
+    /// The grid.
+    #[must_use]
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// The largest distance, voxels of each label, and what else was counted.
+    #[must_use]
+    pub fn found(&self) -> &DistanceFound {
+        &self.found
+    }
+
+    /// What should be known of the sources, one sentence each.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// The distances, lengths.
+    #[must_use]
+    pub fn distance(&self) -> Field<'_, P> {
+        Field::new(&self.geometry, &self.kept.values)
+    }
+
+    /// The label of the nearest data set of each voxel; 0 where none was reached.
+    ///
+    /// # Errors
+    /// When labels were not asked for.
+    pub fn labels(&self) -> Result<Field<'_, u32>> {
+        let sources = self.sources(self.asked.labels, "labels")?;
+        Ok(Field::new(&self.geometry, LabelsOf { sets: &self.sets, sources }))
+    }
+
+    /// The world positions at which the nearest sources of a box of voxels are closest, dense `[z][y][x]`; NaN where none was
+    /// reached.
+    ///
+    /// # Errors
+    /// When closest points were not asked for, the box reaches out of the grid, or what is stored cannot be read.
+    pub fn closest_points(&self, part: &Box3) -> Result<Vec<[f64; 3]>> {
+        let sources = self.sources(self.asked.closest_point, "closest_point")?;
+        check_part(part, &self.geometry)?;
+        let mut nearest = vec![NO_SOURCE; part.len()];
+        sources.read_box(part, &mut nearest)?;
+        let voxels = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
+        Ok(voxels.zip(nearest).map(|(voxel, source)| self.closest_point(voxel, source)).collect())
+    }
+
+    fn closest_point(&self, voxel: [i64; 3], source: u32) -> [f64; 3] {
+        let (source, points) = (source as usize, &self.sets.positions);
+        match points.get(source) {
+            Some(point) => *point,
+            None if source < self.sets.len() => {
+                let triangle = Triangle::new(self.sets.mesh.corners(source - points.len()));
+                triangle.closest_point(self.geometry.position(voxel))
+            }
+            None => [f64::NAN; 3],
+        }
+    }
+
+    fn sources(&self, were_asked: bool, what: &str) -> Result<&BrickArray<u32>> {
+        let sources = self.kept.sources.as_ref().filter(|_| were_asked);
+        sources.ok_or_else(|| Error::usage(format!("`{what}` was not asked for before the distance was computed")))
+    }
+}
+
+/// The labels of voxels by their sources.
+struct LabelsOf<'a> {
+    sets: &'a DataSets,
+    sources: &'a BrickArray<u32>,
+}
+
+impl BoxSource<u32> for LabelsOf<'_> {
+    fn shape(&self) -> [i64; 3] {
+        self.sources.shape()
+    }
+
+    fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
+        self.sources.read_box(part, out)?;
+        let mut labels = Vec::new();
+        source_labels::of_sources(self.sets, out, &mut labels);
+        out.copy_from_slice(&labels);
+        Ok(())
+    }
+}

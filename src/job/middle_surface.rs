@@ -1,0 +1,119 @@
+//! `MiddleSurface`: the surfaces equally far from data sets.
+
+use super::distance_field::SolvedDistance;
+use super::mesh::{Drawing, LabelledMesh};
+use super::run::{finish_store, mesh_file, run_setters};
+use super::task::{Ready, Task, task_setters};
+use super::words::in_builders_words;
+use crate::error::Result;
+use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::surface::{Measures, Pair};
+use crate::pipeline::distance::Kept;
+use crate::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle_kept};
+use crate::store::MeshSink;
+
+/// The surfaces equally far from two data sets or more.
+///
+/// ```
+/// use strandline::MiddleSurface;
+///
+/// # fn main() -> strandline::Result<()> {
+/// let (left, right) = ([[0.0, 0.0, 0.0]], [[2.0, 0.0, 0.0]]);
+/// let found = MiddleSurface::new().points(&left).points(&right).spacing([0.1; 3]).solve()?;
+/// assert!(found.mesh.mesh.vertices.iter().all(|v| (v[0] - 1.0).abs() < 1e-6));
+/// assert_eq!(found.pairs[0].labels, [1, 2]);
+/// # Ok(())
+/// # }
+/// ```
+#[must_use]
+pub struct MiddleSurface<'a> {
+    task: Task<'a>,
+    surface: SurfaceKind,
+    mode: LabelMode,
+}
+
+impl Default for MiddleSurface<'_> {
+    fn default() -> Self {
+        Self { task: Task::default(), surface: SurfaceKind::Exact, mode: LabelMode::Tracked }
+    }
+}
+
+impl<'a> MiddleSurface<'a> {
+    /// A surface between nothing yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    task_setters!();
+
+    /// Which surface is drawn; that between the voxels where this is left out.
+    pub fn surface(mut self, surface: SurfaceKind) -> Self {
+        self.surface = surface;
+        self
+    }
+
+    /// How labels are told; by the sources that the method tracks where this is left out.
+    pub fn labels(mut self, mode: LabelMode) -> Self {
+        self.mode = mode;
+        self
+    }
+
+    run_setters!(task.run);
+
+    /// Computes the surfaces and keeps them in memory, with distances in single precision.
+    ///
+    /// # Errors
+    /// When there are fewer than two data sets, sources, grid or settings make no sense, what is needed does not fit the
+    /// memory, the store cannot be written, or the run is cancelled.
+    pub fn solve(self) -> Result<SolvedMiddle<f32>> {
+        self.solve_as()
+    }
+
+    /// Computes the surfaces and keeps them in memory, with distances stored as `P`: `f32`, `f64` or `half::f16`.
+    ///
+    /// # Errors
+    /// As [`MiddleSurface::solve`].
+    pub fn solve_as<P: Precision>(self) -> Result<SolvedMiddle<P>> {
+        let mut mesh = LabelledMesh::default();
+        let solved = in_builders_words(self.solved(&mut mesh))?;
+        Ok(SolvedMiddle { mesh, ..solved })
+    }
+
+    /// Computes the surfaces and hands them to `mesh` as they are drawn; the mesh of the result is empty.
+    ///
+    /// # Errors
+    /// As [`MiddleSurface::solve`], or when the mesh is not taken.
+    pub fn solve_into(self, mesh: &mut dyn MeshSink) -> Result<SolvedMiddle<f32>> {
+        in_builders_words(self.solved(mesh))
+    }
+
+    fn solved<P: Precision>(&self, mesh: &mut dyn MeshSink) -> Result<SolvedMiddle<P>> {
+        let mut ready = self.task.ready::<P>()?;
+        ready.settings.labels = true;
+        let settings = MiddleSettings { distance: ready.settings, surface: self.surface, labels: self.mode };
+        let Ready { sets, geometry, .. } = &ready;
+        let needs = settings.needs::<P>(geometry, sets, ready.resources.threads, 1);
+        let engine = ready.engine::<P>(&self.task.run, &needs, true)?;
+        let store = self.task.run.begin_store()?;
+        let mut drawing = Drawing::new(mesh, mesh_file(store.as_ref())?.as_deref(), geometry, true)?;
+        let kept = Kept::new(&engine, geometry, true)?;
+        let found = middle_kept(&engine, geometry, sets, &settings, (store.as_ref(), Some(&kept)), &mut drawing)?;
+        drawing.finish()?;
+        finish_store(&engine, store)?;
+        let MiddleFound { distance, measures, pairs } = found;
+        let distance = SolvedDistance::new(ready, distance, kept);
+        Ok(SolvedMiddle { distance, mesh: LabelledMesh::default(), measures, pairs })
+    }
+}
+
+/// Middle surfaces that were computed.
+pub struct SolvedMiddle<P: Precision> {
+    /// The distance to all data sets, with labels.
+    pub distance: SolvedDistance<P>,
+    /// All surfaces.
+    pub mesh: LabelledMesh,
+    /// The measures of all surfaces as one mesh.
+    pub measures: Measures,
+    /// What lies between each two labels that meet.
+    pub pairs: Vec<Pair>,
+}

@@ -1,0 +1,68 @@
+//! What a run may use: memory, threads, a folder for temporary fields.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::available_parallelism;
+
+use crate::error::{Error, Result};
+use crate::exec::{Budget, Cancel, Engine, Progress, machine_memory};
+use crate::grid::digits::bytes;
+use crate::store::Scratch;
+
+const MOST_THREADS: usize = 1024;
+
+/// What a run may use.
+#[derive(Clone, Debug)]
+pub(crate) struct Resources {
+    /// Bytes that the process may have resident.
+    pub(crate) memory: u64,
+    /// Threads that compute.
+    pub(crate) threads: usize,
+    /// The folder of temporary fields.
+    pub(crate) scratch: PathBuf,
+}
+
+impl Resources {
+    /// What was asked for; half of the machine's memory and all of its cores where nothing was. `output` is what lies nearest
+    /// to large free disks when no folder is named, neither here nor as TMPDIR.
+    pub(crate) fn new(
+        memory: Option<u64>,
+        threads: Option<usize>,
+        scratch: Option<&Path>,
+        output: Option<&Path>,
+    ) -> Result<Self> {
+        let threads = threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
+        if !(1..=MOST_THREADS).contains(&threads) {
+            return Err(Error::usage(format!("--threads is {threads}; give 1 to {MOST_THREADS}")));
+        }
+        let there = machine_memory();
+        let memory = memory.unwrap_or(there / 2);
+        if memory > there {
+            return Err(Error::usage(format!(
+                "--memory is {}, but the machine or its control group has {}; give less, or leave it out",
+                bytes(memory),
+                bytes(there)
+            )));
+        }
+        let from_environment = || std::env::var_os("TMPDIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
+        let beside_output = || output.map(|path| folder_of(path).to_path_buf());
+        let scratch = scratch.map(Path::to_path_buf).or_else(from_environment).or_else(beside_output);
+        let scratch = scratch.unwrap_or_else(std::env::temp_dir);
+        if !scratch.is_dir() {
+            let what = "the folder for temporary fields does not exist; create it, or name another with --scratch";
+            return Err(Error::usage(what).at(&scratch));
+        }
+        Ok(Self { memory, threads, scratch })
+    }
+
+    /// An engine that keeps to them, with a window of so many bytes of scratch pages.
+    pub(crate) fn engine(&self, window: u64, cancel: &Cancel, progress: Arc<dyn Progress>) -> Result<Engine> {
+        let scratch = Scratch::new(&self.scratch, window);
+        Engine::new(self.threads, scratch, Budget { total: self.memory }, cancel.clone(), progress)
+    }
+}
+
+/// The folder that a path lies in.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}

@@ -1,0 +1,58 @@
+//! What a segmentation leaves with who asked for it: the segmentation function of each object, and the label volume.
+
+use std::sync::Arc;
+
+use super::begun::Solution;
+use super::neighbours::Joined;
+use super::object_report::ObjectReport;
+use crate::error::Result;
+use crate::exec::{Engine, Workers};
+use crate::grid::{BrickGrid, BrickSet, Geometry, Slot};
+use crate::store::{BoxSink, BoxSource, BrickArray};
+
+/// Edge of the bricks of the label volume.
+const EDGE: i64 = 64;
+
+/// What is kept.
+pub struct Kept {
+    /// The objects, in order of their labels.
+    pub objects: Vec<KeptObject>,
+    /// The labels on the grid of the image; bricks without any are not stored.
+    pub labels: BrickArray<u32>,
+}
+
+/// An object that was solved.
+pub struct KeptObject {
+    /// Its label.
+    pub label: u32,
+    /// The grid of its box.
+    pub geometry: Geometry,
+    /// Its segmentation function there: 1 inside, 0 outside, the surface at 1/2.
+    pub u: BrickArray<f32>,
+}
+
+/// The label volume in bricks of its own.
+pub(super) fn labels_of(engine: &Engine, geometry: &Geometry, joined: &Joined<'_>) -> Result<BrickArray<u32>> {
+    let grid = BrickGrid::new(geometry.shape, EDGE);
+    let is_empty = |id| BoxSource::<u32>::constant_in(joined, &grid.brick_box(id)) == Some(0);
+    let set = Arc::new(BrickSet::from_fn(grid, |id| !is_empty(id)));
+    let kept = BrickArray::new(engine.scratch(), &set)?;
+    let stage = engine.stage("labels", set.len() as u64);
+    let slots: Vec<Slot> = set.owned().collect();
+    stage.run(&slots, &Workers::new(Vec::new), |labels: &mut Vec<u32>, &slot| {
+        let part = grid.brick_box(set.id(slot));
+        labels.resize(part.len(), 0);
+        joined.read_box(&part, labels)?;
+        kept.write_box(&part, labels)
+    })?;
+    stage.finish();
+    Ok(kept)
+}
+
+/// The objects without what they were solved with.
+pub(super) fn objects_of(solved: Vec<(Solution, ObjectReport)>) -> (Vec<KeptObject>, Vec<ObjectReport>) {
+    let kept = |(Solution { geometry, u, .. }, report): (Solution, ObjectReport)| {
+        (KeptObject { label: report.label, geometry, u }, report)
+    };
+    solved.into_iter().map(kept).unzip()
+}
