@@ -38,6 +38,8 @@ mod triangle_distance;
 mod watershed;
 mod wavefront;
 
+mod builders;
+mod builders_refused;
 mod citations;
 mod cli;
 mod clouds_cli;
