@@ -1,4 +1,5 @@
 //! The surfaces between three clouds, and a mesh that is counted as it is drawn instead of being kept.
+#![allow(clippy::disallowed_methods, reason = "no bits are compared here")]
 
 use strandline::{MeshSink, MiddleSurface, Result};
 

@@ -1,4 +1,5 @@
 //! A closed surface from points on a torus, without normals.
+#![allow(clippy::disallowed_methods, reason = "no bits are compared here")]
 
 use std::f64::consts::{PI, TAU};
 

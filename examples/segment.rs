@@ -1,4 +1,5 @@
 //! Two balls in an image with noise, each marked by three outlines; the label volume and a mesh of each.
+#![allow(clippy::disallowed_methods, reason = "no bits are compared here")]
 
 use std::f64::consts::TAU;
 

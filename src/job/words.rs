@@ -21,7 +21,7 @@ pub(super) fn of_builders(sentence: &str) -> String {
             rest = flag;
             continue;
         }
-        told.push_str(&format!("`{}`", name.replace('-', "_")));
+        told.extend(["`", &name.replace('-', "_"), "`"]);
         rest = &flag[name.len()..];
     }
     told + rest
