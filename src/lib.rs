@@ -131,6 +131,7 @@ pub mod tile;
 pub use error::{Error, ErrorKind, Result};
 pub use exec::{Cancel, Progress, Silent};
 pub use grid::{Box3, Geometry, TriangleMesh};
+pub use io::ome_zarr::Compression;
 pub use job::{
     DistanceField, Field, LabelledMesh, MiddleSurface, Reconstruction, Segmentation, SolvedDistance, SolvedMiddle,
     SolvedReconstruction, SolvedSegmentation, Volume,

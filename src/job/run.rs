@@ -8,7 +8,7 @@ use super::words::of_builders;
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress, Silent};
 use crate::grid::digits::bytes;
-use crate::io::ome_zarr::StoreWriter;
+use crate::io::ome_zarr::{Compression, StoreWriter};
 
 /// What was said of a run.
 #[derive(Clone)]
@@ -20,6 +20,7 @@ pub(super) struct Run {
     pub(super) progress: Arc<dyn Progress>,
     pub(super) store: Option<PathBuf>,
     pub(super) overwrite: bool,
+    pub(super) compression: Compression,
 }
 
 impl Default for Run {
@@ -32,6 +33,7 @@ impl Default for Run {
             progress: Arc::new(Silent),
             store: None,
             overwrite: false,
+            compression: Compression::default(),
         }
     }
 }
@@ -58,7 +60,8 @@ impl Run {
 
     /// Begins the store, where one was asked for.
     pub(super) fn begin_store(&self) -> Result<Option<StoreWriter>> {
-        self.store.as_deref().map(|path| StoreWriter::create(path, self.overwrite)).transpose()
+        let begin = |path| Ok(StoreWriter::create(path, self.overwrite)?.packed(self.compression));
+        self.store.as_deref().map(begin).transpose()
     }
 
     /// Hears what should be known, and tells it in the words of builders.
@@ -128,6 +131,12 @@ macro_rules! run_setters {
         /// Replaces a store that is there already, when the new one is complete.
         pub fn overwrite(mut self) -> Self {
             self.$($run).+.overwrite = true;
+            self
+        }
+
+        /// What is saved in packing the store: time where this is left out.
+        pub fn compress(mut self, compression: $crate::io::ome_zarr::Compression) -> Self {
+            self.$($run).+.compression = compression;
             self
         }
     };

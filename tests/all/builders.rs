@@ -18,7 +18,8 @@ use crate::common::meshes::{Form, cuboid};
 use crate::common::stores::{contents, same, volume};
 
 fn lines(cloud: &[[f64; 3]]) -> String {
-    cloud.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect()
+    let lines: Vec<String> = cloud.iter().map(|[x, y, z]| format!("{x} {y} {z}")).collect();
+    lines.join("\n")
 }
 
 fn mesh_of(path: &Path) -> TriangleMesh {

@@ -79,8 +79,10 @@ impl Packing {
         let size = element.size();
         let compressor = if name == "lz4" { BloscCompressor::LZ4 } else { BloscCompressor::Zstd };
         let clevel = BloscCompressionLevel::try_from(level).map_err(|_| Error::failed("blosc has no such level"))?;
-        let codec = BloscCodec::new(compressor, clevel, None, BloscShuffleMode::Shuffle, Some(size))
-            .map_err(|error| Error::failed(format!("the blosc compressor is not available: {error}")).caused_by(error))?;
+        let codec =
+            BloscCodec::new(compressor, clevel, None, BloscShuffleMode::Shuffle, Some(size)).map_err(|error| {
+                Error::failed(format!("the blosc compressor is not available: {error}")).caused_by(error)
+            })?;
         let description = json!({
             "name": "blosc",
             "configuration": { "cname": name, "clevel": level, "shuffle": "shuffle", "typesize": size, "blocksize": 0 }

@@ -47,7 +47,7 @@ impl Cube {
 /// Fixes the voxels of `part` that the given points fix, each with its index and the cube around it.
 ///
 /// `squared` holds squared distances (start: infinity), `source` the index of the fixing point (start:
-/// [`NO_SOURCE`]); both dense `[z][y][x]` with room for `edge`^3 voxels from `part.lo` on. Positions are physical.
+/// `NO_SOURCE`); both dense `[z][y][x]` with room for `edge`^3 voxels from `part.lo` on. Positions are physical.
 pub fn fix_voxels(
     geometry: &Geometry,
     part: &Box3,

@@ -41,7 +41,7 @@ fn halve(triangle: &VoxelTriangle, cells: &Box3, visit: &mut impl FnMut([i64; 3]
 /// Fixes the voxels of `part` beside the given triangles, each with its index and its corners as world positions.
 ///
 /// `squared` holds squared distances (start: infinity), `source` the index of the fixing triangle (start:
-/// [`NO_SOURCE`](crate::grid::NO_SOURCE)), points that were there before among them, each with a `label`; both
+/// `NO_SOURCE`), points that were there before among them, each with a `label`; both
 /// dense `[z][y][x]` with room for `edge`^3 voxels from `part.lo` on. Returns how many distances it computed: for each voxel one to each triangle that cuts a cell beside it, so that
 /// the sum over parts of a grid is that of the grid. Scratch: 4 bytes a voxel.
 pub fn fix_voxels(
