@@ -7,11 +7,11 @@ use crate::store::{BoxSource, Element};
 /// A field of a result. It may be larger than memory: it is read by boxes.
 pub struct Field<'a, T: Element> {
     geometry: &'a Geometry,
-    source: Box<dyn BoxSource<T> + 'a>,
+    source: Box<dyn BoxSource<T> + Send + 'a>,
 }
 
 impl<'a, T: Element> Field<'a, T> {
-    pub(super) fn new(geometry: &'a Geometry, source: impl BoxSource<T> + 'a) -> Self {
+    pub(super) fn new(geometry: &'a Geometry, source: impl BoxSource<T> + Send + 'a) -> Self {
         Self { geometry, source: Box::new(source) }
     }
 

@@ -19,7 +19,7 @@ pub(super) enum Given<'a> {
     /// A mesh of the next label.
     Mesh(Cow<'a, TriangleMesh>),
     /// A volume of labels, on a grid.
-    Volume(Box<dyn BoxSource<u32> + 'a>, Geometry),
+    Volume(Box<dyn BoxSource<u32> + Send + 'a>, Geometry),
 }
 
 /// What was gathered.

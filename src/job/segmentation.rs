@@ -45,7 +45,7 @@ use crate::store::{BoxSource, MeshSink, Sample, VolumeSource};
 /// ```
 #[must_use]
 pub struct Segmentation<'a> {
-    image: Box<dyn VolumeSource + 'a>,
+    image: Box<dyn VolumeSource + Send + 'a>,
     geometry: Geometry,
     marks: Vec<Mark<'a>>,
     settings: SegmentSettings,
@@ -66,7 +66,7 @@ enum MarkShape<'a> {
 
 impl<'a> Segmentation<'a> {
     /// Objects of an image that lies on a grid of its shape; its voxels are `u8`, `u16`, `u32`, `f32` or `f64`.
-    pub fn of<T: Sample>(image: impl BoxSource<T> + 'a, grid: Geometry) -> Self {
+    pub fn of<T: Sample>(image: impl BoxSource<T> + Send + 'a, grid: Geometry) -> Self {
         Self {
             image: Box::new(Image::<_, T>::new(image)),
             geometry: grid,

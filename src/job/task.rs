@@ -137,7 +137,7 @@ macro_rules! task_setters {
         /// label n more than the last before it; 0 is what has none. The volume lies on a grid of its shape.
         pub fn label_volume(
             mut self,
-            volume: impl $crate::store::BoxSource<u32> + 'a,
+            volume: impl $crate::store::BoxSource<u32> + Send + 'a,
             grid: $crate::grid::Geometry,
         ) -> Self {
             self.task.given.push($crate::job::given::Given::Volume(Box::new(volume), grid));

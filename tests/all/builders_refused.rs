@@ -6,7 +6,8 @@ use std::error::Error as _;
 
 use strandline::{
     Cancel, DistanceField, Error, ErrorKind, FillGaps, Geometry, Method, MiddleSurface, Neighbours, Reconstruction,
-    Schedule, Segmentation, Stop, SurfaceKind, TriangleMesh, Volume,
+    Schedule, Segmentation, SolvedDistance, SolvedMiddle, SolvedReconstruction, SolvedSegmentation, Stop, SurfaceKind,
+    TriangleMesh, Volume,
 };
 
 use crate::common::clouds::sphere;
@@ -166,6 +167,21 @@ fn segmentations_that_make_no_sense() {
     ] {
         refused(job.solve(), what);
     }
+}
+
+/// Jobs and results go from one thread to another.
+#[test]
+fn jobs_and_results_are_sent() {
+    fn is_sent<T: Send + Sync>() {}
+    is_sent::<DistanceField<'_>>();
+    is_sent::<MiddleSurface<'_>>();
+    is_sent::<Reconstruction<'_>>();
+    is_sent::<Segmentation<'_>>();
+    is_sent::<SolvedDistance<f32>>();
+    is_sent::<SolvedMiddle<f64>>();
+    is_sent::<SolvedReconstruction>();
+    is_sent::<SolvedSegmentation>();
+    is_sent::<Error>();
 }
 
 /// A run that is cancelled ends with an error of its own kind, and writes no store.

@@ -67,13 +67,13 @@ impl fmt::Debug for Reconstruction {
 impl Reconstruction {
     /// The segmentation function on the grid: 1 inside, 0 outside, the surface at 1/2.
     #[must_use]
-    pub fn level_set(&self) -> impl BoxSource<f32> {
+    pub fn level_set(&self) -> impl BoxSource<f32> + Send {
         self.field(&self.band.u, 0.0)
     }
 
     /// The distance to the cloud on the grid, physical units, as far as the level set had to know it.
     #[must_use]
-    pub fn distance(&self) -> impl BoxSource<f32> {
+    pub fn distance(&self) -> impl BoxSource<f32> + Send {
         self.field(&self.band.distance, self.band.distance.absent(0))
     }
 
