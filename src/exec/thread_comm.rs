@@ -1,8 +1,7 @@
 //! `ThreadComm`: ranks that are threads of one process. Between each two of them runs a channel in either direction;
 //! messages are bytes and no memory is shared, so a run on threads exchanges what a run on many machines would.
 
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Mutex, PoisonError};
+use crossbeam_channel::{Receiver, Sender, unbounded};
 
 use super::comm::Comm;
 use crate::error::{Error, Result};
@@ -11,8 +10,7 @@ use crate::error::{Error, Result};
 pub struct ThreadComm {
     rank: usize,
     to: Vec<Sender<Vec<u8>>>,
-    /// In a lock because a receiver may be moved to another thread, but not be seen by two.
-    from: Vec<Mutex<Receiver<Vec<u8>>>>,
+    from: Vec<Receiver<Vec<u8>>>,
 }
 
 impl ThreadComm {
@@ -22,9 +20,9 @@ impl ThreadComm {
         let mut all: Vec<Self> = (0..ranks).map(|rank| Self { rank, to: Vec::new(), from: Vec::new() }).collect();
         for sender in 0..ranks {
             for receiver in 0..ranks {
-                let (to, from) = channel();
+                let (to, from) = unbounded();
                 all[sender].to.push(to);
-                all[receiver].from.push(Mutex::new(from));
+                all[receiver].from.push(from);
             }
         }
         all
@@ -47,8 +45,7 @@ impl Comm for ThreadComm {
     }
 
     fn collect(&self, with: &[usize]) -> Result<Vec<Vec<u8>>> {
-        let receive = |rank: usize| self.from[rank].lock().unwrap_or_else(PoisonError::into_inner).recv();
-        with.iter().map(|&rank| receive(rank).map_err(|_| gone(rank))).collect()
+        with.iter().map(|&rank| self.from[rank].recv().map_err(|_| gone(rank))).collect()
     }
 }
 
