@@ -208,10 +208,7 @@ pub fn evolve(
         std::mem::swap(&mut band.u, &mut next);
         done.steps += 1;
         cell_iterations += visits * LOCAL_ITERATIONS as u64;
-        let (residual, limit, name) = match settings.stop {
-            Stop::Surface(limit) => (step.speed, limit, "surface"),
-            Stop::L2(limit) => (step.l2, limit, "l2"),
-        };
+        let (residual, limit, name) = step.judged_by(settings.stop);
         done.residual = residual;
         if residual < limit {
             done.stopped_by = name;
@@ -219,9 +216,8 @@ pub fn evolve(
         }
     }
     // Cells are relaxed as often as they need: reported is the mean over all of them.
-    let sums = [cell_iterations as f64, owned.len() as f64].map(|count| engine.comm().sum(&[count]));
-    let [iterations, cells] = sums;
-    done.sor_iterations = (iterations? / cells?.max(1.0)).ceil() as u64;
+    let all = |count: f64| engine.comm().sum(&[count]);
+    done.sor_iterations = (all(cell_iterations as f64)? / all(owned.len() as f64)?.max(1.0)).ceil() as u64;
     stage.iterated(done.sor_iterations, done.residual);
     Ok(done)
 }
@@ -266,6 +262,16 @@ struct Step {
     speed: f64,
     /// Discrete L2 norm of the change.
     l2: f64,
+}
+
+impl Step {
+    /// What a rule looks at, its limit and its name.
+    fn judged_by(self, stop: Stop) -> (f64, f64, &'static str) {
+        match stop {
+            Stop::Surface(limit) => (self.speed, limit, "surface"),
+            Stop::L2(limit) => (self.l2, limit, "l2"),
+        }
+    }
 }
 
 impl Solver<'_> {

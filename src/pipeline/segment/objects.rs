@@ -163,20 +163,7 @@ fn draw(
         return Err(error);
     }
     if let Some(store) = store {
-        let farthest = f64::from(solution.distance.absent(0));
-        for (name, field, high) in [("levelset", u, 1.0), ("distance", &solution.distance, farthest)] {
-            let group = if several { format!("{name}/object-{label}") } else { name.into() };
-            let spec = ImageSpec {
-                name,
-                geometry,
-                element: ElementType::F32,
-                content: Content::Field,
-                window: Some([0.0, high]),
-            };
-            let stage = engine.stage(&format!("write {name} {label}"), 0);
-            write_levels::<f32>(&stage, engine, store.image(&group, &spec)?, field, Reduce::Mean)?;
-            stage.finish();
-        }
+        write_fields(engine, solution, label, store, several)?;
     }
     Ok(ObjectReport {
         label,
@@ -193,6 +180,20 @@ fn draw(
         rho: solution.rho,
         cross_validation: None,
     })
+}
+
+/// Writes level set and distance of an object, in groups of its own where there are several.
+fn write_fields(engine: &Engine, solution: &Solution, label: u32, store: &StoreWriter, several: bool) -> Result<()> {
+    let (geometry, element, content) = (&solution.geometry, ElementType::F32, Content::Field);
+    let farthest = f64::from(solution.distance.absent(0));
+    for (name, field, high) in [("levelset", &solution.u, 1.0), ("distance", &solution.distance, farthest)] {
+        let group = if several { format!("{name}/object-{label}") } else { name.into() };
+        let spec = ImageSpec { name, geometry, element, content, window: Some([0.0, high]) };
+        let stage = engine.stage(&format!("write {name} {label}"), 0);
+        write_levels::<f32>(&stage, engine, store.image(&group, &spec)?, field, Reduce::Mean)?;
+        stage.finish();
+    }
+    Ok(())
 }
 
 /// Marks lie so many largest spacings from their surface in the mean, at most.
