@@ -1,6 +1,7 @@
 //! Meshes and points from files: one mesh in every format gives the same triangles, and nothing broken passes.
 
 use std::fs;
+use std::path::Path;
 
 use strandline::error::{ErrorKind, Result};
 use strandline::grid::TriangleMesh;
@@ -10,7 +11,7 @@ use strandline::io::geometry::read::sources::{FORMATS, read_source};
 use crate::common::damage::damaged;
 use crate::common::meshes::{self, Form};
 use crate::common::random::Random;
-use crate::common::shared_data;
+use crate::common::{shared_data, shipped};
 
 fn read_bytes(bytes: &[u8]) -> Result<Source> {
     let folder = tempfile::tempdir().expect("a scratch folder");
@@ -343,21 +344,37 @@ fn damaged_bytes_never_panic() {
 
 #[test]
 fn real_files_have_their_triangles() {
-    let Some(data) = shared_data("meshes") else { return };
-    for (name, vertices, triangles, is_closed) in [
-        ("pilot-whale-cranium.ply", 50_000, 100_000, true),
-        ("demosthenes-low-res.obj", 8394, 16_719, false),
-        ("gastruloid.ply", 3324, 6643, false),
-        ("teddy-cgal-bear.off", 13_826, 27_648, true),
-    ] {
-        let Source::Mesh(mesh) = read_source(&data.join(name)).unwrap() else { panic!("{name} is no mesh") };
-        assert_eq!((mesh.vertices.len(), mesh.len()), (vertices, triangles), "{name}");
-        let edges = mesh.boundary_edges();
-        assert_eq!((edges.is_closed(), edges.is_oriented()), (is_closed, true), "{name}: {edges:?}");
-        println!("{name}: {edges:?}, bounds {:?}", mesh.bounds());
+    check_mesh(&shipped("meshes/pilot-whale-cranium-10k.ply"), 5000, 10_000, true);
+    check_mesh(&shipped("meshes/demosthenes-low-res.obj"), 8394, 16_719, false);
+    check_mesh(&shipped("meshes/gastruloid.ply"), 3324, 6643, false);
+    check_cloud(&shipped("points/pilot-whale-cranium-5k.xyz"), 5000);
+}
+
+#[test]
+fn more_real_files_have_their_triangles() {
+    for (name, vertices, triangles) in
+        [("meshes/pilot-whale-cranium.ply", 50_000, 100_000), ("meshes/teddy-cgal-bear.off", 13_826, 27_648)]
+    {
+        let Some(path) = shared_data(name) else { return };
+        check_mesh(&path, vertices, triangles, true);
     }
-    for (name, count) in [("kitten.xyz", 5210), ("whale-cranium-vertices.xyz", 50_000)] {
-        let Source::Cloud(cloud) = read_source(&data.join("../points").join(name)).unwrap() else { panic!("{name}") };
-        assert_eq!(cloud.len(), count, "{name}");
+    for (name, count) in [("points/kitten.xyz", 5210), ("points/whale-cranium-vertices.xyz", 50_000)] {
+        let Some(path) = shared_data(name) else { return };
+        check_cloud(&path, count);
     }
+}
+
+fn check_mesh(path: &Path, vertices: usize, triangles: usize, is_closed: bool) {
+    let name = path.display();
+    let Source::Mesh(mesh) = read_source(path).expect("it is read") else { panic!("{name} is no mesh") };
+    assert_eq!((mesh.vertices.len(), mesh.len()), (vertices, triangles), "{name}");
+    let edges = mesh.boundary_edges();
+    assert_eq!((edges.is_closed(), edges.is_oriented()), (is_closed, true), "{name}: {edges:?}");
+    println!("{name}: {edges:?}, bounds {:?}", mesh.bounds());
+}
+
+fn check_cloud(path: &Path, count: usize) {
+    let name = path.display();
+    let Source::Cloud(cloud) = read_source(path).expect("it is read") else { panic!("{name} is no cloud") };
+    assert_eq!(cloud.len(), count, "{name}");
 }

@@ -8,7 +8,7 @@ use strandline::io::geometry::read::points::read_cloud;
 
 use crate::common::damage::damaged;
 use crate::common::random::Random;
-use crate::common::shared_data;
+use crate::common::{shared_data, shipped};
 
 fn read_bytes(bytes: &[u8]) -> Result<PointCloud> {
     let folder = tempfile::tempdir().expect("a scratch folder");
@@ -308,13 +308,22 @@ fn damaged_bytes_never_panic() {
 #[test]
 fn real_files_have_their_points() {
     for (name, count) in [
-        ("embryo-like/marks.csv", 3680),
+        ("points/pilot-whale-cranium-5k.xyz", 5000),
+        ("meshes/pilot-whale-cranium-10k.ply", 5000),
+        ("meshes/gastruloid.ply", 3324),
+    ] {
+        assert_eq!(read_cloud(&shipped(name)).unwrap().len(), count, "{name}");
+    }
+}
+
+#[test]
+fn more_real_files_have_their_points() {
+    for (name, count) in [
         ("points/kitten.xyz", 5210),
         ("points/whale-cranium-vertices.xyz", 50_000),
         ("meshes/pilot-whale-cranium.ply", 50_000),
-        ("meshes/gastruloid.ply", 3324),
     ] {
-        let Some(path) = shared_data(name) else { continue };
+        let Some(path) = shared_data(name) else { return };
         assert_eq!(read_cloud(&path).unwrap().len(), count, "{name}");
     }
     let Some(marks) = shared_data("embryo-like/marks.csv").map(|path| read_cloud(&path).unwrap()) else { return };
@@ -325,12 +334,9 @@ fn real_files_have_their_points() {
 
 #[test]
 fn the_whale_is_the_same_in_text_and_ply() {
-    let (Some(text), Some(binary)) =
-        (shared_data("points/whale-cranium-vertices.xyz"), shared_data("meshes/pilot-whale-cranium.ply"))
-    else {
-        return;
-    };
-    let (text, binary) = (read_cloud(&text).unwrap(), read_cloud(&binary).unwrap());
+    let [text, binary] = ["points/pilot-whale-cranium-5k.xyz", "meshes/pilot-whale-cranium-10k.ply"]
+        .map(|name| read_cloud(&shipped(name)).unwrap());
+    assert_eq!(text.len(), binary.len());
     for (a, b) in text.positions.iter().flatten().zip(binary.positions.iter().flatten()) {
         assert!((a - b).abs() < 1e-6);
     }

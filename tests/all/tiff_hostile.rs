@@ -9,7 +9,7 @@ use strandline::store::PlaneSource;
 
 use crate::common::random::Random;
 use crate::common::tiff_bytes::{PageBytes, Value, bytes_u16, gray_page, tiff_file};
-use crate::common::{shared_data, tiff_planes};
+use crate::common::{shared_data, shipped, tiff_planes};
 
 /// The variable that tells the test below that it runs under the memory limit.
 pub(crate) const LIMITED: &str = "STRANDLINE_TEST_LIMITED";
@@ -28,21 +28,49 @@ fn files_of_the_decoder_suite_read_as_tifffile_reads_them() {
     if std::env::var_os(LIMITED).is_none() {
         return rerun_limited("tiff_hostile::files_of_the_decoder_suite_read_as_tifffile_reads_them");
     }
-    let Some(folder) = shared_data("tiff-readers/image-tiff/tests") else { return };
-    let mut files = 0;
-    for line in include_str!("image_tiff_sums.txt").lines().filter(|l| !l.starts_with('#')) {
-        let [name, verdict, detail] = line.split(';').collect::<Vec<_>>()[..] else { panic!("{line}") };
-        let path = folder.join(name);
-        if verdict == "refused" {
-            let error = tiff_planes::stack(&path, 0, 0).unwrap_err();
-            assert!(error.exit_code() == 2 && error.to_string().contains(detail), "{error}");
-        } else {
-            let sums: Vec<f64> = detail.split(' ').map(|v| v.parse().unwrap()).collect();
-            check_sums(&path, &sums);
-        }
-        files += 1;
+    let folder = shipped(SUITE);
+    let (small, _) = decoder_suite();
+    assert_eq!(small.len(), 120);
+    for line in small {
+        check_line(&folder, line);
     }
-    assert_eq!(files, 196);
+}
+
+#[test]
+fn more_files_of_the_decoder_suite_read_as_tifffile_reads_them() {
+    let Some(folder) = shared_data("tiff-readers/image-tiff/tests") else { return };
+    if std::env::var_os(LIMITED).is_none() {
+        return rerun_limited("tiff_hostile::more_files_of_the_decoder_suite_read_as_tifffile_reads_them");
+    }
+    let (_, large) = decoder_suite();
+    assert_eq!(large.len(), 76);
+    for line in large {
+        check_line(&folder, line);
+    }
+}
+
+/// Where the small files of the suite lie in the project's test data.
+const SUITE: &str = "tiff-decoder-suite";
+
+/// Name, whether it is read or refused, and its sums or a word of the reason.
+type Line = [&'static str; 3];
+
+/// The files that the project holds, and the others.
+fn decoder_suite() -> (Vec<Line>, Vec<Line>) {
+    let lines = include_str!("image_tiff_sums.txt").lines().filter(|line| !line.starts_with('#'));
+    let lines = lines.map(|line| line.split(';').collect::<Vec<_>>().try_into().unwrap());
+    lines.partition(|line: &Line| shipped(SUITE).join(line[0]).exists())
+}
+
+fn check_line(folder: &Path, [name, verdict, detail]: Line) {
+    let path = folder.join(name);
+    if verdict == "refused" {
+        let error = tiff_planes::stack(&path, 0, 0).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains(detail), "{error}");
+    } else {
+        let sums: Vec<f64> = detail.split(' ').map(|v| v.parse().unwrap()).collect();
+        check_sums(&path, &sums);
+    }
 }
 
 fn check_sums(path: &Path, sums: &[f64]) {
@@ -145,8 +173,7 @@ fn damaged_files_never_panic() {
 
 #[test]
 fn damaged_compressed_files_never_panic() {
-    let Some(derived) = shared_data("tiff-readers/derived") else { return };
-    let Some(suite) = shared_data("tiff-readers/image-tiff/tests/images") else { return };
+    let (derived, suite) = (shipped("tiff-derived"), shipped(SUITE).join("images"));
     let mut random = Random(0x6c7a_7721);
     println!("seed {:#x}", random.0);
     let folder = tempfile::tempdir().unwrap();

@@ -22,14 +22,35 @@ pub(crate) mod tiff_bytes;
 pub(crate) mod tiff_planes;
 pub(crate) mod zarr_files;
 
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
-/// The folder of shared test data, or `None` after saying that the test is skipped.
+/// A file or folder of the test data that is part of the project: see `tests/data/README.md`.
+pub(crate) fn shipped(part: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(part)
+}
+
+/// A file or folder of the test data that is not part of the project, or `None` after saying that it is left out. With
+/// `CI=true` a file that is not there is a failure, unless the whole folder is not.
 pub(crate) fn shared_data(part: &str) -> Option<PathBuf> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(part);
-    if folder.exists() {
-        return Some(folder);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let path = folder.join(part);
+    if path.exists() {
+        return Some(path);
     }
-    println!("skipped: {} is absent", folder.display());
+    assert!(!folder.exists() || !is_ci(), "{} is absent", path.display());
+    say_skipped(&format!("{} is absent", path.display()));
     None
+}
+
+pub(crate) fn is_ci() -> bool {
+    std::env::var("CI").as_deref() == Ok("true")
+}
+
+/// Says that the running test leaves something out. Straight to stderr: what `println!` says of a test that passes is kept
+/// back by the harness.
+pub(crate) fn say_skipped(reason: &str) {
+    let thread = std::thread::current();
+    let test = thread.name().unwrap_or("a test");
+    writeln!(std::io::stderr(), "skipped in {test}: {reason}").expect("stderr takes a line");
 }

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+use super::{is_ci, say_skipped};
+
 /// The interpreter that `STRANDLINE_TEST_PYTHON` names, or one in `target/test-venv` with the packages of
 /// `scripts/requirements-test.txt`. None, with the reason printed, when those cannot be installed here; with `CI=true`
 /// that is a failure.
@@ -34,7 +36,9 @@ fn prepare() -> Result<PathBuf, String> {
         return Ok(python);
     }
     run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder))?;
-    run(Command::new(&python).args(["-m", "pip", "install", "--quiet", "--requirement"]).arg(&wanted))?;
+    // Bytecode is made of what is imported, which is little of it.
+    let install = ["-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check", "--requirement"];
+    run(Command::new(&python).args(install).arg(&wanted))?;
     fs::write(&installed, requirements).map_err(|error| error.to_string())?;
     Ok(python)
 }
@@ -46,7 +50,7 @@ fn run(command: &mut Command) -> Result<(), String> {
 }
 
 fn unavailable(reason: &str) -> Option<PathBuf> {
-    assert_ne!(std::env::var("CI").as_deref(), Ok("true"), "the readers cannot be installed: {reason}");
-    eprintln!("skipped: the readers cannot be installed: {reason}");
+    assert!(!is_ci(), "the readers cannot be installed: {reason}");
+    say_skipped(&format!("the readers cannot be installed: {reason}"));
     None
 }
