@@ -25,15 +25,15 @@ fn ranks<P: Stored>(values: &[P]) -> Vec<u64> {
     values.iter().map(|v| v.rank()).collect()
 }
 
-/// With a window of 2 MiB the bricks of these fields are dropped and loaded again and again.
+/// With a window of 512 KiB the bricks of these fields are dropped and loaded again and again.
 #[test]
 fn threads_and_memory_change_no_bit() {
-    let geometry = grid([150, 130, 140], [0.5, 0.4, 0.7]);
+    let geometry = grid([99, 83, 91], [0.5, 0.4, 0.7]);
     let bricks = geometry.shape.map(|n| n.unsigned_abs().div_ceil(16)).iter().product::<u64>();
     let cloud = random_cloud(&geometry, 40, 3);
     for method in Method::all() {
         let first = front::<f32>(&Lab::new(1), &geometry, &cloud, 16, method);
-        for (threads, window) in [(1, 2 << 20), (2, 2 << 20), (2, 1 << 30), (4, 1 << 30), (4, 2 << 20)] {
+        for (threads, window) in [(1, 512 << 10), (2, 512 << 10), (2, 1 << 30), (4, 1 << 30), (4, 512 << 10)] {
             let found = front::<f32>(&Lab::with_window(threads, window), &geometry, &cloud, 16, method);
             let what = format!("{}, {threads} threads, a window of {window} bytes", method.name());
             assert!(ranks(&found.values) == ranks(&first.values), "{what}: values differ");
@@ -70,9 +70,9 @@ fn largest_difference<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], edges:
 #[test]
 fn eikonal_methods_come_to_rest_where_sweeps_do() {
     for (seed, shape, spacing) in [
-        (1, [90, 70, 50], [0.1; 3]),
-        (2, [50, 60, 70], [0.3, 0.17, 0.9]),
-        (3, [120, 1, 90], [1.0; 3]),
+        (1, [66, 52, 37], [0.1; 3]),
+        (2, [37, 43, 50], [0.3, 0.17, 0.9]),
+        (3, [90, 1, 70], [1.0; 3]),
         (4, [200, 1, 1], [0.7; 3]),
     ] {
         let geometry = grid(shape, spacing);
@@ -99,14 +99,23 @@ struct Inexact {
     most: f64,
 }
 
-/// Distances against the least over all points: those of fixed voxels, and all.
-fn inexact(geometry: &Geometry, cloud: &[[f64; 3]], values: &[f32], is_fixed: &[bool]) -> [Inexact; 2] {
+/// For each voxel the least distance over all points, and whether a point fixes it.
+fn exactly(geometry: &Geometry, cloud: &[[f64; 3]]) -> Vec<(f64, bool)> {
     let tree = RTree::bulk_load(cloud.to_vec());
-    let mut found = [Inexact { share: 0.0, most: 0.0 }; 2];
-    for ((v, &value), &is_fixed) in (PlainGrid { shape: geometry.shape }).voxels().zip(values).zip(is_fixed) {
+    let fixing = textbook::fixing_sources(geometry, cloud);
+    let voxels = (PlainGrid { shape: geometry.shape }).voxels().zip(fixing);
+    let least = |(v, fixing): ([i64; 3], Option<usize>)| {
         let here = position(geometry, v);
         let nearest = tree.nearest_neighbor(here).expect("a point");
-        let exact = textbook::squared(here, *nearest).sqrt();
+        (textbook::squared(here, *nearest).sqrt(), fixing.is_some())
+    };
+    voxels.map(least).collect()
+}
+
+/// Distances against the least over all points: those of fixed voxels, and all.
+fn inexact(geometry: &Geometry, exact: &[(f64, bool)], values: &[f32]) -> [Inexact; 2] {
+    let mut found = [Inexact { share: 0.0, most: 0.0 }; 2];
+    for ((v, &value), &(exact, is_fixed)) in (PlainGrid { shape: geometry.shape }).voxels().zip(values).zip(exact) {
         let excess = f64::from(value) - exact;
         let rounding = 1e-6 * exact + 1e-9;
         assert!(excess > -rounding, "{v:?}: {value} is nearer than {exact}");
@@ -146,12 +155,12 @@ fn euclidean_methods_find_nearly_every_nearest_source() {
         cases.push((format!("{count} points, spacing {spacing:?}"), geometry, cloud));
     }
     for (name, geometry, cloud) in &cases {
-        let is_fixed: Vec<bool> = textbook::fixing_sources(geometry, cloud).iter().map(Option::is_some).collect();
+        let exact = exactly(geometry, cloud);
         for method in methods_of(Equation::Euclidean) {
             for (edge, neighbours) in [(16, Neighbours::Faces), (32, Neighbours::Faces), (16, Neighbours::All)] {
                 let options = Options { neighbours, ..everywhere(true) };
                 let found = solve_with::<f32>(&lab, geometry, cloud, edge, method, Schedule::Front, options);
-                let [fixed, all] = inexact(geometry, cloud, &found.values, &is_fixed);
+                let [fixed, all] = inexact(geometry, &exact, &found.values);
                 let what =
                     format!("{name}, {}, {neighbours:?}, bricks of {edge}: {all:?}, fixed {fixed:?}", method.name());
                 println!("{what}");
@@ -162,7 +171,7 @@ fn euclidean_methods_find_nearly_every_nearest_source() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
     fn random_clouds_come_to_rest_where_sweeps_do(

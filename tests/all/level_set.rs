@@ -147,7 +147,7 @@ fn a_sphere_moves_at_its_speed() {
         let off = [1, 2].map(|finer| (radius_after(finer, 40, &|_| speed) - 0.6 - speed * time).abs());
         assert!(off[0] < 0.15 * time && off[1] < 0.7 * off[0], "{speed}: {off:?}");
     }
-    let rested = radius_after(2, 400, &|r| 2.0 * (0.75 - r));
+    let rested = radius_after(2, 200, &|r| 4.0 * (0.75 - r));
     assert!((rested - 0.75).abs() < 0.01, "{rested}");
 }
 
