@@ -13,6 +13,8 @@ pub struct Budget {
 const BASE_BYTES: u64 = 48 << 20;
 /// A window smaller than this would thrash.
 const SMALLEST_WINDOW: u64 = 64 << 20;
+/// A run that is under way goes on with so much where a box grows, before it is refused.
+const SMALLEST_UNDER_WAY: u64 = SMALLEST_WINDOW / 2;
 const MIB: u64 = 1 << 20;
 
 impl Budget {
@@ -21,8 +23,28 @@ impl Budget {
     /// # Errors
     /// When that is too little: names the smallest budget that would do.
     pub fn window(&self, held: u64) -> Result<u64> {
+        self.window_of(held, SMALLEST_WINDOW)
+    }
+
+    /// The same for a run that is under way, where what was to be held turns out to be more.
+    ///
+    /// # Errors
+    /// When that is too little: names the smallest budget that would have done.
+    pub(super) fn window_under_way(self, held: u64) -> Result<u64> {
+        self.window_of(held, SMALLEST_UNDER_WAY)
+    }
+
+    /// Lets inputs be read or looked at that take so many bytes, while no field is there yet.
+    ///
+    /// # Errors
+    /// When they alone are too many: names the smallest budget that a run with them could have.
+    pub fn admit(self, held: u64) -> Result<()> {
+        self.window_of(held, 0).map(drop)
+    }
+
+    fn window_of(self, held: u64, smallest: u64) -> Result<u64> {
         let least = Self::least(held);
-        if self.total < least {
+        if self.total < least - SMALLEST_WINDOW + smallest {
             return Err(Error::usage(format!(
                 "a memory budget of {} is too small for this run: give at least --memory {}MiB",
                 if self.total < 1 << 20 {

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::budget::{Budget, machine_memory, peak_resident};
 use super::cancel::Cancel;
 use super::comm::{Comm, SelfComm};
+use super::footprint::{Account, Footprint, Hold};
 use super::progress::{OfRank, Progress};
 use crate::error::{Error, Result};
 use crate::store::{Scratch, Traffic};
@@ -46,6 +47,7 @@ pub struct Engine {
     ranks: usize,
     scratch: Scratch,
     budget: Budget,
+    account: Arc<Account>,
     reports: Mutex<Vec<StageReport>>,
 }
 
@@ -64,7 +66,8 @@ impl Engine {
         scratch.set_page_cache(machine_memory().saturating_sub(budget.total) / 2);
         let pool = Arc::new(pool(threads)?);
         let comm = Arc::new(SelfComm);
-        Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, reports: Mutex::default() })
+        let account = Account::new(budget, scratch.clone());
+        Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, reports: Mutex::default() })
     }
 
     /// The engine with so many ranks, 1 or more, for stages that can be shared out: see [`Stage::on_ranks`].
@@ -83,6 +86,7 @@ impl Engine {
             ranks: 1,
             scratch: self.scratch.clone(),
             budget: self.budget,
+            account: self.account.clone(),
             reports: Mutex::default(),
         })
     }
@@ -98,6 +102,7 @@ impl Engine {
             ranks: self.ranks,
             scratch: self.scratch.clone(),
             budget: self.budget,
+            account: self.account.clone(),
             reports: Mutex::default(),
         }
     }
@@ -142,13 +147,21 @@ impl Engine {
         self.ranks
     }
 
-    /// Leaves `held` bytes of the budget to what is kept in memory, the rest to mapped pages.
+    /// Leaves so many bytes of the budget to what a job keeps in memory, the rest to mapped pages, until the guard goes.
     ///
     /// # Errors
-    /// When the budget is too small.
-    pub fn reserve(&self, held: u64) -> Result<()> {
-        self.scratch.set_window(self.budget.window(held)?);
-        Ok(())
+    /// When the budget is too small: names the smallest that would do.
+    pub fn reserve(&self, footprint: Footprint) -> Result<Hold> {
+        self.account.reserve(footprint, self.threads() as u64)
+    }
+
+    /// Tells what a box holds that may have grown, or what else a run under way holds; what was reserved for boxes pays for
+    /// it first, then mapped pages do.
+    ///
+    /// # Errors
+    /// When the budget is too small: names the smallest that would do.
+    pub fn hold(&self, bytes: u64) -> Result<Hold> {
+        self.account.hold(bytes)
     }
 
     /// Tells the user one line.
@@ -250,6 +263,20 @@ impl<'a> Stage<'a> {
         })?;
         self.report.lock().unwrap_or_else(PoisonError::into_inner).bricks += wave.len() as u64;
         Ok(results)
+    }
+
+    /// Number of threads.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.engine.threads()
+    }
+
+    /// Tells what else the stage holds: see [`Engine::hold`].
+    ///
+    /// # Errors
+    /// When the budget is too small.
+    pub fn hold(&self, bytes: u64) -> Result<Hold> {
+        self.engine.hold(bytes)
     }
 
     /// Says what the stage repeated and what was left.

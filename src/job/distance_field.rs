@@ -10,7 +10,7 @@ use crate::grid::{Box3, DataSets, Geometry};
 use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::geometry::triangle::Triangle;
-use crate::pipeline::distance::{DistanceFound, Kept, distance_kept};
+use crate::pipeline::distance::{DistanceFound, Kept, Writes, distance_kept};
 use crate::store::{BoxSource, BrickArray};
 
 /// The distance to points, triangle meshes and the borders of labels.
@@ -80,8 +80,9 @@ impl<'a> DistanceField<'a> {
     fn solved<P: Precision>(&self) -> Result<SolvedDistance<P>> {
         let ready = self.task.ready::<P>()?;
         let Ready { sets, geometry, settings, .. } = &ready;
-        let needs = settings.needs::<P>(geometry, sets, ready.resources.threads, 1);
-        let engine = ready.engine::<P>(&self.task.run, &needs, false)?;
+        let writes = if self.task.run.store.is_some() { Writes::Fields } else { Writes::Nothing };
+        let needs = settings.needs::<P>(geometry, sets, [ready.resources.threads, 1], writes);
+        let engine = self.task.run.engine(&ready.resources, needs.held)?;
         let store = self.task.run.begin_store()?;
         let kept = Kept::new(&engine, geometry, settings.keeps_sources())?;
         let found = distance_kept(&engine, geometry, sets, settings, store.as_ref(), Some(&kept))?;

@@ -92,8 +92,9 @@ impl<'a> MiddleSurface<'a> {
         ready.settings.labels = true;
         let settings = MiddleSettings { distance: ready.settings, surface: self.surface, labels: self.mode };
         let Ready { sets, geometry, .. } = &ready;
-        let needs = settings.needs::<P>(geometry, sets, ready.resources.threads, 1);
-        let engine = ready.engine::<P>(&self.task.run, &needs, true)?;
+        let writes = self.task.run.store.is_some();
+        let needs = settings.needs::<P>(geometry, sets, ready.resources.threads, 1, writes);
+        let engine = self.task.run.engine(&ready.resources, needs.held)?;
         let store = self.task.run.begin_store()?;
         let mut drawing = Drawing::new(mesh, mesh_file(store.as_ref())?.as_deref(), geometry, true)?;
         let kept = Kept::new(&engine, geometry, true)?;

@@ -55,9 +55,9 @@ impl Resources {
         Ok(Self { memory, threads, scratch })
     }
 
-    /// An engine that keeps to them, with a window of so many bytes of scratch pages.
-    pub(crate) fn engine(&self, window: u64, cancel: &Cancel, progress: Arc<dyn Progress>) -> Result<Engine> {
-        let scratch = Scratch::new(&self.scratch, window);
+    /// An engine that keeps to them. Jobs take what they hold off its window.
+    pub(crate) fn engine(&self, cancel: &Cancel, progress: Arc<dyn Progress>) -> Result<Engine> {
+        let scratch = Scratch::new(&self.scratch, self.memory);
         Engine::new(self.threads, scratch, Budget { total: self.memory }, cancel.clone(), progress)
     }
 }

@@ -55,7 +55,7 @@ impl Run {
                 bytes(budget.total)
             )));
         }
-        resources.engine(budget.window(held)?, &self.cancel, self.progress.clone())
+        resources.engine(&self.cancel, self.progress.clone())
     }
 
     /// Begins the store, where one was asked for.

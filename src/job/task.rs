@@ -4,11 +4,10 @@ use super::given::{Gathered, Given};
 use super::resources::Resources;
 use super::run::Run;
 use crate::error::{Error, Result};
-use crate::exec::Engine;
 use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
-use crate::pipeline::distance::{DistanceSettings, Init, Method, Needs, Schedule, outside_note};
+use crate::pipeline::distance::{DistanceSettings, Init, Method, Schedule, outside_note};
 use crate::pipeline::laying::{around, check_grid, check_spacing};
 
 /// What was said so far.
@@ -96,19 +95,6 @@ impl Task<'_> {
         }
         let (low, high) = sets.bounds().ok_or_else(|| Error::input("the sources span no box"))?;
         around([low, high], self.spacing, self.padding)
-    }
-}
-
-impl Ready {
-    /// An engine for a job with these needs, and what it holds while a store is written; `borders` says whether the borders
-    /// of labels are written too.
-    pub(super) fn engine<P: Precision>(&self, run: &Run, needs: &Needs, borders: bool) -> Result<Engine> {
-        let written = if run.store.is_some() {
-            self.settings.written_held::<P>(&self.geometry, &self.sets, borders, self.resources.threads)
-        } else {
-            0
-        };
-        run.engine(&self.resources, needs.held.saturating_add(written))
     }
 }
 

@@ -6,6 +6,12 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::ball::{Ball, Bench};
+use crate::common::random::Random;
+use std::sync::Arc;
+use strandline::exec::{Budget, Cancel, Engine, Silent};
+use strandline::grid::{DataSets, Geometry};
+use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule, distance};
+use strandline::store::Scratch;
 
 /// Bytes of a size as it is printed.
 fn bytes(text: &str) -> f64 {
@@ -58,4 +64,75 @@ fn plans_of_fields_tell_the_least_memory() {
         let said = String::from_utf8_lossy(&less.stderr).into_owned();
         assert!(less.status.code() == Some(2) && said.contains(&format!("--memory {least}MiB")), "{said}");
     }
+}
+
+/// Random points in a cube, as a table.
+fn spread(seed: u64, count: usize) -> String {
+    let mut random = Random(seed);
+    let mut line = |_| format!("{:.4},{:.4},{:.4}\n", random.unit(), random.unit(), random.unit());
+    (0..count).map(&mut line).collect()
+}
+
+/// Random points on a ball of radius 1, as a table.
+fn ball(seed: u64, count: usize) -> String {
+    let mut random = Random(seed);
+    let mut line = |_| {
+        let (z, turn) = (2.0 * random.unit() - 1.0, std::f64::consts::TAU * random.unit());
+        let across = (1.0 - z * z).sqrt();
+        format!("{:.4},{:.4},{z:.4}\n", across * turn.cos(), across * turn.sin())
+    };
+    (0..count).map(&mut line).collect()
+}
+
+/// Jobs whose memory is not in bricks: chunks on their way out, sources and their trees, a surface that fills its grid, many
+/// objects. Each gets what it says is the least, and does not take more.
+#[test]
+fn tight_jobs_keep_to_their_limit() {
+    let bench = Bench::new(&Ball::small());
+    bench.write("one.csv", &spread(1, 3000));
+    bench.write("two.csv", &spread(2, 3000));
+    bench.write("ball.csv", &ball(3, 2000));
+    for run in [
+        "distance one.csv two.csv --spacing 0.02 --labels --closest-point --brick 96 -o out/a.zarr",
+        "distance one.csv --spacing 0.02 --method fmm --schedule sweep --precision f64 --brick 16 -o none",
+        "middle one.csv two.csv --spacing 0.05 -o none --mesh out/b.ply",
+        "reconstruct ball.csv --spacing 0.08 --max-steps 2 -o out/c.zarr",
+        "segment image.tif --points marks.csv --max-steps 2 -o out/d.zarr",
+    ] {
+        let refused = bench.run(&format!("{run} --threads 3 --memory 100MiB --dry-run"));
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        let least = between(&said, "give at least --memory ", "MiB").parse::<u64>().unwrap();
+        bench.succeed(&format!("{run} --threads 3 --memory {least}MiB -q --report out/r.json --overwrite"));
+        let peak = bench.json("out/r.json")["peak_rss_bytes"].as_u64().unwrap();
+        assert!(peak <= least << 20, "{run}: {peak} of {least} MiB");
+    }
+}
+
+/// Whoever calls the library is held to the budget too.
+#[test]
+fn a_job_of_the_library_refuses_a_budget_that_is_too_small() {
+    let folder = tempfile::tempdir().unwrap();
+    let scratch = Scratch::new(folder.path(), 1 << 30);
+    let budget = Budget { total: 112 << 20 };
+    let engine = Engine::new(2, scratch.clone(), budget, Cancel::default(), Arc::new(Silent)).unwrap();
+    let geometry = Geometry { shape: [32; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+    let mut sets = DataSets::default();
+    sets.add_cloud(&[[3.0, 4.0, 5.0]]);
+    let settings = DistanceSettings {
+        method: Method::VDT,
+        schedule: Schedule::Front,
+        neighbours: strandline::kernel::distance::state::neighbours::Neighbours::Faces,
+        init: Init::Cell,
+        farthest: None,
+        signed: false,
+        labels: false,
+        closest_point: false,
+        brick: 32,
+    };
+    let error = distance::<f32>(&engine, &geometry, &sets, &settings, None).unwrap_err().to_string();
+    assert!(error.contains("give at least --memory 1"), "{error}");
+    let budget = Budget { total: 128 << 20 };
+    let engine = Engine::new(2, scratch.clone(), budget, Cancel::default(), Arc::new(Silent)).unwrap();
+    distance::<f32>(&engine, &geometry, &sets, &settings, None).unwrap();
+    assert!(scratch.window() <= 80 << 20, "what was not held is the window: {}", scratch.window());
 }

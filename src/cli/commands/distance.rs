@@ -29,7 +29,9 @@ use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
 use crate::job::resources::Resources;
 use crate::kernel::distance::state::precision::Precision;
-use crate::pipeline::distance::{DistanceSettings, Init, Needs, Schedule, check_iterations, distance, outside_note};
+use crate::pipeline::distance::{
+    DistanceSettings, Init, Needs, Schedule, Writes, check_iterations, distance, outside_note,
+};
 use crate::pipeline::middle::{MiddleSettings, middle};
 use crate::store::{MeshSink, Unfinished};
 
@@ -107,21 +109,17 @@ impl Job {
     fn run<P: Precision>(&self) -> Result<()> {
         self.settings.check_on::<P>(&self.geometry, &self.sets)?;
         let (threads, ranks) = (self.resources.threads, self.args.job.ranks);
-        let needs = match self.middle_settings() {
-            Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks),
-            None => self.settings.needs::<P>(&self.geometry, &self.sets, threads, ranks),
-        };
-        let needs = Needs { held: needs.held.saturating_add(self.written_held::<P>()), ..needs };
+        let needs = self.needs::<P>(threads, ranks);
         let plan = self.plan(&needs);
         if self.args.job.output.dry_run {
             print(&format!("{plan}\n"))?;
         }
-        let window = self.fits(&needs)?;
+        self.fits(&needs)?;
         if self.args.job.output.dry_run {
             return Ok(());
         }
         self.console.say(&plan);
-        let engine = self.resources.engine(window, &self.cancel, self.console.clone())?;
+        let engine = self.resources.engine(&self.cancel, self.console.clone())?;
         let engine = engine.with_ranks(self.args.job.ranks);
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
@@ -182,8 +180,17 @@ impl Job {
         Some(MiddleSettings { distance: self.settings, surface, labels })
     }
 
+    fn needs<P: Precision>(&self, threads: usize, ranks: usize) -> Needs {
+        let writes = self.args.job.output.store().is_some();
+        if let Some(middle) = self.middle_settings() {
+            return middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes);
+        }
+        let writes = if writes { Writes::Fields } else { Writes::Nothing };
+        self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], writes)
+    }
+
     /// Refuses a run that cannot fit memory or disk.
-    fn fits(&self, needs: &Needs) -> Result<u64> {
+    fn fits(&self, needs: &Needs) -> Result<()> {
         let window = Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
             let name = self.settings.method.name();
             let textbook = if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {
@@ -209,17 +216,7 @@ impl Job {
             written,
             coarser: "a larger --spacing",
         }
-        .check(&self.console)?;
-        Ok(window)
-    }
-
-    /// Bytes that are held while the output is written.
-    fn written_held<P: Precision>(&self) -> u64 {
-        if self.args.job.output.store().is_none() {
-            return 0;
-        }
-        let settings = DistanceSettings { labels: self.settings.labels || self.middle.is_some(), ..self.settings };
-        settings.written_held::<P>(&self.geometry, &self.sets, self.middle.is_some(), self.resources.threads)
+        .check(&self.console)
     }
 
     /// Bytes of the output, if nothing of it could be compressed.

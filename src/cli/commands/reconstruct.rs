@@ -29,8 +29,8 @@ use crate::io::geometry::read::source::Source;
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::job::resources::Resources;
 use crate::pipeline::reconstruct::{
-    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct, refuse_too_fine, typical_spacing,
-    without_isolated,
+    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct, refuse_too_fine, spacing_memory,
+    typical_spacing, without_isolated,
 };
 use crate::store::Unfinished;
 
@@ -62,12 +62,12 @@ pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
     if args.output.dry_run {
         print(&format!("{plan}\n"))?;
     }
-    let window = job.fits(&estimate)?;
+    job.fits(&estimate)?;
     if args.output.dry_run {
         return Ok(());
     }
     job.console.say(&plan);
-    job.run(window, &estimate)
+    job.run()
 }
 
 /// Leaves out points that stand alone, if that was asked for, and says how many.
@@ -133,6 +133,7 @@ impl Job {
                 mesh.vertices
             }
         };
+        Budget { total: resources.memory }.admit(spacing_memory(cloud.len()))?;
         let cloud = drop_isolated(cloud, args.grid.drop_isolated, &console)?;
         let grid = grid_for(&cloud, spacing).ok_or_else(|| {
             let what = "all points lie in one place, which tells no spacing and encloses nothing";
@@ -158,7 +159,7 @@ impl Job {
     }
 
     /// Refuses a run that cannot fit memory or disk.
-    fn fits(&self, estimate: &Estimate) -> Result<u64> {
+    fn fits(&self, estimate: &Estimate) -> Result<()> {
         let window = Budget { total: self.resources.memory }.window(estimate.held)?;
         // Two fields of the whole box, their coarser levels an eighth each of the one before; far from the points they are
         // constant and take nothing.
@@ -171,8 +172,7 @@ impl Job {
             written,
             coarser: "a larger --spacing",
         }
-        .check(&self.console)?;
-        Ok(window)
+        .check(&self.console)
     }
 
     /// What the run will take, in a few lines.
@@ -193,9 +193,8 @@ impl Job {
         )
     }
 
-    fn run(&self, window: u64, estimate: &Estimate) -> Result<()> {
-        let engine = self.resources.engine(window, &self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
-        engine.reserve(estimate.held)?;
+    fn run(&self) -> Result<()> {
+        let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let found = result?;

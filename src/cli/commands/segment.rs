@@ -65,7 +65,7 @@ pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     let estimate = job.estimate();
     if args.output.dry_run {
         job.print_plan(&estimate)?;
-        return job.fits(&estimate).map(|_| ());
+        return job.fits(&estimate);
     }
     job.run(&estimate).map(|_| ())
 }
@@ -144,7 +144,7 @@ impl Job {
 
     /// Runs the segmentation and writes all that was asked for; returns what was found.
     pub(crate) fn run(&self, estimate: &Estimate) -> Result<Outcome> {
-        let window = self.fits(estimate)?;
+        self.fits(estimate)?;
         self.console.say(&format!(
             "{}: {}, about {}; memory up to {}, {} of temporary fields in {}",
             self.names.image,
@@ -160,8 +160,7 @@ impl Job {
         if self.console.is_verbose() {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
-        let engine = self.resources.engine(window, &self.cancel, self.console.clone())?;
-        engine.reserve(estimate.held)?;
+        let engine = self.resources.engine(&self.cancel, self.console.clone())?;
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let outcome = result?;

@@ -11,7 +11,7 @@ use crate::cli::args::grid::GridArgs;
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::text::{bytes, grouped};
 use crate::error::{Error, Result};
-use crate::exec::{Cancel, Progress};
+use crate::exec::{Budget, Cancel, Progress};
 use crate::grid::{DataSets, Geometry, PointCloud, TriangleMesh, refuse_too_many};
 use crate::io::geometry::read::point_file::PointFile;
 use crate::io::geometry::read::points::LengthUnit;
@@ -56,11 +56,10 @@ pub(crate) fn read_sets(
         if is_volume && !args.choice.signed {
             let volume = open_volume(path, &args.job.grid, console)?;
             refuse_other_unit(volume.geometry(), &mut unit).map_err(|error| error.at(path))?;
-            if volume.reading_bytes() > memory {
+            Budget { total: memory }.admit(volume.reading_bytes()).map_err(|error| {
                 let needed = bytes(volume.reading_bytes());
-                let error = format!("needs {needed} to be read, for its chunks or planes; give more with --memory");
-                return Err(Error::usage(error).at(path));
-            }
+                Error::usage(format!("needs {needed} to be read, for its chunks or planes; {error}")).at(path)
+            })?;
             add_labels(&mut read.sets, path, &volume, console, cancel)?;
             read.volume.get_or_insert_with(|| volume.geometry().clone());
         } else if is_volume {

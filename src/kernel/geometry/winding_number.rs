@@ -77,6 +77,14 @@ impl WindingTree {
         tree
     }
 
+    /// Bytes of the tree of a mesh of so many triangles, and of the list that it is made from: groups are halved until they
+    /// have a leaf's triangles or fewer, so that a leaf has more than half as many.
+    #[must_use]
+    pub fn bytes(triangles: u64) -> u64 {
+        let groups = 2 * triangles.div_ceil(LEAF as u64 / 2);
+        triangles * (size_of::<Member>() + size_of::<[[f64; 3]; 3]>()) as u64 + groups * size_of::<Group>() as u64
+    }
+
     /// The winding number of the mesh about a finite world position `[x, y, z]`; the mean of both sides' on a triangle.
     #[must_use]
     pub fn winding_number(&self, point: [f64; 3]) -> f64 {

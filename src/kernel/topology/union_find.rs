@@ -18,6 +18,12 @@ impl Forest {
         Self { above: (0..len as u32).collect() }
     }
 
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (self.above.capacity() * size_of::<u32>()) as u64
+    }
+
     /// Enters a thing as a tree of its own; false when it is known.
     ///
     /// # Panics

@@ -7,7 +7,7 @@ use super::readout::images::Wanted;
 use super::readout::kept::Kept;
 use super::readout::visit::ReadOut;
 use super::seeding::contiguous::contiguous_margin;
-use super::{Method, Options, Schedule, Solved, Sources, solve};
+use super::{Method, Options, Schedule, Solved, Sources, Writes, solve};
 use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::{BrickGrid, BrickSet, DataSets, Geometry, PointBins, TriangleBins};
@@ -69,8 +69,8 @@ impl DistanceSettings {
 /// Computes the distance to `sets` on a grid, stored as `P`; `store` gets the fields, none when it is absent.
 ///
 /// # Errors
-/// When the method cannot do what is asked for in that order, the output cannot be written, scratch runs out, or the run is
-/// interrupted.
+/// When the memory is too little, the method cannot do what is asked for in that order, the output cannot be written,
+/// scratch runs out, or the run is interrupted.
 pub fn distance<P: Precision>(
     engine: &Engine,
     geometry: &Geometry,
@@ -93,6 +93,9 @@ pub fn distance_kept<P: Precision>(
     store: Option<&StoreWriter>,
     kept: Option<&Kept<P>>,
 ) -> Result<DistanceFound> {
+    let writes = if store.is_some() { Writes::Fields } else { Writes::Nothing };
+    let needs = settings.needs::<P>(geometry, sets, [engine.threads(), engine.ranks()], writes);
+    let _held = engine.reserve(needs.footprint)?;
     let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));
     solve_sets::<P, _>(engine, geometry, sets, trees.as_ref(), settings, |solved, _| {
         let wanted = Wanted { labels: settings.labels, borders: false, closest_point: settings.closest_point };

@@ -5,6 +5,7 @@
 //! values, so leaving far bricks out changes none of the near ones.
 
 mod checks;
+mod costs;
 mod job;
 mod needs;
 mod ranks;
@@ -18,8 +19,8 @@ use std::sync::Arc;
 
 pub use checks::{check_iterations, outside_note, without_inside};
 pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets};
-pub use needs::Needs;
 pub(crate) use needs::tree_bytes;
+pub use needs::{Needs, Writes};
 pub use ranks::solve;
 pub use readout::field::{Solved, Together};
 pub use readout::found::DistanceFound;

@@ -1,15 +1,20 @@
-//! What a distance will take: memory that must be held, temporary fields, time.
+//! What a distance will take: memory that must be held, temporary fields, time. The job reserves what is told here.
 
 use super::{DistanceSettings, Schedule, Textbook, Wanted};
+use crate::exec::Footprint;
 use crate::grid::{BrickGrid, DataSets, Geometry};
 use crate::kernel::distance::repair::descent::remembered_bytes;
 use crate::kernel::distance::seeding::outside::count_outside;
 use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::geometry::triangle::Triangle;
+use crate::kernel::geometry::winding_number::WindingTree;
 
 /// An estimate; sizes in bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Needs {
     /// What must be in memory at the same time, bricks left out.
+    pub footprint: Footprint,
+    /// The same on all threads.
     pub held: u64,
     /// Temporary fields.
     pub scratch: u64,
@@ -17,22 +22,44 @@ pub struct Needs {
     pub seconds: f64,
 }
 
-/// Bytes of a voxel of the tiles of one thread: the tile, its layout along diagonals (twice as long), coordinates.
-const TILE_BYTES: u64 = 48;
-/// Bytes of a voxel of one thread where sources are found beside distances: tiles of both, chains, or ghosts and what
-/// fell.
+/// What of a distance goes into a store.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Writes {
+    /// Nothing.
+    Nothing,
+    /// What the settings ask for.
+    Fields,
+    /// That, and the borders of labels.
+    FieldsAndBorders,
+}
+
+/// Bytes of a voxel of a brick while sources are entered: the squared distance and source of those that fix it, and of
+/// those it is told of.
+const SEED_BYTES: u64 = 2 * (8 + 4);
+/// Bytes of a voxel of one thread where sources are found along with distances or after them: tiles of sources, now and
+/// before, and chains or what fell.
 const TRACE_BYTES: u64 = 24;
-/// Bytes of a voxel while sources are entered: distance and source of those that fix it, and of those it is told of.
-const SEED_BYTES: u64 = 24;
 /// Bytes kept of each brick: its lock, its state, its places in tables.
 const BRICK_BYTES: u64 = 96;
 /// Bytes that every further rank keeps of each brick of the grid: its slot, its value where it is not stored.
 const RANK_BYTES: u64 = 16;
 /// Bytes kept of each source: its position, twice, its place in a brick's list, its corners.
 const SOURCE_BYTES: u64 = 160;
+/// Bytes of a triangle while it is told whether a mesh is closed: its three edges, and its share of the corners by place.
+const CLOSED_BYTES: u64 = 3 * 12 + 32;
+/// How often triangles are kept beside that: by the method, by who looks again, and for closest points.
+const TRIANGLE_COPIES: u64 = 3;
 /// Bytes of a point and of a triangle in their trees: a node is as large as what a parent keeps of itself, 72 bytes, or as
 /// its triangle, and there are six to a parent.
 const TREE_BYTES: [u64; 2] = [96, 240];
+/// Voxels that a thread reads out at a time: a chunk.
+const CHUNK: u64 = 64 * 64 * 64;
+/// Bytes of a voxel that is read out with its source: source, label; the same with what is looked at again around it.
+const READ_SOURCE_BYTES: u64 = 4 + 4 + 24;
+/// Bytes of a voxel that is read with those around: border, source and label once more, in a box a voxel wider.
+const READ_BORDER_BYTES: u64 = 4 + 10;
+/// Bytes of a voxel whose side is told: whether it is fixed, known, inside; the flood's list.
+const READ_SIDE_BYTES: u64 = 3 + 24;
 /// Seconds for a voxel on one thread.
 const VOXEL_SECONDS: f64 = 30e-9;
 
@@ -43,45 +70,93 @@ pub(crate) fn tree_bytes(sets: &DataSets) -> u64 {
 
 impl DistanceSettings {
     /// What these settings take on a grid, on so many threads that so many ranks share; each rank has one at least.
+    /// `writes` says what is stored.
     #[must_use]
-    pub fn needs<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize, ranks: usize) -> Needs {
+    pub fn needs<P: Precision>(
+        &self,
+        geometry: &Geometry,
+        sets: &DataSets,
+        [threads, ranks]: [usize; 2],
+        writes: Writes,
+    ) -> Needs {
         let grid = BrickGrid::new(geometry.shape, self.brick);
-        let brick = grid.brick_len() as u64;
-        let faces = 6 * (self.brick * self.brick) as u64;
+        let footprint = self.footprint::<P>(geometry, sets, [threads, ranks], writes);
+        let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
+        let held = footprint.bytes(threads as u64);
+        Needs { footprint, held, scratch: self.scratch::<P>(&grid, ranks), seconds }
+    }
+
+    /// What is in memory at one time beside bricks.
+    fn footprint<P: Precision>(
+        &self,
+        geometry: &Geometry,
+        sets: &DataSets,
+        [threads, ranks]: [usize; 2],
+        writes: Writes,
+    ) -> Footprint {
+        let solving = self.solving::<P>(geometry);
+        // Where ranks outnumber threads each has one of its own all the same.
+        let more = solving.per_thread.saturating_mul(ranks.saturating_sub(threads) as u64);
+        let solving = solving.and(Footprint::of_all(more));
+        let reading = self.reading::<P>(geometry, sets, threads, writes);
+        self.tables::<P>(geometry, sets, ranks).and(solving.or(reading, threads as u64))
+    }
+
+    /// What is kept from the start to the end.
+    fn tables<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, ranks: usize) -> Footprint {
+        let bricks = BrickGrid::new(geometry.shape, self.brick).len();
+        let of_brick = BRICK_BYTES + ranks.saturating_sub(1) as u64 * RANK_BYTES;
+        let triangles = sets.mesh.len() as u64;
+        let copies = triangles * TRIANGLE_COPIES * size_of::<Triangle>() as u64;
+        let inside = if self.signed { WindingTree::bytes(triangles) + triangles * CLOSED_BYTES } else { 0 };
+        let trees = if self.looks_closer::<P>(sets) { tree_bytes(sets) } else { 0 };
+        let outside = if count_outside(geometry, sets) > 0 { tree_bytes(sets) } else { 0 };
+        let of_sources = sets.len() as u64 * SOURCE_BYTES + copies + inside + trees + outside;
+        Footprint::of_all(bricks.saturating_mul(of_brick).saturating_add(of_sources))
+    }
+
+    /// What entering sources and solving take: one after the other, in the same threads.
+    fn solving<P: Precision>(&self, geometry: &Geometry) -> Footprint {
+        let (edge, row) = (self.brick as usize, self.method.solver::<P>());
+        let grown = (edge as u64 + 2).pow(3);
+        let traced = if self.keeps_sources() && row.source_bytes > 0 { TRACE_BYTES * grown } else { 0 };
+        // A state is no larger than a distance in f64.
+        let tile = (row.cost)(edge, self.schedule).bytes::<u64>(edge);
+        let seeding = SEED_BYTES * (edge as u64).pow(3);
+        Footprint { held: self.heap_bytes::<P>(geometry), ..Footprint::of_thread(seeding.max(tile + traced)) }
+    }
+
+    /// What reading the solved field out and writing it take.
+    fn reading<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize, writes: Writes) -> Footprint {
+        let row = self.method.solver::<P>();
+        let borders = writes == Writes::FieldsAndBorders;
+        let looks_again = row.tracks_sources() && self.schedule == Schedule::Front;
+        let mut voxel = 2 * size_of::<P>() as u64 + row.state_bytes;
+        voxel += if self.keeps_sources() || looks_again { READ_SOURCE_BYTES } else { 0 };
+        voxel += if borders { READ_BORDER_BYTES + size_of::<P>() as u64 } else { 0 };
+        voxel += if self.signed { READ_SIDE_BYTES } else { 0 };
+        let remembered = if self.looks_closer::<P>(sets) { remembered_bytes(sets.len()) } else { 0 };
+        let reading = Footprint::of_thread(voxel * CHUNK.min(geometry.domain().volume()) + remembered);
+        let wanted = Wanted { labels: self.labels, borders, closest_point: self.closest_point };
+        match writes {
+            Writes::Nothing => reading,
+            _ => reading.and(Footprint::of_all(wanted.held::<P>(geometry, sets, threads))),
+        }
+    }
+
+    /// Temporary fields.
+    fn scratch<P: Precision>(&self, grid: &BrickGrid, ranks: usize) -> u64 {
+        let (brick, faces) = (grid.brick_len() as u64, 6 * (self.brick * self.brick) as u64);
         let row = self.method.solver::<P>();
         let apart = if self.keeps_sources() { row.source_bytes } else { 0 };
         let element = row.state_bytes + apart;
-        let traced = if apart > 0 { TRACE_BYTES } else { 0 };
-        let buffers = threads.max(ranks) as u64 * brick * (TILE_BYTES + SEED_BYTES + traced + element);
-        let cuts = ranks.saturating_sub(1) as u64;
-        let of_brick = BRICK_BYTES + cuts * RANK_BYTES;
-        let held = buffers + grid.len().saturating_mul(of_brick) + sets.len() as u64 * SOURCE_BYTES;
-        let remembered = threads as u64 * remembered_bytes(sets.len());
-        let trees = if self.looks_closer::<P>(sets) { tree_bytes(sets) + remembered } else { 0 };
-        let outside = if count_outside(geometry, sets) > 0 { tree_bytes(sets) } else { 0 };
-        let held = held.saturating_add(self.heap_bytes::<P>(geometry)).saturating_add(trees + outside);
         // On either side of a cut lie ghosts, a plane of bricks at most, of which only faces are stored.
+        let cuts = ranks.saturating_sub(1) as u64;
         let plane = grid.counts()[0].unsigned_abs().saturating_mul(grid.counts()[1].unsigned_abs());
         // Along with sweeps the faces of sources are kept a second time, as they were before.
         let swept = if matches!(self.schedule, Schedule::Sweep { .. }) { apart } else { 0 };
         let ghosts = plane.saturating_mul(2 * cuts).saturating_mul(faces * (element + swept));
-        let scratch = grid.len().saturating_mul((brick + faces) * element + faces * swept).saturating_add(ghosts);
-        let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
-        Needs { held, scratch, seconds }
-    }
-
-    /// Bytes that are held while the images are written, beside what the distance takes; `borders` says whether those of
-    /// labels are too.
-    #[must_use]
-    pub fn written_held<P: Precision>(
-        &self,
-        geometry: &Geometry,
-        sets: &DataSets,
-        borders: bool,
-        threads: usize,
-    ) -> u64 {
-        let wanted = Wanted { labels: self.labels, borders, closest_point: self.closest_point };
-        wanted.held::<P>(geometry, sets, threads)
+        grid.len().saturating_mul((brick + faces) * element + faces * swept).saturating_add(ghosts)
     }
 
     /// What one heap over the whole volume takes, where these settings call for one.

@@ -2,12 +2,14 @@
 //! help and the shared tests pick it up from the table.
 
 use super::Schedule;
+use super::costs;
 use super::readout::field::Solved;
 use super::solving::{Solving, dijkstra_pythagoras, fast_marching, fast_sweeping, vector_distance};
 use crate::error::Result;
 use crate::grid::BrickGrid;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::distance::whole_volume::{dijkstra_heap, marching_heap};
+use crate::tile::TileCost;
 
 /// Solves on the bricks of a set, by a schedule.
 pub(super) type Solve<P> = for<'a> fn(&Solving<'_, 'a>, Schedule) -> Result<Solved<'a, P>>;
@@ -41,6 +43,8 @@ pub struct Solver<P> {
     pub state_bytes: u64,
     /// Bytes of a voxel's source, where sources are asked for and not part of the state.
     pub source_bytes: u64,
+    /// What a thread takes for a brick of an edge, whether sources are points or triangles.
+    pub cost: fn(usize, Schedule) -> TileCost,
     /// Does it.
     pub solve: Solve<P>,
 }
@@ -82,6 +86,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             brick: 64,
             state_bytes: size_of::<P>() as u64,
             source_bytes: 4,
+            cost: costs::fast_sweeping::<P>,
             solve: fast_sweeping::<P>,
         },
         Solver {
@@ -92,6 +97,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             brick: 32,
             state_bytes: 4,
             source_bytes: 0,
+            cost: costs::vector_distance::<P>,
             solve: vector_distance::<P>,
         },
         Solver {
@@ -102,6 +108,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             brick: 32,
             state_bytes: size_of::<P>() as u64,
             source_bytes: 4,
+            cost: costs::fast_marching::<P>,
             solve: fast_marching::<P>,
         },
         Solver {
@@ -112,6 +119,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             brick: 32,
             state_bytes: 4,
             source_bytes: 0,
+            cost: costs::dijkstra_pythagoras::<P>,
             solve: dijkstra_pythagoras::<P>,
         },
     ]

@@ -22,3 +22,9 @@ pub(crate) const THREAD_BYTES: u64 = 4 << 20;
 pub(crate) const COARSE_VOXELS: u64 = 128 * 128 * 128 + 4 * 64 * 64 * 64;
 /// Seconds of one thread for a voxel near the cloud.
 pub(crate) const SECONDS_PER_NEAR_VOXEL: f64 = 2.5e-6;
+
+/// Bytes of memory that the box around a cloud of so many points holds while its surface is solved on so many of its cells.
+pub(crate) fn box_bytes(points: u64, grid_cells: u64, stored: u64) -> u64 {
+    let of_cells = grid_cells.saturating_mul(GRID_CELL_BYTES).saturating_add(stored.saturating_mul(STORED_CELL_BYTES));
+    points.saturating_mul(POINT_BYTES).saturating_add(of_cells)
+}

@@ -1,5 +1,6 @@
 //! Where a cloud's surface is solved: the box around it and the cells near it, for the run and for its estimate alike.
 
+use super::needs::box_bytes;
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, PointBins};
 use crate::kernel::level_set::cell::CELL;
 
@@ -16,6 +17,18 @@ pub struct Vicinity {
 }
 
 impl Vicinity {
+    /// The number of cells that the grid of such a box has, near the cloud or not.
+    #[must_use]
+    pub fn grid_cells(grid: &Geometry, cloud: &[[f64; 3]], farthest: f64) -> u64 {
+        BrickGrid::new(grid_around(grid, &voxel_bounds(cloud, grid), farthest).0.shape, CELL as i64).len()
+    }
+
+    /// What such a box holds while a surface is solved in it.
+    #[must_use]
+    pub(crate) fn held(&self, cloud: &[[f64; 3]]) -> u64 {
+        box_bytes(cloud.len() as u64, self.cells.grid().len(), self.cells.len() as u64)
+    }
+
     /// What lies within `farthest` (physical) of `cloud`.
     #[must_use]
     pub fn new(grid: &Geometry, cloud: &[[f64; 3]], farthest: f64) -> Self {

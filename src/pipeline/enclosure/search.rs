@@ -3,13 +3,14 @@
 
 use std::sync::Arc;
 
+use super::needs::box_bytes;
 use super::pockets::pockets;
 use super::region::{Vicinity, voxel_bounds};
 use super::sheets::{Company, hold_sheets};
 use super::tagging::{Basin, tag};
 use super::watershed::{Sides, watershed};
 use crate::error::Result;
-use crate::exec::{Engine, Stage};
+use crate::exec::{Engine, Hold, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::kernel::level_set::initial::persistence::PERSISTENCE;
 use crate::pipeline::distance::{Method, Sources, cloud_distance};
@@ -135,6 +136,8 @@ pub struct Enclosure {
     basins: Vec<Basin>,
     deepest: Option<Deepest>,
     sheet: Vec<u32>,
+    /// What the box takes of the memory.
+    held: Hold,
 }
 
 /// What a search ends with.
@@ -157,7 +160,7 @@ pub fn first_reach_for(grid: &Geometry, beta: Option<f64>) -> f64 {
 /// Looks for what the cloud encloses.
 ///
 /// # Errors
-/// When scratch runs out or the run is interrupted.
+/// When a box that has grown does not fit the memory, scratch runs out or the run is interrupted.
 pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     match (search.beta, search.start) {
         (None, Start::Watershed) => enclose_by_sides(engine, search),
@@ -250,18 +253,24 @@ fn automatic_beta(basins: &[Basin], grid: &Geometry) -> Option<f64> {
 struct Around {
     vicinity: Vicinity,
     distance: BrickArray<f32>,
+    held: Hold,
 }
 
 impl Around {
     fn new(engine: &Engine, search: &Search<'_>, farthest: f64) -> Result<Self> {
+        // The box grows with the reach: what it takes is held again, the tables of its grid before they are made.
+        let (points, cells) = (search.cloud.len() as u64, Vicinity::grid_cells(search.grid, search.cloud, farthest));
+        let tables = engine.hold(box_bytes(points, cells, 0))?;
         let vicinity = Vicinity::new(search.grid, search.cloud, farthest);
+        drop(tables);
+        let held = engine.hold(vicinity.held(search.cloud))?;
         let set = Arc::new(vicinity.cells.clone());
         let sources = Sources::cloud(&vicinity.geometry, search.cloud, &vicinity.bins);
         let stage = engine.stage(&format!("distance{}", search.suffix), 11 * set.len() as u64);
         stage.voxels((set.len() * set.grid().brick_len()) as u64);
         let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
         stage.finish();
-        Ok(Self { vicinity, distance })
+        Ok(Self { vicinity, distance, held })
     }
 
     fn sources<'a>(&'a self, search: &Search<'a>) -> Sources<'a> {
@@ -302,9 +311,10 @@ impl Around {
         basins: Vec<Basin>,
         sheet: Vec<u32>,
     ) -> Enclosure {
-        let Vicinity { geometry, window, .. } = self.vicinity;
+        let (geometry, window) = (self.vicinity.geometry.clone(), self.vicinity.window);
         let deepest = Deepest::of(&basins, &geometry);
-        Enclosure { geometry, window, beta, reaches, distance: self.distance, inside, basins, deepest, sheet }
+        let Self { distance, held, .. } = self;
+        Enclosure { geometry, window, beta, reaches, distance, inside, basins, deepest, sheet, held }
     }
 }
 
@@ -335,14 +345,14 @@ impl Enclosure {
         &self.sheet
     }
 
-    /// Makes the band; the fields of the search go.
+    /// Makes the band; the fields of the search go. What the box takes of the memory is held until the guard goes.
     ///
     /// # Errors
     /// When scratch runs out or the run is interrupted.
-    pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<Band> {
+    pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<(Band, Hold)> {
         let stage = engine.stage(&format!("band{suffix}"), self.inside.set().len() as u64);
         let band = make_band(&stage, engine, &self.distance, &self.inside, self.reaches)?;
         stage.finish();
-        Ok(band)
+        Ok((band, self.held))
     }
 }

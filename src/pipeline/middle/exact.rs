@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::exec::{Stage, Workers};
+use crate::exec::{Hold, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId};
 use crate::kernel::distance::features::exact_labels::ExactLabels;
 use crate::kernel::distance::state::precision::Precision;
@@ -22,6 +22,8 @@ struct Corrected<'a, P> {
     grid: BrickGrid,
     /// By brick.
     changes: BTreeMap<BrickId, Vec<Change>>,
+    /// What they take of the memory: how many voxels have the wrong label, only the run tells.
+    _held: Hold,
 }
 
 /// A voxel, its nearest source and how far that is.
@@ -93,7 +95,7 @@ impl<P: Precision> Together<P> for Corrected<'_, P> {
 /// A solved distance with the sources of the wrong label replaced by the nearest.
 ///
 /// # Errors
-/// When the run is interrupted.
+/// When what is remembered does not fit the memory, or the run is interrupted.
 pub(super) fn with_exact_labels<'a, P: Precision>(
     stage: &Stage<'_>,
     exact: &ExactLabels<'_>,
@@ -112,8 +114,10 @@ pub(super) fn with_exact_labels<'a, P: Precision>(
         };
         Ok(exact.corrections(&part, sources).into_iter().map(change).collect::<Vec<_>>())
     })?;
-    let changes = bricks.into_iter().zip(changes).filter(|(_, changes)| !changes.is_empty()).collect();
+    let bytes = changes.iter().map(|changes| (changes.capacity() * size_of::<Change>()) as u64).sum();
+    let held = stage.hold(bytes)?;
+    let changes: BTreeMap<_, _> = bricks.into_iter().zip(changes).filter(|(_, changes)| !changes.is_empty()).collect();
     let Solved { values, sources, together, .. } = solved;
-    let corrected = Arc::new(Corrected { values, sources, together, grid: *grid, changes });
+    let corrected = Arc::new(Corrected { values, sources, together, grid: *grid, changes, _held: held });
     Ok(Solved { values: corrected.clone(), sources: corrected.clone(), together: Some(corrected), ..solved })
 }

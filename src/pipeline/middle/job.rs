@@ -33,8 +33,8 @@ pub struct MiddleFound {
 /// and a table of the measures, none when it is absent.
 ///
 /// # Errors
-/// When there are fewer than two sets, the mesh is not taken, the output cannot be written, scratch runs out, or the run is
-/// interrupted.
+/// When there are fewer than two sets, the memory is too little, the mesh is not taken, the output cannot be written, scratch
+/// runs out, or the run is interrupted.
 pub fn middle<P: Precision>(
     engine: &Engine,
     geometry: &Geometry,
@@ -59,6 +59,8 @@ pub fn middle_kept<P: Precision>(
     mesh: &mut dyn MeshSink,
 ) -> Result<MiddleFound> {
     refuse(sets, settings.surface)?;
+    let needs = settings.needs::<P>(geometry, sets, engine.threads(), engine.ranks(), store.is_some());
+    let _held = engine.reserve(needs.footprint)?;
     let distance = DistanceSettings { labels: true, ..settings.distance };
     let trees = SourceTrees::new(sets);
     solve_sets::<P, _>(engine, geometry, sets, Some(&trees), &distance, |mut solved, set| {

@@ -1,10 +1,11 @@
 //! What `middle` is asked for.
 
-use super::surface::SurfaceKind;
-use super::surface::held;
+use super::surface::{SurfaceKind, drawing};
+use crate::exec::Footprint;
 use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::state::precision::Precision;
-use crate::pipeline::distance::{DistanceSettings, Needs, tree_bytes};
+use crate::kernel::geometry::triangle::Triangle;
+use crate::pipeline::distance::{DistanceSettings, Needs, Writes, tree_bytes};
 
 /// How labels are told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,12 +31,24 @@ pub struct MiddleSettings {
 }
 
 impl MiddleSettings {
-    /// What these settings take on a grid, on so many threads that so many ranks share.
+    /// What these settings take on a grid, on so many threads that so many ranks share; `writes` says whether there is a
+    /// store.
     #[must_use]
-    pub fn needs<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, threads: usize, ranks: usize) -> Needs {
+    pub fn needs<P: Precision>(
+        &self,
+        geometry: &Geometry,
+        sets: &DataSets,
+        threads: usize,
+        ranks: usize,
+        writes: bool,
+    ) -> Needs {
         let distance = DistanceSettings { labels: true, ..self.distance };
-        let needs = distance.needs::<P>(geometry, sets, threads, ranks);
+        let fields = if writes { Writes::FieldsAndBorders } else { Writes::Nothing };
+        let needs = distance.needs::<P>(geometry, sets, [threads, ranks], fields);
         let trees = if distance.looks_closer::<P>(sets) { 0 } else { tree_bytes(sets) };
-        Needs { held: needs.held + trees + held(geometry), ..needs }
+        // A copy of the triangles of their own, for what lies on labels' borders.
+        let shapes = (sets.mesh.len() * size_of::<Triangle>()) as u64;
+        let footprint = needs.footprint.and(Footprint::of_all(trees + shapes)).and(drawing(geometry));
+        Needs { footprint, held: footprint.bytes(threads as u64), ..needs }
     }
 }

@@ -1,7 +1,7 @@
 //! Draws the surfaces between labels brick by brick, welded in grid order, and measures them.
 
 use crate::error::Result;
-use crate::exec::{Stage, Workers};
+use crate::exec::{Footprint, Stage, Workers};
 use crate::grid::Geometry;
 use crate::grid::{Box3, BrickGrid, BrickId};
 use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
@@ -12,20 +12,20 @@ use crate::kernel::surface::{
     Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder,
     cells_of_brick,
 };
+use crate::pipeline::output::drawn::{Drawn, STATED};
 use crate::store::{BoxSource, MeshSink};
 
-/// Boxes whose patches are made in parallel before they are welded in order.
-const BATCH: usize = 64;
 /// Edge of the boxes that the surface is drawn in, whatever the bricks are: so these do not tell the order of vertices.
 const EDGE: i64 = 32;
-/// Bytes of a patch for each voxel of one side of its box: vertices, triangles and their tables.
-const PATCH_BYTES: u64 = 600;
 
-/// Memory that drawing holds: patches, and what is remembered of the layer that is drawn. Surfaces that are larger than a
-/// few planes through the grid take more.
-pub(super) fn held(geometry: &Geometry) -> u64 {
+/// Bytes of what is remembered for each voxel of the layer that is drawn.
+const LAYER_BYTES: u64 = 64;
+
+/// Memory that drawing holds: patches, and what is remembered of the layer that is drawn. What surfaces take that
+/// are larger than a few planes through the grid is held as they are drawn.
+pub(super) fn drawing(geometry: &Geometry) -> Footprint {
     let plane = libm::cbrt(geometry.domain().volume() as f64).powi(2) as u64;
-    BATCH as u64 * (EDGE * EDGE) as u64 * PATCH_BYTES + 64 * plane
+    Footprint::of_all(STATED + LAYER_BYTES * plane)
 }
 
 /// The voxels' nearest sources and what they are.
@@ -68,7 +68,10 @@ pub(super) fn draw(
     };
     let workers = Workers::new(make);
     let bricks: Vec<BrickId> = (0..grid.len()).collect();
-    for batch in bricks.chunks(BATCH) {
+    let (mut drawn, mut left) = (Drawn::new(stage), bricks.as_slice());
+    while !left.is_empty() {
+        let batch;
+        (batch, left) = left.split_at(drawn.batch().min(left.len()));
         let patches = stage.run(batch, &workers, |worker, &id| worker.patch(labelled, &grid.brick_box(id), kind))?;
         for patch in patches.iter().filter(|patch| !patch.patch.triangles.is_empty()) {
             welder.add(&patch.patch, sink)?;
@@ -78,6 +81,7 @@ pub(super) fn draw(
                 pairs.add(patch.patch.pairs[n], positions, distances);
             }
         }
+        drawn.took(patches.iter().map(TaggedPatch::bytes), welder.bytes() + measure.bytes(), left.len())?;
     }
     Ok((measure.measures(), pairs.finish()))
 }

@@ -2,12 +2,11 @@
 
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
+use crate::exec::Footprint;
 use crate::grid::digits::{bytes, grouped};
 use crate::grid::{BrickGrid, Geometry};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
-use crate::pipeline::enclosure::needs::{
-    COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, POINT_BYTES, STORED_CELL_BYTES, THREAD_BYTES,
-};
+use crate::pipeline::enclosure::needs::{COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, THREAD_BYTES};
 use crate::pipeline::enclosure::region::Vicinity;
 use crate::pipeline::enclosure::search::first_reach_for;
 use crate::pipeline::laying::check_counts;
@@ -33,6 +32,16 @@ const SIDES_BYTES: u64 = 13;
 /// Seconds of one thread for a voxel near the cloud, that of a second search within twice the reach included.
 const SECONDS_PER_NEAR_VOXEL: f64 = 6e-7;
 
+/// Bytes of a point while the spacing of all is told: it and its copies in order, its distance, its node of a tree, and
+/// where copies are thinned out its place in a table.
+const SPACING_BYTES: u64 = 320;
+
+/// Bytes of memory that so many points take while their spacing is told.
+#[must_use]
+pub fn spacing_memory(points: usize) -> u64 {
+    points as u64 * SPACING_BYTES
+}
+
 /// Bytes of memory that a grid takes for its cells alone, told without taking any.
 fn least_memory(grid: &Geometry) -> u64 {
     BrickGrid::new(grid.shape, CELL as i64).len().saturating_mul(GRID_CELL_BYTES)
@@ -56,6 +65,20 @@ pub fn refuse_too_fine(grid: &Geometry, memory: u64) -> Result<()> {
     )))
 }
 
+/// What a thread takes to solve, and to write.
+pub(super) const BUFFERS: Footprint = Footprint::of_thread(THREAD_BYTES);
+pub(super) const WRITING: Footprint = Footprint::of_thread(COARSE_VOXELS * size_of::<f32>() as u64);
+
+/// The box that the search begins with.
+pub(super) fn begin(grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructSettings) -> Vicinity {
+    Vicinity::new(grid, cloud, first_reach_for(grid, settings.beta))
+}
+
+/// What that box holds; it may grow.
+pub(super) fn boxes(vicinity: &Vicinity, cloud: &[[f64; 3]]) -> Footprint {
+    Footprint::of_boxes(vicinity.held(cloud))
+}
+
 /// Estimates a reconstruction on a grid with so many threads; `writes` says whether there is an output.
 #[must_use]
 pub fn estimate(
@@ -65,13 +88,11 @@ pub fn estimate(
     threads: u64,
     writes: bool,
 ) -> Estimate {
-    let cells = Vicinity::new(grid, cloud, first_reach_for(grid, settings.beta)).cells;
-    let (stored, near_voxels) = (cells.len() as u64, (cells.len() * CELL_LEN) as u64);
-    let points = cloud.len() as u64;
-    let solving = points * POINT_BYTES + cells.grid().len() * GRID_CELL_BYTES + stored * STORED_CELL_BYTES;
-    let writing = if writes { threads * COARSE_VOXELS * 4 } else { 0 };
+    let vicinity = begin(grid, cloud, settings);
+    let near_voxels = (vicinity.cells.len() * CELL_LEN) as u64;
+    let working = if writes { BUFFERS.or(WRITING, threads) } else { BUFFERS };
     Estimate {
-        held: solving + (threads * THREAD_BYTES).max(writing),
+        held: boxes(&vicinity, cloud).and(working).bytes(threads).max(spacing_memory(cloud.len())),
         scratch: SIDES_BYTES * near_voxels,
         least_scratch: DISTANCE_BYTES * near_voxels,
         near_voxels,

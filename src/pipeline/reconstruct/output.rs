@@ -2,11 +2,12 @@
 
 use std::fmt;
 
+use super::estimate::{BUFFERS, WRITING, begin, boxes};
 use super::flat::flat;
 use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
-use crate::exec::{Engine, Stage};
+use crate::exec::{Engine, Hold, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
@@ -51,6 +52,8 @@ pub struct Reconstruction {
     band: Band,
     /// Where the box that they were solved on lies in the grid, where these are not the same.
     window: Option<Box3>,
+    /// What they take of the memory as long as they are there.
+    _held: [Hold; 2],
 }
 
 impl fmt::Debug for Reconstruction {
@@ -85,8 +88,9 @@ impl Reconstruction {
     /// Writes the fields.
     ///
     /// # Errors
-    /// When the output cannot be written, scratch runs out, or the run is interrupted.
+    /// When the memory is too little, the output cannot be written, scratch runs out, or the run is interrupted.
     pub fn write(&self, engine: &Engine, store: &StoreWriter) -> Result<()> {
+        let _buffers = engine.hold(WRITING.bytes(engine.threads() as u64))?;
         let geometry = &self.geometry;
         let farthest = f64::from(self.band.distance.absent(0));
         let fields: [(&str, &str, &dyn BoxSource<f32>, f64); 2] =
@@ -112,7 +116,7 @@ impl Reconstruction {
 /// the surface. Distance and level set are solved by all ranks of the engine, whose number changes no bit.
 ///
 /// # Errors
-/// When the cloud encloses nothing, the surface vanishes, the mesh is not taken, scratch runs out, or the run is
+/// When the memory is too little, the cloud encloses nothing, the surface vanishes, the mesh is not taken, scratch runs out, or the run is
 /// interrupted.
 pub fn reconstruct(
     engine: &Engine,
@@ -121,6 +125,8 @@ pub fn reconstruct(
     settings: &ReconstructSettings,
     mesh: &mut dyn MeshSink,
 ) -> Result<Reconstruction> {
+    let _buffers = engine.reserve(BUFFERS)?;
+    let held = engine.reserve(boxes(&begin(grid, cloud, settings), cloud))?;
     let search = Search {
         grid,
         cloud,
@@ -142,7 +148,7 @@ pub fn reconstruct(
     let window = enclosure.window;
     let larger_beta = enclosure.larger_beta();
     let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
-    let mut band = enclosure.into_band(engine, "")?;
+    let (mut band, held_by_box) = enclosure.into_band(engine, "")?;
     let stage = engine.stage("level set", 0);
     stage.voxels(band.voxels);
     let time_loop = settings.motion.time_loop(&geometry);
@@ -179,6 +185,7 @@ pub fn reconstruct(
         lost_points,
         band,
         window: settings.keeps_grid.then_some(window),
+        _held: [held, held_by_box],
     })
 }
 

@@ -3,7 +3,7 @@
 use super::picture::{Picture, name};
 use super::settings::SegmentSettings;
 use crate::error::Result;
-use crate::exec::Engine;
+use crate::exec::{Engine, Hold};
 use crate::grid::{Box3, Geometry};
 use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::image::intensity::Normalised;
@@ -54,6 +54,8 @@ pub(crate) struct Begun {
     pub hole: Option<Hole>,
     /// True where it is too thin for the grid to move, and stays what its outlines say.
     pub rests: bool,
+    /// What its box takes of the memory.
+    pub held: Hold,
 }
 
 impl Begun {
@@ -66,7 +68,7 @@ impl Begun {
         settings: &SegmentSettings,
         forces: &Forces,
     ) -> Result<Solution> {
-        let Self { geometry, window, mut band, distance, cloud_points, beta, hole, rests } = self;
+        let Self { geometry, window, mut band, distance, cloud_points, beta, hole, rests, held: _held } = self;
         let look = || edge_field(engine, picture, marks, settings, &geometry, window, &band);
         let edges = forces.edges.then(look).transpose()?;
         let mut time_loop = settings.motion.time_loop(&geometry);

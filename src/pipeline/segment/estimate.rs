@@ -8,11 +8,11 @@ use super::neighbours::needs;
 use super::outlined::shape_start::BAND;
 use super::reach::first_reach;
 use super::settings::{Guides, SegmentSettings};
+use crate::exec::Footprint;
 use crate::grid::{Box3, BrickGrid};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
 use crate::pipeline::enclosure::needs::{
-    COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, KEPT_BYTES, POINT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES,
-    STORED_CELL_BYTES, THREAD_BYTES,
+    COARSE_VOXELS, DISTANCE_BYTES, KEPT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES, THREAD_BYTES, box_bytes,
 };
 use crate::pipeline::enclosure::region::Vicinity;
 use crate::pipeline::image::smoothing::thread_bytes;
@@ -23,7 +23,9 @@ use crate::store::VolumeSource;
 /// What a run is expected to take.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
-    /// Bytes that must be in memory at one time, beside the window of scratch pages.
+    /// What must be in memory at one time, beside the window of scratch pages.
+    pub footprint: Footprint,
+    /// The same on all threads, bytes.
     pub held: u64,
     /// Bytes of memory that are probably in use at one time beside fields, the program itself included.
     pub working: u64,
@@ -63,6 +65,11 @@ const HISTOGRAM_BYTES: u64 = 10 << 20;
 /// Memory that a thread takes to fit outlines.
 const FIT_BYTES: u64 = 8 << 20;
 
+/// What is kept of each object when it is solved, until all are joined: for a cell of its box, stored or not, its slot and the
+/// values of both fields where they are not stored; for a stored one its number and the locks of both fields and their faces.
+const KEPT_GRID_CELL_BYTES: u64 = 12;
+const KEPT_CELL_BYTES: u64 = 64;
+
 /// What an outline and an object's profiles take for each point of its cloud where that is less than the above.
 const OUTLINED_POINT_BYTES: u64 = 512;
 
@@ -71,8 +78,9 @@ const OUTLINED_POINT_BYTES: u64 = 512;
 struct Counts {
     /// The most of one object's points.
     points: u64,
-    /// The most of one object's cells, stored or not.
+    /// The most of one object's cells, stored or not, and those of all.
     grid_cells: u64,
+    all_grid_cells: u64,
     /// The most of one object's cells that its search begins with.
     largest: u64,
     /// Such cells of all objects.
@@ -109,6 +117,7 @@ impl Counts {
     /// Adds an object with so many cells, of which its search begins with some, and its band probably has some.
     fn add(&mut self, grid_cells: u64, [first, band]: [u64; 2]) {
         self.grid_cells = self.grid_cells.max(grid_cells);
+        self.all_grid_cells += grid_cells;
         (self.largest, self.near) = (self.largest.max(first), self.near + first);
         self.bands = [self.bands[0].max(band), self.bands[1] + band];
     }
@@ -140,35 +149,71 @@ pub fn estimate(
     writes: bool,
 ) -> Estimate {
     let size = stack.element().size() as u64;
-    let natural = Box3::from_shape(stack.natural_shape()).volume() * size;
-    let Counts { points, grid_cells, largest, near, bands, outlines } = Counts::new(guides, settings);
+    let counts = Counts::new(guides, settings);
+    let Counts { points, grid_cells, largest, near, bands, outlines, .. } = counts;
     let voxels = crop.volume();
     let grid = BrickGrid::new(crop.shape(), settings.brick);
     let image = grid.len() * grid.brick_len() as u64 * size;
     let (largest_voxels, near_voxels) = (largest * CELL_LEN as u64, near * CELL_LEN as u64);
-    // While the image comes in: a natural box, what its decoding takes, and a histogram.
-    let reading = threads * (natural + stack.decoding_bytes() + HISTOGRAM_BYTES);
-    let cells = points * POINT_BYTES + grid_cells * GRID_CELL_BYTES + largest * STORED_CELL_BYTES;
-    let solving = outlines[0] + threads * FIT_BYTES + cells;
-    let writing = if writes { threads * COARSE_VOXELS * size.max(4) } else { 0 };
-    // Decoders keep their buffers.
-    let decoders = threads * natural;
-    let [joining, joined] =
-        if guides.objects.len() > 1 { needs(guides.geometry, settings.fill_gaps, threads) } else { [0; 2] };
+    let decoders = decoded(stack);
+    let buffers = smoothing(guides, settings, size);
+    let (joining, joined) = joining(guides, settings, threads);
+    let footprint = footprint(stack, &counts, [buffers, joining], threads, writes);
     let coarse = if writes { voxels * size * 3 / 4 } else { 0 };
-    let buffers = if settings.smoothing == Smoothing::Gaussian && settings.uses_image() {
-        THREAD_BYTES.max(thread_bytes(guides.geometry.spacing, [settings.sigma_on(guides.geometry); 3], size))
-    } else {
-        THREAD_BYTES
-    };
+    let cells = box_bytes(points, grid_cells, largest);
     Estimate {
-        held: reading.max(decoders + (solving + threads * buffers).max(writing).max(joining)),
-        working: PROGRAM_BYTES + decoders + outlines[1] + cells + threads * buffers,
+        footprint,
+        held: footprint.bytes(threads),
+        working: PROGRAM_BYTES + outlines[1] + cells + decoders.and(buffers).bytes(threads),
         fields: image + (SOLVE_BYTES * bands[0] + KEPT_BYTES * bands[1]) * CELL_LEN as u64,
         scratch: image + (SOLVE_BYTES * largest_voxels).max(coarse).max(joined) + KEPT_BYTES * near_voxels,
         least_scratch: image + DISTANCE_BYTES * largest_voxels,
         output: if writes { voxels * (size + 1) * 3 / 2 + 5 * near_voxels } else { 0 },
         near_voxels,
         seconds: (near_voxels as f64 * SECONDS_PER_NEAR_VOXEL + voxels as f64 * SECONDS_PER_VOXEL) / threads as f64,
+    }
+}
+
+/// What is in memory at one time: while the image comes in; then, decoders keeping their buffers, while objects are solved,
+/// fields written, or neighbours joined.
+fn footprint(
+    stack: &dyn VolumeSource,
+    counts: &Counts,
+    [buffers, joining]: [Footprint; 2],
+    threads: u64,
+    writes: bool,
+) -> Footprint {
+    let size = stack.element().size() as u64;
+    let decoders = decoded(stack);
+    let reading = decoders.and(Footprint::of_thread(stack.decoding_bytes() + HISTOGRAM_BYTES));
+    let boxes = Footprint::of_boxes(box_bytes(counts.points, counts.grid_cells, counts.largest));
+    let outlines = Footprint::of_all(counts.outlines[0]).and(Footprint::of_thread(FIT_BYTES));
+    let solving = boxes.and(outlines).and(buffers);
+    let writing = Footprint::of_thread(if writes { COARSE_VOXELS * size.max(4) } else { 0 });
+    let kept = Footprint::of_all(counts.all_grid_cells * KEPT_GRID_CELL_BYTES + counts.near * KEPT_CELL_BYTES);
+    let later = solving.or(writing, threads).or(joining, threads);
+    reading.or(decoders.and(kept).and(later), threads)
+}
+
+/// A box as it is stored, decoded, of each thread.
+fn decoded(stack: &dyn VolumeSource) -> Footprint {
+    let natural = Box3::from_shape(stack.natural_shape()).volume();
+    Footprint::of_thread(natural.saturating_mul(stack.element().size() as u64))
+}
+
+/// Buffers of a thread for cells, and to smooth the image where that takes more.
+fn smoothing(guides: &Guides<'_>, settings: &SegmentSettings, sample: u64) -> Footprint {
+    let smooths = settings.smoothing == Smoothing::Gaussian && settings.uses_image();
+    let sigma = [settings.sigma_on(guides.geometry); 3];
+    let bytes = if smooths { thread_bytes(guides.geometry.spacing, sigma, sample) } else { 0 };
+    Footprint::of_thread(THREAD_BYTES.max(bytes))
+}
+
+/// What joining several objects takes, of memory and of scratch.
+fn joining(guides: &Guides<'_>, settings: &SegmentSettings, threads: u64) -> (Footprint, u64) {
+    if guides.objects.len() > 1 {
+        needs(guides.geometry, settings.fill_gaps, threads)
+    } else {
+        (Footprint::default(), 0)
     }
 }

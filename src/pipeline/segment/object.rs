@@ -56,12 +56,12 @@ pub(super) fn solve<T: Element>(
     };
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
     let (beta, larger_beta) = (enclosure.beta, enclosure.larger_beta());
-    let band = enclosure.into_band(engine, &suffix)?;
+    let (band, held) = enclosure.into_band(engine, &suffix)?;
     // Marks that a cloud is made of are dense, and edges make results worse where marks are good.
     let edges = !loose || settings.image == ImageModel::Edge;
     let forces = Forces { edges: edges && settings.uses_image(), ..Forces::of_settings(settings) };
-    let begun =
-        Begun { geometry, window, band, distance: None, cloud_points: cloud.len() as u64, beta, hole, rests: false };
+    let cloud_points = cloud.len() as u64;
+    let begun = Begun { geometry, window, band, distance: None, cloud_points, beta, hole, rests: false, held };
     Ok(Solution { larger_beta, ..begun.solve(engine, picture, marks, settings, &forces)? })
 }
 

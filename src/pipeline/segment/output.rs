@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::begun::Solution;
+use super::estimate::estimate;
 use super::kept::{Kept, labels_of, objects_of};
 use super::labels::Placed;
 use super::neighbours::{Found, Joined};
@@ -50,7 +51,7 @@ pub const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
 /// Segments the part `crop` of a stack; `store` gets the results, none of them when it is absent.
 ///
 /// # Errors
-/// When the stack or the marks cannot be used, the output cannot be written, scratch runs out, or the run is
+/// When the memory is too little, the stack or the marks cannot be used, the output cannot be written, scratch runs out, or the run is
 /// interrupted.
 pub fn segment(
     engine: &Engine,
@@ -101,6 +102,8 @@ impl SampleWork for Job<'_> {
 
 fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let Job { engine, stack, crop, guides, settings, store, keeps } = *job;
+    let needs = estimate(stack, crop, guides, settings, engine.threads() as u64, store.is_some());
+    let _held = engine.reserve(needs.footprint)?;
     let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
     let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
     stage.finish();

@@ -12,6 +12,7 @@ use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{BrickGrid, BrickSet, Geometry};
 use crate::kernel::level_set::cell::CELL;
 use crate::kernel::level_set::initial::ball;
+use crate::pipeline::enclosure::needs::box_bytes;
 use crate::pipeline::level_set::band::Band;
 use crate::pipeline::marks::{ObjectMarks, Seed};
 use crate::store::{BrickArray, Element};
@@ -28,10 +29,12 @@ pub(super) fn grow<T: Element>(
     let window = geometry.domain();
     let stage = engine.stage(&name("seed", marks), 0);
     stage.voxels(window.volume());
+    let cells = BrickGrid::new(geometry.shape, CELL as i64).len();
+    let held = engine.hold(box_bytes(0, cells, cells))?;
     let band = start_as_ball(&stage, engine, &geometry, seed)?;
     stage.finish();
     let forces = Forces::of_settings(settings);
-    Begun { geometry, window, band, distance: None, cloud_points: 0, beta: 0.0, hole: None, rests: false }
+    Begun { geometry, window, band, distance: None, cloud_points: 0, beta: 0.0, hole: None, rests: false, held }
         .solve(engine, picture, marks, settings, &forces)
 }
 

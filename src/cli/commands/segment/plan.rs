@@ -19,7 +19,7 @@ impl Job {
     }
 
     /// Refuses a run that cannot fit memory or disk.
-    pub(crate) fn fits(&self, estimate: &Estimate) -> Result<u64> {
+    pub(crate) fn fits(&self, estimate: &Estimate) -> Result<()> {
         let window = Budget { total: self.resources.memory }.window(estimate.held)?;
         Disk {
             what: format!("an image with {} voxels near the marks", grouped(estimate.near_voxels)),
@@ -29,8 +29,7 @@ impl Job {
             written: estimate.output,
             coarser: "a part of the image with --crop; a spacing of the image that is wrong is put right with --image-spacing",
         }
-        .check(&self.console)?;
-        Ok(window)
+        .check(&self.console)
     }
 
     /// The image and its settings in a few lines.

@@ -12,7 +12,7 @@ use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Real;
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
-use crate::tile::HaloTile;
+use crate::tile::{HaloTile, TileCost};
 
 /// VDT with 26 neighbours to the sources of `S`.
 #[derive(Clone, Debug)]
@@ -124,6 +124,10 @@ impl<S: TrackedSource> DistanceMethod for AllNeighbours<S> {
     }
 
     fn work(_: usize) {}
+
+    fn cost(edge: usize) -> TileCost {
+        TileCost::grown(edge, 0)
+    }
 
     fn settle(&self, tile: &mut HaloTile<SourceState>, (): &mut (), part: &Box3) -> bool {
         let first = downhill(tile, |at, state| {

@@ -15,8 +15,8 @@ use crate::grid::{Box3, Geometry, NEIGHBOURS_26, SourceState};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Real;
-use crate::kernel::distance::tile_order::buckets::Buckets;
-use crate::tile::HaloTile;
+use crate::kernel::distance::tile_order::buckets::{Buckets, LISTED_BYTES, QUEUE_BYTES};
+use crate::tile::{HaloTile, TileCost};
 
 /// Width of a bucket, in the smallest spacing.
 const WIDTH: f64 = 0.5;
@@ -245,6 +245,12 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
 
     fn work(edge: usize) -> Self::Work {
         Work::new(edge)
+    }
+
+    fn cost(edge: usize) -> TileCost {
+        // Sources and squared distances; the places that fell and those that are taken.
+        let lists = 2 * LISTED_BYTES;
+        TileCost::grown(edge, (size_of::<SourceState>() + size_of::<S::Number>()) as u64 + QUEUE_BYTES + lists)
     }
 
     fn settle(&self, tile: &mut HaloTile<SourceState>, work: &mut Self::Work, part: &Box3) -> bool {

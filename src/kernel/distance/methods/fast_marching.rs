@@ -16,8 +16,8 @@ use super::upwind::{Axes, godunov};
 use crate::grid::Box3;
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::precision::{Precision, Real};
-use crate::kernel::distance::tile_order::buckets::Buckets;
-use crate::tile::HaloTile;
+use crate::kernel::distance::tile_order::buckets::{Buckets, LISTED_BYTES, QUEUE_BYTES};
+use crate::tile::{HaloTile, TileCost};
 
 /// Voxels updated at a time.
 const LANES: usize = 8;
@@ -211,6 +211,12 @@ impl<P: Precision, A: Real> DistanceMethod for FastMarching<P, A> {
 
     fn work(edge: usize) -> Self::Work {
         Work::new(edge)
+    }
+
+    fn cost(edge: usize) -> TileCost {
+        // Values and what is listed; the places that are listed, that fell and that are taken.
+        let lists = 3 * LISTED_BYTES;
+        TileCost::grown(edge, (size_of::<P::Lane>() + size_of::<bool>()) as u64 + QUEUE_BYTES + lists)
     }
 
     fn settle(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3) -> bool {

@@ -15,7 +15,7 @@ use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::state::precision::{Precision, Real};
 use crate::kernel::distance::tile_order::diagonals::{Diagonals, MOST_LANES, has_wide_vectors};
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
-use crate::tile::HaloTile;
+use crate::tile::{HaloTile, TileCost};
 
 /// FSM stored as `P`, computed in `A`.
 #[derive(Clone, Copy, Debug)]
@@ -259,6 +259,10 @@ impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
 
     fn work(edge: usize) -> Self::Work {
         Work { data: vec![P::Lane::default().marked(); Diagonals::len(edge)], layout: Diagonals::new(edge) }
+    }
+
+    fn cost(edge: usize) -> TileCost {
+        TileCost { halo: 1, scratch: (Diagonals::len(edge) * size_of::<P::Lane>()) as u64 }
     }
 
     fn settle(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3) -> bool {

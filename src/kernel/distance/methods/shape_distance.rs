@@ -12,7 +12,7 @@ use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::state::source::squared_distance;
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
 use crate::kernel::geometry::triangle::Triangle;
-use crate::tile::HaloTile;
+use crate::tile::{HaloTile, TileCost};
 
 /// VDT to points and triangles.
 #[derive(Clone, Debug)]
@@ -197,6 +197,10 @@ impl DistanceMethod for ShapeDistance<'_> {
 
     fn work(edge: usize) -> Asked {
         Asked::new(edge)
+    }
+
+    fn cost(edge: usize) -> TileCost {
+        TileCost::grown(edge, (size_of::<f64>() + size_of::<u8>()) as u64)
     }
 
     fn settle(&self, tile: &mut HaloTile<SourceState>, asked: &mut Asked, part: &Box3) -> bool {

@@ -15,7 +15,7 @@ use crate::kernel::distance::state::source::squared_distance;
 use crate::kernel::distance::tile_order::diagonals::{Diagonals, MOST_LANES, Run, has_wide_vectors};
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
 use crate::kernel::distance::tile_order::dirty::Due;
-use crate::tile::HaloTile;
+use crate::tile::{HaloTile, TileCost};
 
 /// VDT to points, compared in `A`.
 #[derive(Clone, Debug)]
@@ -320,6 +320,12 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
 
     fn work(edge: usize) -> Work<A> {
         Work::new(edge)
+    }
+
+    fn cost(edge: usize) -> TileCost {
+        // Sources and their three coordinates along diagonals; a flag for each of these.
+        let laid_out = Diagonals::len(edge) * (size_of::<SourceState>() + 3 * size_of::<A>());
+        TileCost { halo: 1, scratch: (laid_out + Due::len(edge)) as u64 }
     }
 
     fn settle(&self, tile: &mut HaloTile<SourceState>, work: &mut Work<A>, part: &Box3) -> bool {

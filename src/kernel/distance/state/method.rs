@@ -5,7 +5,7 @@
 use super::neighbours::Neighbours;
 use crate::grid::Box3;
 use crate::store::Element;
-use crate::tile::HaloTile;
+use crate::tile::{HaloTile, TileCost};
 
 /// A way to carry distance from fixed voxels outward. Values only ever fall; fixed voxels keep what they
 /// start with.
@@ -32,6 +32,9 @@ pub trait DistanceMethod: Send + Sync {
 
     /// Buffers for tiles of `edge`^3 voxels.
     fn work(edge: usize) -> Self::Work;
+
+    /// What a thread takes for tiles of `edge`^3 voxels: the halo that is read, and those buffers.
+    fn cost(edge: usize) -> TileCost;
 
     /// Relaxes a tile, whose lowest voxel lies at `part.lo`, until no voxel of it can fall. Halo 1.
     /// Returns whether any voxel changed.

@@ -12,6 +12,11 @@ const NONE: u16 = u16::MAX;
 /// The most buckets; values beyond the last one share it.
 const MOST: usize = 4096;
 
+/// Bytes of a place in a list: its number, in room that doubles when it is used up.
+pub(crate) const LISTED_BYTES: u64 = 8;
+/// Bytes of a queue for each place: its bucket, and its place in this one's list and in one that it has left.
+pub(crate) const QUEUE_BYTES: u64 = 2 + 2 * LISTED_BYTES;
+
 /// Buckets of places.
 #[derive(Debug)]
 pub(crate) struct Buckets<A> {

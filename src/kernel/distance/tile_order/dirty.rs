@@ -27,8 +27,12 @@ const FIRST: usize = 2;
 impl Due {
     /// For a tile of `edge`^3 voxels.
     pub(crate) fn new(edge: usize) -> Self {
-        let row = 2 * (edge + 2);
-        Self { flags: vec![false; row * (edge + 2)], row, last: 2 * edge }
+        Self { flags: vec![false; Self::len(edge)], row: 2 * (edge + 2), last: 2 * edge }
+    }
+
+    /// Diagonals of all planes of such a tile.
+    pub(crate) fn len(edge: usize) -> usize {
+        2 * (edge + 2) * (edge + 2)
     }
 
     /// All of a tile of which so many voxels are in use are due.

@@ -28,6 +28,12 @@ impl Components {
         self.count
     }
 
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.forest.bytes()
+    }
+
     /// Number of vertices that triangles have.
     #[must_use]
     pub fn vertices(&self) -> u64 {

@@ -29,6 +29,12 @@ impl EdgeTally {
         self.open
     }
 
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        table_bytes(&self.waiting)
+    }
+
     fn walk(&mut self, from: u32, to: u32) {
         if let Some(count) = self.waiting.get_mut(&(to, from)) {
             self.open -= 1;
@@ -41,6 +47,11 @@ impl EdgeTally {
             *self.waiting.entry((from, to)).or_insert(0) += 1;
         }
     }
+}
+
+/// Bytes of a table: for each place an entry and a byte, an eighth of them empty.
+pub(super) fn table_bytes<K, V>(table: &HashMap<K, V>) -> u64 {
+    (table.capacity() + table.capacity() / 7) as u64 * (size_of::<(K, V)>() as u64 + 1)
 }
 
 #[cfg(test)]

@@ -68,6 +68,12 @@ impl SurfaceMeasure {
         self.components.add(corners);
     }
 
+    /// Bytes of memory: edges of the layer that is drawn, and a number for each vertex.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.edges.bytes() + self.components.bytes()
+    }
+
     /// The measures of all triangles so far.
     #[must_use]
     pub fn measures(&self) -> Measures {

@@ -18,6 +18,18 @@ pub struct Patch {
     pub pairs: Vec<[u32; 2]>,
 }
 
+impl Patch {
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let of_vertices =
+            self.keys.capacity() * size_of::<VertexKey>() + self.positions.capacity() * size_of::<[f64; 3]>();
+        let of_triangles =
+            (self.triangles.capacity() * size_of::<[u32; 3]>()) + self.pairs.capacity() * size_of::<[u32; 2]>();
+        (of_vertices + of_triangles) as u64
+    }
+}
+
 impl Default for Patch {
     fn default() -> Self {
         Self {

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::edge_tally::table_bytes;
 use super::patch::Patch;
 use super::vertex_key::VertexKey;
 use crate::error::{Error, Result};
@@ -50,6 +51,13 @@ impl Welder {
     #[must_use]
     pub fn vertices(&self) -> u64 {
         self.vertices
+    }
+
+    /// Bytes of memory: what later patches may share, and the last one's vertices.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let of_last = self.numbers.capacity() * size_of::<u32>() + self.world.capacity() * size_of::<[f64; 3]>();
+        table_bytes(&self.shared) + of_last as u64
     }
 
     /// Number of triangles so far.

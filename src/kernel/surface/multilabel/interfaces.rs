@@ -28,6 +28,14 @@ pub struct TaggedPatch {
     pub distances: Vec<f64>,
 }
 
+impl TaggedPatch {
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.patch.bytes() + (self.distances.capacity() * size_of::<f64>()) as u64
+    }
+}
+
 /// The edges of a tetrahedron.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 

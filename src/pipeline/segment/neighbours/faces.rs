@@ -6,10 +6,8 @@ use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
 use crate::kernel::surface::{Contact, Contacts, PARTITION_REACH, Partition, Patch, Welder, cells_of_brick};
+use crate::pipeline::output::drawn::Drawn;
 use crate::store::{BoxSource, MeshSink};
-
-/// Boxes whose patches are made in parallel before they are welded in order.
-const BATCH: usize = 64;
 
 /// Sends the surfaces between labels, and to what has none, to `sink`; measures what lies between each two.
 ///
@@ -25,7 +23,10 @@ pub fn draw(
     let (mut welder, mut contacts) = (Welder::new(geometry), Contacts::new(geometry));
     let workers = Workers::new(|| (Partition::default(), Vec::new()));
     let bricks: Vec<BrickId> = (0..grid.len()).collect();
-    for batch in bricks.chunks(BATCH) {
+    let (mut drawn, mut left) = (Drawn::new(stage), bricks.as_slice());
+    while !left.is_empty() {
+        let batch;
+        (batch, left) = left.split_at(drawn.batch().min(left.len()));
         let patches = stage.run(batch, &workers, |(partition, values), &id| {
             patch(partition, values, joined, geometry, &grid.brick_box(id))
         })?;
@@ -35,6 +36,7 @@ pub fn draw(
                 contacts.add(pair, positions);
             }
         }
+        drawn.took(patches.iter().map(Patch::bytes), welder.bytes(), left.len())?;
     }
     Ok(contacts.finish())
 }

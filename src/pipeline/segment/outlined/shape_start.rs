@@ -15,6 +15,7 @@ use crate::kernel::level_set::cell::CELL;
 use crate::kernel::level_set::initial::start;
 use crate::kernel::outline::planar::section::{Section, widest_gap};
 use crate::pipeline::distance::{Sources, cloud_distance};
+use crate::pipeline::enclosure::needs::box_bytes;
 use crate::pipeline::image::intensity::Normalised;
 use crate::pipeline::image::terms::{EdgeSettings, presmooth};
 use crate::pipeline::level_set::band::Band;
@@ -49,10 +50,12 @@ pub(crate) fn begin<T: Element>(
     let stage = engine.stage(&name("shape", marks), 0);
     let field = ShapeField::new(&stage, picture.geometry, &sections, &object.fitted, reach)?;
     let set = field.cells_within(&stage, reach)?;
+    let cloud = cloud(&object.sections);
+    // The shape's own box, which may be larger than the one around its marks.
+    let held = engine.hold(box_bytes(cloud.len() as u64, set.grid().len(), set.len() as u64))?;
     let (shape, deepest) = field.on_cells(&stage, engine, &set)?;
     stage.voxels((set.len() * set.grid().brick_len()) as u64);
     stage.finish();
-    let cloud = cloud(&object.sections);
     let distance = distance_to(engine, marks, &field.geometry, &cloud, &set, settings)?;
     let spacing = field.geometry.max_spacing();
     let rests = deepest < THIN * spacing;
@@ -84,6 +87,7 @@ pub(crate) fn begin<T: Element>(
         beta: 0.0,
         hole: None,
         rests,
+        held,
     };
     Ok((begun, forces))
 }
