@@ -133,7 +133,9 @@ impl Job {
                 mesh.vertices
             }
         };
-        Budget { total: resources.memory }.admit(spacing_memory(cloud.len()))?;
+        if spacing.is_none() || args.grid.drop_isolated.is_some() {
+            Budget { total: resources.memory }.admit(spacing_memory(cloud.len()))?;
+        }
         let cloud = drop_isolated(cloud, args.grid.drop_isolated, &console)?;
         let grid = grid_for(&cloud, spacing).ok_or_else(|| {
             let what = "all points lie in one place, which tells no spacing and encloses nothing";

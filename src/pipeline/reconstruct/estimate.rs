@@ -92,7 +92,7 @@ pub fn estimate(
     let near_voxels = (vicinity.cells.len() * CELL_LEN) as u64;
     let working = if writes { BUFFERS.or(WRITING, threads) } else { BUFFERS };
     Estimate {
-        held: boxes(&vicinity, cloud).and(working).bytes(threads).max(spacing_memory(cloud.len())),
+        held: boxes(&vicinity, cloud).and(working).bytes(threads),
         scratch: SIDES_BYTES * near_voxels,
         least_scratch: DISTANCE_BYTES * near_voxels,
         near_voxels,
