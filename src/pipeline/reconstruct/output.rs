@@ -11,7 +11,7 @@ use crate::exec::{Engine, Hold, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures};
-use crate::pipeline::enclosure::search::{Deepest, Found, Hole, Search, Start, enclose, first_reach_for};
+use crate::pipeline::enclosure::search::{Deepest, Enclosure, Found, Hole, Search, Start, enclose, first_reach_for};
 use crate::pipeline::enclosure::sheets::{Company, hold_sheets};
 use crate::pipeline::level_set::band::Band;
 use crate::pipeline::level_set::evolve::Evolution;
@@ -127,44 +127,13 @@ pub fn reconstruct(
 ) -> Result<Reconstruction> {
     let _buffers = engine.reserve(BUFFERS)?;
     let held = engine.reserve(boxes(&begin(grid, cloud, settings), cloud))?;
-    let search = Search {
-        grid,
-        cloud,
-        method: settings.method,
-        beta: settings.beta,
-        start: Start::Watershed,
-        first_reach: first_reach_for(grid, settings.beta),
-        suffix: "",
-    };
-    let enclosure = match enclose(engine, &search)? {
-        Found::Enclosed(enclosure) => enclosure,
-        Found::Leaks(deepest) => return Err(flat_cloud(grid, cloud).unwrap_or_else(|| leaks(settings, grid, &deepest))),
-        Found::Nothing(deepest) => {
-            let nothing = || encloses_nothing(settings, grid, deepest.as_ref());
-            return Err(flat_cloud(grid, cloud).unwrap_or_else(nothing));
-        }
-    };
+    let enclosure = enclosed(engine, grid, cloud, settings)?;
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
     let window = enclosure.window;
     let larger_beta = enclosure.larger_beta();
     let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
     let (mut band, held_by_box) = enclosure.into_band(engine, "")?;
-    let stage = engine.stage("level set", 0);
-    stage.voxels(band.voxels);
-    let time_loop = settings.motion.time_loop(&geometry);
-    let mut evolution = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
-    // Where more smoothing was asked for, the surface leaves points because it shall.
-    let keeps_points = settings.beta.is_none() && settings.motion.smooths_no_more_than_usual(&geometry);
-    let late = if keeps_points { hold_what_was_lost(&stage, &geometry, cloud, &band)? } else { Vec::new() };
-    if !late.is_empty() {
-        sheet.extend(late);
-        sheet.sort_unstable();
-        sheet.dedup();
-        let again = evolve_on_ranks(&stage, engine, &mut band, geometry.spacing, &time_loop)?;
-        let (steps, sor_iterations) = (evolution.steps + again.steps, evolution.sor_iterations + again.sor_iterations);
-        evolution = Evolution { steps, sor_iterations, ..again };
-    }
-    stage.finish();
+    let evolution = solve(engine, &geometry, cloud, settings, &mut band, &mut sheet)?;
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
     let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh)?;
@@ -187,6 +156,60 @@ pub fn reconstruct(
         window: settings.keeps_grid.then_some(window),
         _held: [held, held_by_box],
     })
+}
+
+/// What the cloud encloses.
+fn enclosed(
+    engine: &Engine,
+    grid: &Geometry,
+    cloud: &[[f64; 3]],
+    settings: &ReconstructSettings,
+) -> Result<Box<Enclosure>> {
+    let search = Search {
+        grid,
+        cloud,
+        method: settings.method,
+        beta: settings.beta,
+        start: Start::Watershed,
+        first_reach: first_reach_for(grid, settings.beta),
+        suffix: "",
+    };
+    match enclose(engine, &search)? {
+        Found::Enclosed(enclosure) => Ok(enclosure),
+        Found::Leaks(deepest) => Err(flat_cloud(grid, cloud).unwrap_or_else(|| leaks(settings, grid, &deepest))),
+        Found::Nothing(deepest) => {
+            let nothing = || encloses_nothing(settings, grid, deepest.as_ref());
+            Err(flat_cloud(grid, cloud).unwrap_or_else(nothing))
+        }
+    }
+}
+
+/// Moves the surface until it rests, and again where it left points that it should not; `sheet` gets these.
+fn solve(
+    engine: &Engine,
+    geometry: &Geometry,
+    cloud: &[[f64; 3]],
+    settings: &ReconstructSettings,
+    band: &mut Band,
+    sheet: &mut Vec<u32>,
+) -> Result<Evolution> {
+    let stage = engine.stage("level set", 0);
+    stage.voxels(band.voxels);
+    let time_loop = settings.motion.time_loop(geometry);
+    let mut evolution = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop)?;
+    // Where more smoothing was asked for, the surface leaves points because it shall.
+    let keeps_points = settings.beta.is_none() && settings.motion.smooths_no_more_than_usual(geometry);
+    let late = if keeps_points { hold_what_was_lost(&stage, geometry, cloud, band)? } else { Vec::new() };
+    if !late.is_empty() {
+        sheet.extend(late);
+        sheet.sort_unstable();
+        sheet.dedup();
+        let again = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop)?;
+        let (steps, sor_iterations) = (evolution.steps + again.steps, evolution.sor_iterations + again.sor_iterations);
+        evolution = Evolution { steps, sor_iterations, ..again };
+    }
+    stage.finish();
+    Ok(evolution)
 }
 
 /// Holds what the surface has left; returns these points.
