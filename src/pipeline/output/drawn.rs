@@ -11,6 +11,8 @@ const BATCH: usize = 64;
 pub(crate) const STATED: u64 = 36 << 20;
 /// A thread draws in buffers that take so many times what its patch does.
 const BUFFERS: u64 = 2;
+/// A table that is full is copied into one of twice its size; of several one at a time.
+const TABLES: u64 = 2;
 
 /// What was drawn so far.
 pub(crate) struct Drawn<'s, 'a> {
@@ -20,18 +22,21 @@ pub(crate) struct Drawn<'s, 'a> {
     /// Bytes beyond what was stated, and their guard.
     more: u64,
     held: Option<Hold>,
+    /// Whether there is no room for more than one box for each thread.
+    is_tight: bool,
 }
 
 impl<'s, 'a> Drawn<'s, 'a> {
     /// Nothing.
     pub(crate) fn new(stage: &'s Stage<'a>) -> Self {
-        Self { stage, largest: 0, more: 0, held: None }
+        Self { stage, largest: 0, more: 0, held: None, is_tight: false }
     }
 
     /// How many boxes are drawn next: as many as half of what was stated has room for, one for each thread at least.
     pub(crate) fn batch(&self) -> usize {
         let threads = self.stage.threads();
         match self.largest {
+            _ if self.is_tight => threads,
             // Nothing is known of the surface yet.
             0 => (2 * threads).clamp(1, BATCH.max(threads)),
             largest => (STATED / 2 / largest).clamp(threads as u64, BATCH.max(threads) as u64) as usize,
@@ -45,14 +50,20 @@ impl<'s, 'a> Drawn<'s, 'a> {
     pub(crate) fn took(&mut self, patches: impl Iterator<Item = u64>, tables: u64, left: usize) -> Result<()> {
         // Surfaces end and begin again: what is forgotten is forgotten slowly.
         self.largest = patches.fold(self.largest / 2, u64::max).max(1);
-        let (waiting, drawing) = (self.batch().min(left) as u64, self.stage.threads().min(left) as u64);
-        let drawing = (waiting + BUFFERS * drawing) * self.largest;
-        // A table that is full is copied into one of twice its size.
-        let more = (drawing + 3 * tables).saturating_sub(STATED);
-        if more > self.more {
+        let drawing = self.stage.threads().min(left) as u64;
+        let of = |waiting: usize, room: u64| {
+            let patches = (waiting.min(left) as u64 + BUFFERS * drawing) * self.largest;
+            (patches + TABLES * tables).saturating_sub(STATED) * room / 4
+        };
+        let [likely, least] = [of(self.batch(), 5), of(self.stage.threads(), 4)];
+        if likely > self.more {
             self.held = None;
-            self.more = more + more / 4;
-            self.held = Some(self.stage.hold(self.more)?);
+            self.more = likely;
+            self.held = self.stage.hold(likely).ok();
+            if self.held.is_none() {
+                (self.is_tight, self.more) = (true, least);
+                self.held = Some(self.stage.hold(least)?);
+            }
         }
         Ok(())
     }
