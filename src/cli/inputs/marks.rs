@@ -1,6 +1,6 @@
 //! The marks of all files as one cloud in the world of the image, and what is odd about them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::cli::args::common::PointsIn;
@@ -13,7 +13,7 @@ use crate::io::geometry::read::point_file::{PointFile, Scale};
 use crate::io::geometry::read::points::{LengthUnit, read_points};
 use crate::pipeline::marks::{ObjectMarks, Seed, split_and_seed};
 use crate::pipeline::segment;
-use crate::pipeline::segment::{Grids, Looked, Refused, same_place};
+use crate::pipeline::segment::{Extent, Grids, Looked, Refused, shared};
 
 /// What decides how the numbers of a file are read.
 pub(crate) struct Reading<'a> {
@@ -210,29 +210,32 @@ pub(crate) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: &[Seed], co
 /// Pairs of objects that are compared, at most: it is looked at for people's files, not for thousands of cells.
 const MOST_PAIRS: usize = 1 << 20;
 
+/// Pairs that are named, at most.
+const MOST_NAMED: usize = 10;
+
 /// Says which objects of two files lie where one object would.
 fn tell_twice_marked(objects: &[ObjectMarks], marks: &Marks, image: &Geometry, console: &Console) {
-    if objects.len().pow(2) > MOST_PAIRS {
+    if marks.files.values().collect::<BTreeSet<_>>().len() < 2 || objects.len().pow(2) > MOST_PAIRS {
         return;
     }
-    for (n, a) in objects.iter().enumerate() {
-        for b in &objects[n + 1..] {
-            let files = [a, b].map(|object| &marks.files[&object.object]);
-            if files[0] == files[1] {
-                continue;
-            }
-            if let Some(share) = same_place(a, b, image) {
-                console.note(&format!(
-                    "objects {} ({}) and {} ({}) overlap by {:.0} %: if they are one, put their marks into one file, with \
-                     one object number",
-                    a.object,
-                    files[0].display(),
-                    b.object,
-                    files[1].display(),
-                    100.0 * share
-                ));
-            }
-        }
+    let extents: Vec<(u32, Extent)> =
+        objects.iter().filter_map(|object| Some((object.object, Extent::of(object)?))).collect();
+    let file = |object: &u32| &marks.files[object];
+    let pairs = extents.iter().enumerate().flat_map(|(n, a)| extents[n + 1..].iter().map(move |b| (a, b)));
+    let of_two_files = pairs.filter(|((a, _), (b, _))| file(a) != file(b));
+    let mut twice = of_two_files.filter_map(|((a, first), (b, second))| Some((a, b, shared(first, second, image)?)));
+    for (a, b, share) in twice.by_ref().take(MOST_NAMED) {
+        console.note(&format!(
+            "objects {a} ({}) and {b} ({}) overlap by {:.0} %: if they are one, put their marks into one file, with one \
+             object number",
+            file(a).display(),
+            file(b).display(),
+            100.0 * share
+        ));
+    }
+    match twice.count() {
+        0 => {}
+        more => console.note(&format!("{more} more pairs of objects of two files overlap by half or more")),
     }
 }
 

@@ -1,5 +1,5 @@
 //! Marks that fit the image and may be meant otherwise: slice numbers and pixels for lengths, one outline number for many
-//! slices, one object marked in two files.
+//! slices.
 
 use crate::grid::{Geometry, digits};
 use crate::pipeline::marks::ObjectMarks;
@@ -10,8 +10,6 @@ const TELLING: usize = 8;
 const HARDLY_MARKED: f64 = 4.0;
 /// An object so much smaller than a voxel was marked in another unit: a thousandth, or less, of its size.
 const IN_ANOTHER_UNIT: f64 = 0.2;
-/// Two objects whose boxes share so much of what both fill are likely one.
-const SAME: f64 = 0.5;
 
 /// What speaks against reading an object's marks as lengths, where the image has other spacings than 1.
 #[must_use]
@@ -129,35 +127,6 @@ pub fn open_outlines(marks: &ObjectMarks) -> Vec<i64> {
     numbered.filter(|(_, contour)| is_open(contour)).map(|(&number, _)| number).collect()
 }
 
-/// The share that the boxes of two objects have in common of what both fill, where it is so large that they may be one
-/// object; none where one lies within the other, as a nucleus in its cell.
-#[must_use]
-pub fn same_place(a: &ObjectMarks, b: &ObjectMarks, image: &Geometry) -> Option<f64> {
-    let boxed = |marks: &ObjectMarks| {
-        let points = marks.contours.concat();
-        (!points.is_empty()).then(|| [0, 1, 2].map(|axis| limits(&points, axis)))
-    };
-    let (a, b) = (boxed(a)?, boxed(b)?);
-    let within = |inner: &[(f64, f64); 3], outer: &[(f64, f64); 3]| {
-        (0..3).all(|axis| {
-            let h = image.spacing[axis];
-            inner[axis].0 >= outer[axis].0 + h && inner[axis].1 <= outer[axis].1 - h
-        })
-    };
-    if within(&a, &b) || within(&b, &a) {
-        return None;
-    }
-    let volume = |limits: &[(f64, f64); 3]| -> f64 {
-        (0..3).map(|axis| (limits[axis].1 - limits[axis].0).max(0.0) + 0.5 * image.spacing[axis]).product()
-    };
-    let common = [0, 1, 2].map(|axis| (a[axis].0.max(b[axis].0), a[axis].1.min(b[axis].1)));
-    if common.iter().any(|(low, high)| low > high) {
-        return None;
-    }
-    let share = volume(&common) / (volume(&a) + volume(&b) - volume(&common));
-    Some(share).filter(|&share| share > SAME)
-}
-
 fn limits(points: &[[f64; 3]], axis: usize) -> (f64, f64) {
     points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[axis]), high.max(p[axis])))
 }
@@ -224,19 +193,5 @@ mod tests {
         marks.contours = vec![marks.contours.concat()];
         marks.numbers = vec![9];
         assert_eq!(spans_slices(&marks, &image([1.0; 3])), [(9, 3)]);
-    }
-
-    #[test]
-    fn an_object_in_two_files_is_found_and_a_nucleus_is_none() {
-        let geometry = image([1.0; 3]);
-        let (a, b) = (rings(&[4.0, 10.0, 16.0], |_| 1), rings(&[5.0, 11.0, 17.0], |_| 1));
-        assert!(same_place(&a, &b, &geometry).is_some_and(|share| share > 0.7));
-        let mut inner = rings(&[8.0, 10.0, 14.0], |_| 1);
-        let towards = |p: &[f64; 3]| [20.1 + 0.9 * (p[0] - 20.1), 20.2 + 0.85 * (p[1] - 20.2), p[2]];
-        inner.contours.iter_mut().for_each(|c| c.iter_mut().for_each(|p| *p = towards(p)));
-        assert_eq!(same_place(&a, &inner, &geometry), None);
-        let mut far = b.clone();
-        far.contours.iter_mut().for_each(|c| c.iter_mut().for_each(|p| p[0] += 15.0));
-        assert_eq!(same_place(&a, &far, &geometry), None);
     }
 }

@@ -3,3 +3,4 @@
 pub(crate) mod doubts;
 pub(crate) mod lengths;
 pub(crate) mod look;
+pub(crate) mod same_object;

@@ -29,9 +29,9 @@ const REPEATED: f64 = 1.5;
 
 /// An outline as it was marked.
 pub(crate) struct Drawn<'a> {
-    plane: Plane,
+    pub(crate) plane: Plane,
     marks: &'a [[f64; 3]],
-    in_plane: Vec<[f64; 2]>,
+    pub(crate) in_plane: Vec<[f64; 2]>,
 }
 
 /// The plane that a contour was drawn in; none where it is not flat.

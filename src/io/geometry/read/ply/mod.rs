@@ -31,7 +31,7 @@ pub(crate) fn read_vertices(input: &mut Input) -> Result<PointCloud> {
     refuse_overlong(&header, vertex, input.length)?;
     let mut body = Body::after(&header, &mut input.reader);
     header.elements[..vertex].iter().try_for_each(|e| body.skip(e))?;
-    let positions = vertices::read(&mut body, &header.elements[vertex], input.length.is_some())?;
+    let positions = vertices::read(&mut body, &header.elements[vertex], input.length.is_some(), &mut input.notes)?;
     Ok(PointCloud { positions, ..PointCloud::default() })
 }
 
@@ -47,7 +47,7 @@ pub(crate) fn read(input: &mut Input) -> Result<Source> {
     let (mut vertices, mut found) = (Vec::new(), Faces::new(vertex_count));
     for (place, element) in header.elements[..=last].iter().enumerate() {
         if place == vertex {
-            vertices = vertices::read(&mut body, element, input.length.is_some())?;
+            vertices = vertices::read(&mut body, element, input.length.is_some(), &mut input.notes)?;
         } else if is_face(element) {
             faces::read(&mut body, element, &mut found)?;
         } else {

@@ -1,9 +1,10 @@
-//! The vertices of a PLY file: their positions, `[x, y, z]`; other properties are passed over.
+//! The vertices of a PLY file: their positions, `[x, y, z]`; other properties are passed over, and
+//! said to be no numbers where they are none.
 
 use std::io::{self, BufRead};
 
 use super::body::Body;
-use super::header::{Element, Encoding};
+use super::header::{Element, Encoding, Property, Scalar};
 use crate::error::{Error, Result};
 use crate::grid::refuse_too_many;
 use crate::io::geometry::read::mesh::number;
@@ -12,22 +13,63 @@ use crate::io::text::{quoted, unreadable};
 /// Bytes of the pieces in which vertices are read.
 const PIECE: usize = 1 << 20;
 
-/// Reads the vertices; `fits` says that the file is known to be long enough for them.
-pub(crate) fn read<R: BufRead>(body: &mut Body<'_, R>, vertex: &Element, fits: bool) -> Result<Vec<[f64; 3]>> {
+/// The vertices of a file.
+#[derive(Debug, Default)]
+pub(crate) struct Vertices {
+    pub positions: Vec<[f64; 3]>,
+    /// How many have a property beside their position that is no number, as a normal of no length has none.
+    undefined: u64,
+    /// The first property that was.
+    property: Option<usize>,
+}
+
+impl Vertices {
+    /// Takes a vertex, and which of its other properties is no number.
+    fn push(&mut self, position: [f64; 3], undefined: Option<usize>) -> Result<()> {
+        if position.iter().any(|x| !x.is_finite()) {
+            let number = self.positions.len();
+            return Err(Error::input(format!(
+                "vertex {number} (counted from 0) has a coordinate that is not finite; delete the vertex"
+            )));
+        }
+        self.positions.push(position);
+        self.undefined += u64::from(undefined.is_some());
+        self.property = self.property.or(undefined);
+        Ok(())
+    }
+
+    /// What is said of properties that are no numbers.
+    fn note(&self, vertex: &Element) -> Option<String> {
+        let name = &vertex.properties[self.property?].name;
+        let (undefined, all) = (self.undefined, self.positions.len());
+        Some(format!(
+            "{undefined} of {all} vertices have properties that are no numbers, as {name}; only x, y and z are read"
+        ))
+    }
+}
+
+/// Reads the vertices; `fits` says that the file is known to be long enough for them, `notes` gets what is odd about them.
+pub(crate) fn read<R: BufRead>(
+    body: &mut Body<'_, R>,
+    vertex: &Element,
+    fits: bool,
+    notes: &mut Vec<String>,
+) -> Result<Vec<[f64; 3]>> {
     let place = places(vertex)?;
     refuse_too_many("vertices", vertex.count)?;
-    let mut positions = Vec::new();
+    let mut found = Vertices::default();
     if fits {
-        positions.reserve_exact(vertex.count as usize);
+        found.positions.reserve_exact(vertex.count as usize);
     }
     if body.encoding == Encoding::Ascii {
-        read_text(body, vertex, place, &mut positions)?;
+        read_text(body, vertex, place, &mut found)?;
     } else if vertex.has_fixed_size() {
-        read_binary(body, vertex, place, &mut positions)?;
+        read_binary(body, vertex, place, &mut found)?;
     } else {
-        read_binary_with_lists(body, vertex, place, &mut positions)?;
+        read_binary_with_lists(body, vertex, place, &mut found)?;
     }
-    Ok(positions)
+    notes.extend(found.note(vertex));
+    Ok(found.positions)
 }
 
 /// The places of x, y and z among the properties of a vertex.
@@ -41,39 +83,30 @@ fn places(vertex: &Element) -> Result<[usize; 3]> {
     Ok(found)
 }
 
-fn push(positions: &mut Vec<[f64; 3]>, position: [f64; 3]) -> Result<()> {
-    if position.iter().all(|x| x.is_finite()) {
-        positions.push(position);
-        return Ok(());
-    }
-    let number = positions.len();
-    Err(Error::input(format!(
-        "vertex {number} (counted from 0) has a coordinate that is not finite; delete the vertex"
-    )))
-}
-
 /// Vertices of a text file: one a line.
 fn read_text<R: BufRead>(
     body: &mut Body<'_, R>,
     vertex: &Element,
     place: [usize; 3],
-    positions: &mut Vec<[f64; 3]>,
+    found: &mut Vertices,
 ) -> Result<()> {
-    while positions.len() as u64 != vertex.count {
-        let text = body.element_line()?.ok_or_else(|| cut_off(positions.len(), vertex.count))?;
+    while found.positions.len() as u64 != vertex.count {
+        let text = body.element_line()?.ok_or_else(|| cut_off(found.positions.len(), vertex.count))?;
         let number = body.line;
-        let position = position_in(&text, vertex, place)
+        let (position, undefined) = vertex_in(&text, vertex, place)
             .ok_or_else(|| Error::input(format!("line {number}, {}, is not a vertex as declared", quoted(&text))))?;
-        push(positions, position).map_err(|error| Error::input(format!("line {number}: {error}")).caused_by(error))?;
+        found
+            .push(position, undefined)
+            .map_err(|error| Error::input(format!("line {number}: {error}")).caused_by(error))?;
     }
     Ok(())
 }
 
-/// The position in a line, when it has just as many words as the vertex declares numbers. Of the others only the lengths
-/// of lists need to be numbers: normals that could not be computed are written in many ways.
-fn position_in(line: &str, vertex: &Element, place: [usize; 3]) -> Option<[f64; 3]> {
+/// The position in a line, when it has just as many words as the vertex declares numbers, and the first other property that
+/// is no number. Of these only the lengths of lists need to be: normals that could not be computed are written in many ways.
+fn vertex_in(line: &str, vertex: &Element, place: [usize; 3]) -> Option<([f64; 3], Option<usize>)> {
     let mut words = line.split_whitespace();
-    let mut position = [0.0; 3];
+    let (mut position, mut undefined) = ([0.0; 3], None);
     for (i, property) in vertex.properties.iter().enumerate() {
         let word = words.next()?;
         if property.list.is_some() {
@@ -84,9 +117,16 @@ fn position_in(line: &str, vertex: &Element, place: [usize; 3]) -> Option<[f64; 
         }
         if let Some(axis) = place.iter().position(|&p| p == i) {
             position[axis] = number(word)?;
+        } else if undefined.is_none() && !is_written_in_digits(word) {
+            undefined = Some(i);
         }
     }
-    words.next().is_none().then_some(position)
+    words.next().is_none().then_some((position, undefined))
+}
+
+/// Whether a word can be a number: nan, -nan(ind), -1.#IND and their like have other letters.
+fn is_written_in_digits(word: &str) -> bool {
+    word.bytes().all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte))
 }
 
 /// Vertices of a binary file that all have the same number of bytes.
@@ -94,20 +134,26 @@ fn read_binary<R: BufRead>(
     body: &mut Body<'_, R>,
     vertex: &Element,
     place: [usize; 3],
-    positions: &mut Vec<[f64; 3]>,
+    found: &mut Vertices,
 ) -> Result<()> {
     let offset = |at: usize| vertex.properties[..at].iter().map(|p| p.item.size()).sum::<usize>();
     let fields = place.map(|at| (offset(at), vertex.properties[at].item));
+    let is_other = |(i, p): &(usize, &Property)| {
+        !place.contains(i) && p.list.is_none() && matches!(p.item, Scalar::F32 | Scalar::F64)
+    };
+    let others = vertex.properties.iter().enumerate().filter(is_other);
+    let others: Vec<(usize, usize, Scalar)> = others.map(|(i, p)| (i, offset(i), p.item)).collect();
     let stride = offset(vertex.properties.len());
     let mut piece = vec![0; stride * (PIECE / stride).max(1)];
     let mut left = vertex.count;
     while left > 0 {
         let rows = left.min((piece.len() / stride) as u64);
         let bytes = &mut piece[..rows as usize * stride];
-        body.reader.read_exact(bytes).map_err(|e| cut_off_by(&e, positions.len(), vertex.count))?;
+        body.reader.read_exact(bytes).map_err(|e| cut_off_by(&e, found.positions.len(), vertex.count))?;
         for row in bytes.chunks_exact(stride) {
-            let position = fields.map(|(at, item)| item.decode(&row[at..at + item.size()], body.encoding));
-            push(positions, position)?;
+            let decoded = |at: usize, item: Scalar| item.decode(&row[at..at + item.size()], body.encoding);
+            let undefined = others.iter().find(|(_, at, item)| !decoded(*at, *item).is_finite());
+            found.push(fields.map(|(at, item)| decoded(at, item)), undefined.map(|(i, ..)| *i))?;
         }
         left -= rows;
     }
@@ -118,10 +164,10 @@ fn read_binary_with_lists<R: BufRead>(
     body: &mut Body<'_, R>,
     vertex: &Element,
     place: [usize; 3],
-    positions: &mut Vec<[f64; 3]>,
+    found: &mut Vertices,
 ) -> Result<()> {
     for _ in 0..vertex.count {
-        let mut position = [0.0; 3];
+        let (mut position, mut undefined) = ([0.0; 3], None);
         for (i, property) in vertex.properties.iter().enumerate() {
             if let Some(length) = property.list {
                 body.skip_list(length, property.item)?;
@@ -129,10 +175,12 @@ fn read_binary_with_lists<R: BufRead>(
                 let value = body.number(property.item)?;
                 if let Some(axis) = place.iter().position(|&p| p == i) {
                     position[axis] = value;
+                } else if undefined.is_none() && !value.is_finite() {
+                    undefined = Some(i);
                 }
             }
         }
-        push(positions, position)?;
+        found.push(position, undefined)?;
     }
     Ok(())
 }
