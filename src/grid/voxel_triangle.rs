@@ -7,6 +7,8 @@
 //! ten are tested with a margin for rounding: a cell that is cut is never missed, one that is only touched from
 //! outside may be taken for cut. Triangles without area are segments or points by the same axes.
 
+use glam::DVec3;
+
 use super::{Box3, Geometry};
 
 /// Rounding errors of a projection, in units of the sum of its terms' magnitudes.
@@ -28,9 +30,9 @@ pub struct VoxelTriangle {
 /// A direction, and the interval that the triangle covers along it as seen from its first corner.
 #[derive(Clone, Copy, Debug, Default)]
 struct Axis {
-    direction: [f64; 3],
+    direction: DVec3,
     /// Magnitudes of what was summed to get each component.
-    size: [f64; 3],
+    size: DVec3,
     lo: f64,
     hi: f64,
     /// Rounding errors of `lo` and `hi`.
@@ -44,14 +46,13 @@ impl VoxelTriangle {
         let [a, b, c] = corners.map(|p| geometry.to_voxels(p));
         let lo = std::array::from_fn(|i| a[i].min(b[i]).min(c[i]));
         let hi = std::array::from_fn(|i| a[i].max(b[i]).max(c[i]));
-        let between = |to: [f64; 3], from: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| to[i] - from[i]) };
-        let (ab, ac, bc) = (between(b, a), between(c, a), between(c, b));
+        let [from, b, c] = [a, b, c].map(DVec3::from);
+        let (ab, ac, bc) = (b - from, c - from, c - b);
         let mut axes = [Axis::default(); 10];
         axes[0] = Axis::of(product(ab, ac), [ab, ac]);
         for (n, side) in [ab, ac, bc].into_iter().enumerate() {
-            for unit in 0..3 {
-                let e = std::array::from_fn(|i| f64::from(u8::from(i == unit)));
-                axes[1 + 3 * n + unit] = Axis::of(product(side, e), [ab, ac]);
+            for (a, unit) in DVec3::AXES.into_iter().enumerate() {
+                axes[1 + 3 * n + a] = Axis::of(product(side, unit), [ab, ac]);
             }
         }
         Self { anchor: a, lo, hi, axes }
@@ -78,17 +79,17 @@ impl VoxelTriangle {
         if (0..3).any(|i| self.lo[i] >= hi[i] || self.hi[i] < lo[i]) {
             return false;
         }
-        let half = std::array::from_fn(|i| (hi[i] - lo[i]) / 2.0);
-        let centre = std::array::from_fn(|i| f64::midpoint(lo[i], hi[i]) - self.anchor[i]);
+        let half = (DVec3::from(hi) - DVec3::from(lo)) / 2.0;
+        let centre = DVec3::from_array(std::array::from_fn(|i| f64::midpoint(lo[i], hi[i]) - self.anchor[i]));
         !self.axes.iter().any(|axis| axis.separates(centre, half))
     }
 }
 
 impl Axis {
     /// The axis along `direction`, for the triangle of these two sides from its first corner.
-    fn of((direction, size): ([f64; 3], [f64; 3]), sides: [[f64; 3]; 2]) -> Self {
-        let along = sides.map(|side| dot(direction, side));
-        let margin = sides.map(|side| dot(size, side.map(f64::abs)));
+    fn of((direction, size): (DVec3, DVec3), sides: [DVec3; 2]) -> Self {
+        let along = sides.map(|side| direction.dot(side));
+        let margin = sides.map(|side| size.dot(side.abs()));
         Self {
             direction,
             size,
@@ -99,23 +100,18 @@ impl Axis {
     }
 
     /// True when a box and the triangle are apart along this axis beyond any rounding.
-    fn separates(&self, centre: [f64; 3], half: [f64; 3]) -> bool {
-        let at = dot(self.direction, centre);
-        let reach = dot(self.direction.map(f64::abs), half);
-        let terms: [f64; 3] = std::array::from_fn(|i| centre[i].abs() + half[i]);
-        let margin = ROUNDING * (dot(self.size, terms) + self.margin);
+    fn separates(&self, centre: DVec3, half: DVec3) -> bool {
+        let at = self.direction.dot(centre);
+        let reach = self.direction.abs().dot(half);
+        let margin = ROUNDING * (self.size.dot(centre.abs() + half) + self.margin);
         at - reach > self.hi + margin || at + reach < self.lo - margin
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// The vector product and, component by component, the sum of its terms' magnitudes.
-fn product(a: [f64; 3], b: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+fn product(a: DVec3, b: DVec3) -> (DVec3, DVec3) {
     let terms = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| (a[i] * b[j], a[j] * b[i]));
-    (terms.map(|(p, q)| p - q), terms.map(|(p, q)| p.abs() + q.abs()))
+    (terms.map(|(p, q)| p - q).into(), terms.map(|(p, q)| p.abs() + q.abs()).into())
 }
 
 #[cfg(test)]

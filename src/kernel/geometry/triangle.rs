@@ -5,7 +5,7 @@
 //! on an edge or at a corner, and the signs of its gradient tell which. Triangles with next to no height act as the
 //! segments that bound them, those of three equal corners as a point.
 
-use super::vector::{cross, dot, sub};
+use glam::DVec3;
 
 /// Below this squared ratio of height to length the region tests lose their digits: such triangles are thin.
 const THIN: f64 = 1e-8;
@@ -13,9 +13,9 @@ const THIN: f64 = 1e-8;
 /// A triangle, ready to be asked for distances.
 #[derive(Clone, Copy, Debug)]
 pub struct Triangle {
-    a: [f64; 3],
-    ab: [f64; 3],
-    ac: [f64; 3],
+    a: DVec3,
+    ab: DVec3,
+    ac: DVec3,
     /// ab . ab, ab . ac and ac . ac.
     gram: [f64; 3],
     /// The determinant of these: four times the squared area.
@@ -26,39 +26,41 @@ pub struct Triangle {
 impl Triangle {
     /// The triangle of three corners.
     #[must_use]
-    pub fn new([a, b, c]: [[f64; 3]; 3]) -> Self {
-        let (ab, ac) = (sub(b, a), sub(c, a));
-        let gram = [dot(ab, ab), dot(ab, ac), dot(ac, ac)];
-        let normal = cross(ab, ac);
-        let determinant = dot(normal, normal);
-        let bc = sub(c, b);
-        let longest = gram[0].max(gram[2]).max(dot(bc, bc));
+    pub fn new(corners: [[f64; 3]; 3]) -> Self {
+        let [a, b, c] = corners.map(DVec3::from);
+        let (ab, ac) = (b - a, c - a);
+        let gram = [ab.length_squared(), ab.dot(ac), ac.length_squared()];
+        let determinant = ab.cross(ac).length_squared();
+        let longest = gram[0].max(gram[2]).max(c.distance_squared(b));
         Self { a, ab, ac, gram, determinant, is_thin: determinant <= THIN * longest * longest }
     }
 
     /// Its first corner.
     #[must_use]
     pub fn corner(&self) -> [f64; 3] {
-        self.a
+        self.a.into()
     }
 
     /// The squared distance from `point` to the triangle.
     #[must_use]
     pub fn distance_squared(&self, point: [f64; 3]) -> f64 {
-        let between = sub(point, self.closest_point(point));
-        dot(between, between)
+        DVec3::from(point).distance_squared(self.closest(point.into()))
     }
 
     /// The point of the triangle closest to `point`.
     #[must_use]
     pub fn closest_point(&self, point: [f64; 3]) -> [f64; 3] {
-        let ap = sub(point, self.a);
-        let (d1, d2) = (dot(self.ab, ap), dot(self.ac, ap));
+        self.closest(point.into()).into()
+    }
+
+    fn closest(&self, point: DVec3) -> DVec3 {
+        let ap = point - self.a;
+        let (d1, d2) = (self.ab.dot(ap), self.ac.dot(ap));
         if self.is_thin { self.closest_of_thin(point, d1, d2) } else { self.closest_by_region(d1, d2) }
     }
 
     /// The region tests; `d1`, `d2` are ab . ap and ac . ap.
-    fn closest_by_region(&self, d1: f64, d2: f64) -> [f64; 3] {
+    fn closest_by_region(&self, d1: f64, d2: f64) -> DVec3 {
         let [g11, g12, g22] = self.gram;
         if d1 <= 0.0 && d2 <= 0.0 {
             return self.at(0.0, 0.0);
@@ -87,7 +89,7 @@ impl Triangle {
     }
 
     /// The nearest of the three segments' points and, where it exists, the point inside.
-    fn closest_of_thin(&self, point: [f64; 3], d1: f64, d2: f64) -> [f64; 3] {
+    fn closest_of_thin(&self, point: DVec3, d1: f64, d2: f64) -> DVec3 {
         let [g11, g12, g22] = self.gram;
         let along_bc = ratio((d2 - g12) - (d1 - g11), g11 - 2.0 * g12 + g22);
         let s = ratio(g22 * d1 - g12 * d2, self.determinant);
@@ -98,12 +100,12 @@ impl Triangle {
             self.at(1.0 - along_bc, along_bc),
             self.at(s, t),
         ];
-        let squared = |q: [f64; 3]| dot(sub(point, q), sub(point, q));
-        candidates.into_iter().fold(self.a, |best, q| if squared(q) < squared(best) { q } else { best })
+        let nearer = |q: DVec3, best| point.distance_squared(q) < point.distance_squared(best);
+        candidates.into_iter().fold(self.a, |best, q| if nearer(q, best) { q } else { best })
     }
 
-    fn at(&self, s: f64, t: f64) -> [f64; 3] {
-        std::array::from_fn(|i| self.a[i] + s * self.ab[i] + t * self.ac[i])
+    fn at(&self, s: f64, t: f64) -> DVec3 {
+        self.a + s * self.ab + t * self.ac
     }
 }
 
@@ -118,19 +120,19 @@ mod tests {
     use proptest::prelude::*;
 
     /// The distance by another way: down to the plane where that lands inside, else to the nearest edge.
-    fn reference(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
-        let segment = |from: [f64; 3], to: [f64; 3]| {
-            let along = sub(to, from);
-            let length = dot(along, along);
-            let s = if length > 0.0 { (dot(sub(p, from), along) / length).clamp(0.0, 1.0) } else { 0.0 };
-            let rest: [f64; 3] = std::array::from_fn(|i| p[i] - from[i] - s * along[i]);
-            dot(rest, rest).sqrt()
+    fn reference(p: [f64; 3], corners: [[f64; 3]; 3]) -> f64 {
+        let (p, [a, b, c]) = (DVec3::from(p), corners.map(DVec3::from));
+        let segment = |from: DVec3, to: DVec3| {
+            let along = to - from;
+            let length = along.length_squared();
+            let s = if length > 0.0 { ((p - from).dot(along) / length).clamp(0.0, 1.0) } else { 0.0 };
+            (p - from - s * along).length()
         };
-        let normal = cross(sub(b, a), sub(c, a));
-        let is_left = |from, to| dot(cross(sub(to, from), sub(p, from)), normal) >= 0.0;
-        let size = dot(normal, normal).sqrt();
+        let normal = (b - a).cross(c - a);
+        let is_left = |from: DVec3, to: DVec3| (to - from).cross(p - from).dot(normal) >= 0.0;
+        let size = normal.length();
         if size > 1e-9 && is_left(a, b) && is_left(b, c) && is_left(c, a) {
-            return dot(sub(p, a), normal).abs() / size;
+            return (p - a).dot(normal).abs() / size;
         }
         segment(a, b).min(segment(b, c)).min(segment(c, a))
     }

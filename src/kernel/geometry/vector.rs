@@ -1,27 +1,11 @@
-//! Sums and products of `[x, y, z]` triples.
+//! Unit vectors and small systems of equations. Vectors are `glam`'s, whose f64 arithmetic is plain, component by component, `x`, `y`, `z` in this order.
 
-/// a - b.
-#[inline]
-pub(crate) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
+use glam::DVec3;
 
-/// The scalar product.
-#[inline]
-pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// The vector product.
-#[inline]
-pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// A vector of the same direction with length 1; 0 where it has no length.
-pub(crate) fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = dot(v, v).sqrt();
-    if length > 0.0 { v.map(|x| x / length) } else { [0.0; 3] }
+/// A vector of the same direction with length 1; 0 where it has no length. Divides, where `normalize` multiplies by a rounded inverse.
+pub(crate) fn unit(v: DVec3) -> DVec3 {
+    let length = v.length();
+    if length > 0.0 { v / length } else { DVec3::ZERO }
 }
 
 /// The solution of a few linear equations, each a row with its right side at the end; none where they have no single one.

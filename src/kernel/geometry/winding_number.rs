@@ -18,7 +18,8 @@
 
 use std::f64::consts::PI;
 
-use super::vector::{cross, dot, sub};
+use glam::{DMat3, DVec3};
+
 use crate::grid::TriangleMesh;
 
 /// A group is taken as a dipole from this many of its radii on (Barill et al. 2018 use 2).
@@ -37,22 +38,22 @@ pub struct WindingTree {
 }
 
 /// Integrals over a group's triangles, about its centre, as the head of this file names them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Moments {
     /// N.
-    normal: [f64; 3],
+    normal: DVec3,
     /// C; rows are offsets.
-    linear: [[f64; 3]; 3],
+    linear: DMat3,
     /// V.
-    vector: [f64; 3],
-    /// Q, by its coefficients of x^2 (x, y, z), y^2 (x, y, z), z^2 (x, y, z) and x y z.
-    cubic: [f64; 10],
+    vector: DVec3,
+    /// Q, by its coefficients of x^2 (x, y, z), y^2 (x, y, z), z^2 (x, y, z) and of x y z.
+    cubic: ([DVec3; 3], f64),
 }
 
 #[derive(Clone, Debug)]
 struct Group {
     /// Area-weighted centre of the triangles.
-    centre: [f64; 3],
+    centre: DVec3,
     /// The squared distance from the centre beyond which the group is a dipole.
     far: f64,
     moments: Moments,
@@ -91,8 +92,8 @@ impl WindingTree {
         let mut sum = 0.0;
         let mut at = 0;
         while let Some(group) = self.groups.get(at) {
-            let r = sub(group.centre, point);
-            let squared = dot(r, r);
+            let r = group.centre - DVec3::from(point);
+            let squared = r.length_squared();
             at = if squared > group.far {
                 sum += group.moments.solid_angle(r, squared);
                 group.next as usize
@@ -135,78 +136,81 @@ impl WindingTree {
 struct Member {
     index: u32,
     corners: [[f64; 3]; 3],
-    centre: [f64; 3],
+    centre: DVec3,
     /// Half the product of two sides: normal to the triangle, as long as its area.
-    area: [f64; 3],
+    area: DVec3,
 }
 
 impl Member {
     fn new(index: u32, corners: [[f64; 3]; 3]) -> Self {
-        let [a, b, c] = corners;
-        let area = cross(sub(b, a), sub(c, a)).map(|x| x / 2.0);
-        Self { index, corners, centre: std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0), area }
+        let [a, b, c] = corners.map(DVec3::from);
+        Self { index, corners, centre: (a + b + c) / 3.0, area: (b - a).cross(c - a) / 2.0 }
     }
 }
 
 impl Group {
     fn of(members: &[Member]) -> Self {
         let centre = weighted_centre(members);
-        let (mut moments, mut radius) = (Moments::default(), 0.0_f64);
+        let (mut moments, mut radius) = (Moments::NONE, 0.0_f64);
         for member in members {
-            let corners = member.corners.map(|corner| sub(corner, centre));
+            let corners = member.corners.map(|corner| DVec3::from(corner) - centre);
             moments.add(corners, member.area);
-            radius = corners.iter().fold(radius, |radius, arm| radius.max(dot(*arm, *arm)));
+            radius = corners.iter().fold(radius, |radius, arm| radius.max(arm.length_squared()));
         }
         Self { centre, far: BETA * BETA * radius, moments, leaf: 0..0, next: 0 }
     }
 }
 
 impl Moments {
+    const NONE: Self =
+        Self { normal: DVec3::ZERO, linear: DMat3::ZERO, vector: DVec3::ZERO, cubic: ([DVec3::ZERO; 3], 0.0) };
+
     /// Adds a triangle of these corners, seen from the centre, and this area vector.
-    fn add(&mut self, [a, b, c]: [[f64; 3]; 3], n: [f64; 3]) {
-        let sum: [f64; 3] = std::array::from_fn(|i| a[i] + b[i] + c[i]);
+    fn add(&mut self, [a, b, c]: [DVec3; 3], n: DVec3) {
+        let sum = a + b + c;
         // The means of d and of d (x) d over the triangle.
-        let mean = sum.map(|x| x / 3.0);
-        let square = |i: usize, j: usize| (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + sum[i] * sum[j]) / 12.0;
-        let m: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| square(i, j)));
-        let trace = m[0][0] + m[1][1] + m[2][2];
+        let mean = sum / 3.0;
+        let row = |i: usize| (a * a[i] + b * b[i] + c * c[i] + sum * sum[i]) / 12.0;
+        let m = DMat3::from_cols(row(0), row(1), row(2));
+        self.normal += n;
+        self.vector += trace(&m) * n + 2.0 * (m * n);
+        self.linear += DMat3::from_cols(mean * n.x, mean * n.y, mean * n.z);
         for i in 0..3 {
-            self.normal[i] += n[i];
-            self.vector[i] += trace * n[i] + 2.0 * dot(m[i], n);
-            for j in 0..3 {
-                self.linear[i][j] += mean[i] * n[j];
-                let mixed = if i == j { 0.0 } else { 2.0 * m[i][j] * n[i] };
-                self.cubic[3 * i + j] += m[i][i] * n[j] + mixed;
-            }
+            let mut mixed = 2.0 * m.col(i) * n[i];
+            mixed[i] = 0.0;
+            self.cubic.0[i] += m.col(i)[i] * n + mixed;
         }
-        self.cubic[9] += 2.0 * (m[0][1] * n[2] + m[1][2] * n[0] + m[2][0] * n[1]);
+        self.cubic.1 += 2.0 * (m.x_axis.y * n.z + m.y_axis.z * n.x + m.z_axis.x * n.y);
     }
 
     /// The solid angle from afar; `r` points from the query to the centre, `squared` is its squared length.
-    fn solid_angle(&self, r: [f64; 3], squared: f64) -> f64 {
-        let c = &self.linear;
-        let trace = c[0][0] + c[1][1] + c[2][2];
-        let q = &self.cubic;
-        let rows: [f64; 3] = std::array::from_fn(|i| r[i] * r[i] * dot([q[3 * i], q[3 * i + 1], q[3 * i + 2]], r));
-        let cubic = rows[0] + rows[1] + rows[2] + q[9] * r[0] * r[1] * r[2];
-        let second = 3.0 * dot(r, c.map(|row| dot(row, r))) + 1.5 * dot(self.vector, r);
-        (dot(self.normal, r) + trace + (7.5 * cubic / squared - second) / squared) / (squared * squared.sqrt())
+    fn solid_angle(&self, r: DVec3, squared: f64) -> f64 {
+        let (squares, product) = &self.cubic;
+        let rows = [0, 1, 2].map(|i| r[i] * r[i] * squares[i].dot(r));
+        let cubic = rows[0] + rows[1] + rows[2] + product * r.x * r.y * r.z;
+        let second = 3.0 * r.dot(self.linear * r) + 1.5 * self.vector.dot(r);
+        (self.normal.dot(r) + trace(&self.linear) + (7.5 * cubic / squared - second) / squared)
+            / (squared * squared.sqrt())
     }
 }
 
+fn trace(m: &DMat3) -> f64 {
+    m.x_axis.x + m.y_axis.y + m.z_axis.z
+}
+
 /// The centre of the triangles weighted by area, or of their centres where none has an area.
-fn weighted_centre(members: &[Member]) -> [f64; 3] {
+fn weighted_centre(members: &[Member]) -> DVec3 {
     let total = |weight: fn(&Member) -> f64| {
-        members.iter().fold(([0.0; 3], 0.0), |(sum, all), member| {
+        members.iter().fold((DVec3::ZERO, 0.0), |(sum, all), member| {
             let w = weight(member);
-            (std::array::from_fn(|i| sum[i] + w * member.centre[i]), all + w)
+            (sum + w * member.centre, all + w)
         })
     };
-    let (mut sum, mut all) = total(|member| dot(member.area, member.area).sqrt());
+    let (mut sum, mut all) = total(|member| member.area.length());
     if all <= 0.0 {
         (sum, all) = total(|_| 1.0);
     }
-    sum.map(|x: f64| x / all)
+    sum / all
 }
 
 /// The axis along which the centres extend furthest.
@@ -224,14 +228,14 @@ fn longest_axis(members: &[Member]) -> usize {
 /// plane.
 #[must_use]
 pub fn solid_angle(corners: [[f64; 3]; 3], point: [f64; 3]) -> f64 {
-    let [a, b, c] = corners.map(|corner| sub(corner, point));
-    let determinant = dot(a, cross(b, c));
+    let [a, b, c] = corners.map(|corner| DVec3::from(corner) - DVec3::from(point));
+    let determinant = a.dot(b.cross(c));
     if determinant == 0.0 {
         // Within the triangle the angle jumps between plus and minus 2 pi: this is the mean.
         return 0.0;
     }
-    let [la, lb, lc] = [a, b, c].map(|side| dot(side, side).sqrt());
-    2.0 * libm::atan2(determinant, la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+    let [la, lb, lc] = [a, b, c].map(DVec3::length);
+    2.0 * libm::atan2(determinant, la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
 }
 
 #[cfg(test)]

@@ -4,12 +4,12 @@
 //! cavity, wound inwards, or a body, wound outwards; it is wrong where it would leave less than nothing inside: a winding
 //! number below zero. What lies in a piece that was inside out is taken for cavities and bodies by turns.
 
+use glam::DVec3;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
 use super::patches::Patches;
 use crate::grid::TriangleMesh;
-use crate::kernel::geometry::vector::{cross, dot, sub};
 use crate::kernel::geometry::winding_number::WindingTree;
 
 /// Volumes below this part of their box's are flat, with no inside to tell.
@@ -81,8 +81,8 @@ impl Piece {
                     hi[a] = hi[a].max(p[a]);
                 }
             }
-            let [a, b, c] = corners.map(|p| sub(p, from));
-            six += dot(a, cross(b, c));
+            let [a, b, c] = corners.map(|p| DVec3::from(p) - DVec3::from(from));
+            six += a.dot(b.cross(c));
         }
         let volume = six / 6.0;
         let of_box: f64 = (0..3).map(|a| hi[a] - lo[a]).product();

@@ -1,6 +1,8 @@
 //! The plane that an outline was drawn in: across an axis where it is flat in one, else through the outline itself.
 
-use crate::kernel::geometry::vector::{cross, dot, sub, unit};
+use glam::DVec3;
+
+use crate::kernel::geometry::vector::unit;
 
 /// A plane with coordinates of its own. Lengths are physical.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,7 +11,7 @@ pub struct Plane {
     pub normal: [f64; 3],
     /// `normal . p` of its points.
     pub offset: f64,
-    axes: [[f64; 3]; 2],
+    axes: [DVec3; 2],
 }
 
 /// Outlines whose normals differ by less than this angle's cosine are parallel (about half a degree).
@@ -24,10 +26,9 @@ impl Plane {
         let largest = (0..3).max_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs())).unwrap_or(0);
         let sign = if normal[largest] < 0.0 { -1.0 } else { 1.0 };
         let normal = normal.map(|v| sign * v);
-        let mut along = [0.0; 3];
-        along[(largest + 1) % 3] = 1.0;
-        let first = unit(sub(along, normal.map(|v| v * dot(normal, along))));
-        Self { normal, offset: sign * offset, axes: [first, cross(normal, first)] }
+        let (across, along) = (DVec3::from(normal), DVec3::AXES[(largest + 1) % 3]);
+        let first = unit(along - across * across.dot(along));
+        Self { normal, offset: sign * offset, axes: [first, across.cross(first)] }
     }
 
     /// The plane of a closed outline: of an axis, if it is flat within half of `tolerance` (a length for each axis); else
@@ -46,14 +47,12 @@ impl Plane {
             return Some(across(axis));
         }
         // Newell's normal: the sum of the areas that the edges span with a point.
-        let area = outline.iter().enumerate().fold([0.0; 3], |sum, (n, &p)| {
-            let by = cross(sub(p, mean), sub(outline[(n + 1) % outline.len()], mean));
-            std::array::from_fn(|a| sum[a] + by[a])
-        });
+        let seen = |n: usize| DVec3::from(outline[n % outline.len()]) - DVec3::from(mean);
+        let area = (0..outline.len()).fold(DVec3::ZERO, |sum, n| sum + seen(n).cross(seen(n + 1)));
         let normal = unit(area);
-        let plane = Self::new(normal, dot(normal, mean));
+        let plane = Self::new(normal.into(), normal.dot(mean.into()));
         let smallest = tolerance.into_iter().fold(f64::INFINITY, f64::min);
-        let is_flat = normal != [0.0; 3] && outline.iter().all(|&p| plane.height(p).abs() <= smallest);
+        let is_flat = normal != DVec3::ZERO && outline.iter().all(|&p| plane.height(p).abs() <= smallest);
         let scatter =
             |off: &dyn Fn(&[f64; 3]) -> f64| (outline.iter().map(|p| off(p).powi(2)).sum::<f64>() / count).sqrt();
         let own = scatter(&|&p| plane.height(p));
@@ -72,26 +71,25 @@ impl Plane {
     /// How far a point lies from the plane, along its normal.
     #[must_use]
     pub fn height(&self, point: [f64; 3]) -> f64 {
-        dot(self.normal, point) - self.offset
+        DVec3::from(self.normal).dot(point.into()) - self.offset
     }
 
     /// A point's coordinates in the plane.
     #[must_use]
     pub fn project(&self, point: [f64; 3]) -> [f64; 2] {
-        self.axes.map(|axis| dot(axis, point))
+        self.axes.map(|axis| axis.dot(point.into()))
     }
 
     /// The point of the plane with these coordinates, moved by `height` along the normal.
     #[must_use]
     pub fn lift(&self, [u, v]: [f64; 2], height: f64) -> [f64; 3] {
-        let along = self.offset + height;
-        std::array::from_fn(|a| u * self.axes[0][a] + v * self.axes[1][a] + along * self.normal[a])
+        (u * self.axes[0] + v * self.axes[1] + (self.offset + height) * DVec3::from(self.normal)).into()
     }
 
     /// True where both planes face the same way.
     #[must_use]
     pub fn is_parallel_to(&self, other: &Self) -> bool {
-        dot(self.normal, other.normal).abs() > PARALLEL
+        DVec3::from(self.normal).dot(other.normal.into()).abs() > PARALLEL
     }
 }
 

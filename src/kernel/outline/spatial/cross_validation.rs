@@ -1,9 +1,9 @@
 //! Leave one section out: how far its marks lie from the shape of the others tells how sure a shape is between marks.
 
+use glam::DVec3;
 use rstar::RTree;
 
 use super::fitted::Fitted;
-use crate::kernel::geometry::vector::{dot, sub};
 use crate::kernel::outline::planar::section::Section;
 
 /// A shape without a section is fitted to so many of those nearest to it.
@@ -51,8 +51,5 @@ pub fn leave_out(sections: &[&Section], n: usize, least: f64) -> Option<Vec<Held
 }
 
 fn nearest(points: &RTree<[f64; 3]>, to: [f64; 3]) -> f64 {
-    points.nearest_neighbor(to).map_or(f64::INFINITY, |&p| {
-        let by = sub(p, to);
-        dot(by, by).sqrt()
-    })
+    points.nearest_neighbor(to).map_or(f64::INFINITY, |&p| DVec3::from(p).distance(to.into()))
 }

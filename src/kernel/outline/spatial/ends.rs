@@ -2,13 +2,14 @@
 //! been marked. An end is round, and narrows to a point there; but where that is near beside the section's width it is
 //! flat, and half way there.
 
-use crate::kernel::geometry::vector::dot;
+use glam::DVec3;
+
 use crate::kernel::outline::planar::section::{Section, widest_gap};
 
 /// The ends of an object along the normal of its sections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
-    normal: [f64; 3],
+    normal: DVec3,
     /// Offsets of the first and last section.
     marked: [f64; 2],
     /// How far beyond them the next ones would have been marked.
@@ -35,7 +36,7 @@ impl Ends {
             let depth = section.deepest().map_or(0.0, |(_, depth)| depth);
             if height < ROUND * depth { 0.5 * height } else { height }
         });
-        Some(Self { normal: first.plane.normal, marked: [first.plane.offset, last.plane.offset], height, reach })
+        Some(Self { normal: first.plane.normal.into(), marked: [first.plane.offset, last.plane.offset], height, reach })
     }
 
     /// How far the object reaches along the normal, at the most.
@@ -59,7 +60,7 @@ impl Ends {
     /// Where a point lies along the normal.
     #[must_use]
     pub fn offset(&self, point: [f64; 3]) -> f64 {
-        dot(self.normal, point)
+        self.normal.dot(point.into())
     }
 
     /// How far a point lies beyond the nearer section at an end; 0 between both.

@@ -4,11 +4,12 @@
 //! where there are many (`windows.rs`), divided by the norm of their gradient; and an end beyond the last sections
 //! (`ends.rs`).
 
+use glam::DVec3;
+
 use super::ends::Ends;
 use super::radial_basis::RadialBasis;
 use super::samples::Samples;
 use super::windows::{Window, windows};
-use crate::kernel::geometry::vector::dot;
 use crate::kernel::outline::planar::section::Section;
 
 /// Points beside outlines lie at least so many smallest spacings away.
@@ -120,20 +121,19 @@ impl Fitted {
     #[must_use]
     pub fn distance(&self, point: [f64; 3]) -> (f64, [f64; 3]) {
         let (value, gradient) = self.value(point);
-        let norm = dot(gradient, gradient).sqrt();
+        let norm = gradient.length();
         let distance = value / norm.clamp(NORMS[0], NORMS[1]);
         let beyond = self.ends.map_or(f64::NEG_INFINITY, |ends| ends.beyond(point));
-        let direction = gradient.map(|g| g / norm.max(f64::MIN_POSITIVE));
-        (distance.max(beyond), direction)
+        (distance.max(beyond), (gradient / norm.max(f64::MIN_POSITIVE)).into())
     }
 
-    fn value(&self, point: [f64; 3]) -> (f64, [f64; 3]) {
+    fn value(&self, point: [f64; 3]) -> (f64, DVec3) {
         let offset = self.ends.map_or(0.0, |ends| ends.offset(point));
         let weighted = self.parts.iter().map(|(window, function)| (window.weight(offset), function));
-        let mut sum = (0.0, [0.0; 3]);
+        let mut sum = (0.0, DVec3::ZERO);
         for (weight, function) in weighted.filter(|(weight, _)| *weight > 0.0) {
             let (value, gradient) = function.value(point);
-            sum = (sum.0 + weight * value, std::array::from_fn(|a| sum.1[a] + weight * gradient[a]));
+            sum = (sum.0 + weight * value, sum.1 + weight * DVec3::from(gradient));
         }
         sum
     }

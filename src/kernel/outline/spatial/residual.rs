@@ -3,8 +3,9 @@
 //! to the truth than one that carries the corners of an outline straight on. Directions count by how near their sections
 //! are.
 
+use glam::DVec3;
+
 use crate::grid::{Box3, Geometry};
-use crate::kernel::geometry::vector::dot;
 use crate::kernel::outline::planar::section::Section;
 
 /// What is left to a section's own distance counts up to so many smallest spacings.
@@ -26,9 +27,14 @@ pub(crate) struct Family<'a> {
 }
 
 impl Family<'_> {
+    /// Where a point lies along the normal that the sections have in common.
+    fn along(&self, point: [f64; 3]) -> f64 {
+        DVec3::from(self.sections[0].plane.normal).dot(point.into())
+    }
+
     /// How far the nearest section's plane is from a point.
     pub(crate) fn away(&self, point: [f64; 3]) -> f64 {
-        let along = dot(self.sections[0].plane.normal, point);
+        let along = self.along(point);
         let above = self.sections.partition_point(|section| section.plane.offset <= along);
         let at = |n: usize| self.sections.get(n).map_or(f64::INFINITY, |section| (section.plane.offset - along).abs());
         at(above).min(at(above.wrapping_sub(1)))
@@ -103,7 +109,7 @@ impl<F: Fn([f64; 3]) -> f64> Residuals<'_, F> {
     /// What is left at a voxel, and how far the nearest section is.
     fn at(&mut self, voxel: [i64; 3], point: [f64; 3], h: f64) -> (f64, f64) {
         let sections = &self.family.sections;
-        let along = dot(sections[0].plane.normal, point);
+        let along = self.family.along(point);
         let above = sections.partition_point(|section| section.plane.offset <= along);
         let away = |n: usize| (sections[n].plane.offset - along).abs();
         let share = |away: f64| libm::exp(-(away / self.family.fade.max(h)).powi(2));

@@ -1,12 +1,13 @@
 //! `SurfaceMeasure`: volume, area, closedness and pieces of a mesh, summed while its triangles pass.
 
-use crate::kernel::geometry::vector::{cross, dot, sub};
+use glam::DVec3;
+
 use crate::kernel::surface::{Components, EdgeTally};
 
 /// Running sums over triangles, in f64 and in the order the triangles come.
 #[derive(Clone, Debug)]
 pub struct SurfaceMeasure {
-    centre: [f64; 3],
+    centre: DVec3,
     /// Six times the volume.
     volume6: f64,
     /// Twice the area.
@@ -47,7 +48,7 @@ impl SurfaceMeasure {
     #[must_use]
     pub fn new(centre: [f64; 3]) -> Self {
         Self {
-            centre,
+            centre: centre.into(),
             volume6: 0.0,
             area2: 0.0,
             triangles: 0,
@@ -58,11 +59,10 @@ impl SurfaceMeasure {
 
     /// Adds a triangle, its corners as vertex numbers and as world positions.
     pub fn add(&mut self, corners: [u32; 3], positions: [[f64; 3]; 3]) {
-        let [a, b, c] = positions.map(|p| sub(p, self.centre));
+        let [a, b, c] = positions.map(|p| DVec3::from(p) - self.centre);
         // Divergence theorem: the tetrahedron from the centre to a triangle has the volume a . (b x c) / 6.
-        self.volume6 += dot(a, cross(b, c));
-        let normal = cross(sub(b, a), sub(c, a));
-        self.area2 += dot(normal, normal).sqrt();
+        self.volume6 += a.dot(b.cross(c));
+        self.area2 += (b - a).cross(c - a).length();
         self.triangles += 1;
         self.edges.add(corners);
         self.components.add(corners);

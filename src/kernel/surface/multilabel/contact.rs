@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
+
 use crate::grid::Geometry;
-use crate::kernel::geometry::vector::{cross, dot, sub};
 
 /// The faces between two labels. Lengths physical.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +23,7 @@ pub struct Contact {
 #[derive(Clone, Debug)]
 pub struct Contacts {
     /// Where positions are seen from, so that a mesh far from the origin loses no digits.
-    from: [f64; 3],
+    from: DVec3,
     known: BTreeMap<[u32; 2], Contact>,
 }
 
@@ -30,16 +31,15 @@ impl Contacts {
     /// None yet, on a grid.
     #[must_use]
     pub fn new(geometry: &Geometry) -> Self {
-        Self { from: geometry.origin, known: BTreeMap::new() }
+        Self { from: geometry.origin.into(), known: BTreeMap::new() }
     }
 
     /// Adds a triangle by its corners in the world.
     pub fn add(&mut self, labels: [u32; 2], corners: [[f64; 3]; 3]) {
         let new = Contact { labels, area: 0.0, centre: [0.0; 3], triangles: 0 };
         let contact = self.known.entry(labels).or_insert(new);
-        let [a, b, c] = corners.map(|corner| sub(corner, self.from));
-        let normal = cross(sub(b, a), sub(c, a));
-        let area = 0.5 * dot(normal, normal).sqrt();
+        let [a, b, c] = corners.map(|corner| DVec3::from(corner) - self.from);
+        let area = 0.5 * (b - a).cross(c - a).length();
         contact.area += area;
         contact.triangles += 1;
         // The moment, until it is divided by the area.

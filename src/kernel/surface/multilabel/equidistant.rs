@@ -6,10 +6,12 @@
 //! On an edge the difference of two exact distances is brought to zero (regula falsi, Illinois); in a triangle of three
 //! labels and a tetrahedron of four all of them are made equal by Newton's method.
 
+use glam::DVec3;
+
 use super::corner::Corner;
 use super::known::Known;
 use crate::grid::Box3;
-use crate::kernel::geometry::vector::{solved, sub, unit};
+use crate::kernel::geometry::vector::{solved, unit};
 
 /// How close to a voxel centre a vertex may come, in parts of the edge: triangles keep an area.
 const MARGIN: f64 = 1.0 / 1024.0;
@@ -40,7 +42,7 @@ pub struct Between {
     pub distance: f64,
     /// The direction across the surface, towards the side of the larger label, of unit length, on an edge; else 0.
     /// Physical.
-    pub normal: [f64; 3],
+    pub normal: DVec3,
 }
 
 /// Work buffers: the sources of each label around.
@@ -57,7 +59,7 @@ impl Candidates {
         let [from, to] = corners.map(|corner| corner.place);
         let place = |t: f64| -> [f64; 3] { std::array::from_fn(|a| from[a] + t * (to[a] - from[a])) };
         let ends = [from, to].map(|place| known.world(place));
-        let length = (0..3).map(|a| (ends[0][a] - ends[1][a]).powi(2)).sum::<f64>().sqrt();
+        let length = DVec3::from(ends[0]).distance(ends[1].into());
         let (mut t, mut last) = (0.5, f64::INFINITY);
         for n in 1..=LOOKUPS {
             let difference = |t: f64| {
@@ -73,7 +75,8 @@ impl Candidates {
         let here = known.world(place(t));
         let distance = self.distance(known, 0, here).min(self.distance(known, 1, here));
         // Towards the larger label, whichever way the edge runs.
-        let normal = self.normal(known, here).map(|n| if labels[0] < labels[1] { n } else { -n });
+        let normal = self.normal(known, here);
+        let normal = if labels[0] < labels[1] { normal } else { -normal };
         Between { position: place(t), distance, normal }
     }
 
@@ -99,7 +102,7 @@ impl Candidates {
         }
         let here = known.world(place(weights));
         let distance = (0..N).map(|n| self.distance(known, n, here)).fold(f64::INFINITY, f64::min);
-        Between { position: place(weights), distance, normal: [0.0; 3] }
+        Between { position: place(weights), distance, normal: DVec3::ZERO }
     }
 
     /// A place within corners that was found otherwise.
@@ -109,18 +112,19 @@ impl Candidates {
         self.look_up(known, &labels, position);
         let here = known.world(position);
         let distance = (0..labels.len()).map(|n| self.distance(known, n, here)).fold(f64::INFINITY, f64::min);
-        Between { position, distance, normal: [0.0; 3] }
+        Between { position, distance, normal: DVec3::ZERO }
     }
 
     /// The direction in which the difference of the distances to the first two labels grows fastest.
-    fn normal(&self, known: &Known<'_>, here: [f64; 3]) -> [f64; 3] {
+    fn normal(&self, known: &Known<'_>, here: [f64; 3]) -> DVec3 {
         let away = [0, 1].map(|n| {
             let nearer =
                 |a: &&u32, b: &&u32| known.shapes.distance(here, **a).total_cmp(&known.shapes.distance(here, **b));
             let source = self.of_label[n].iter().min_by(nearer);
-            unit(source.map_or([0.0; 3], |&source| sub(here, known.shapes.closest(here, source))))
+            let from = |&source: &u32| DVec3::from(here) - DVec3::from(known.shapes.closest(here, source));
+            unit(source.map_or(DVec3::ZERO, from))
         });
-        unit(sub(away[0], away[1]))
+        unit(away[0] - away[1])
     }
 
     /// Collects the sources of each corner's label one voxel around, those nearest to the middle of the corners.

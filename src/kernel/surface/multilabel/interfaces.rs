@@ -8,6 +8,8 @@
 
 use std::collections::HashMap;
 
+use glam::DVec3;
+
 use super::corner::Corner;
 use super::creases::{self, Crossing};
 use super::equidistant::{Between, Candidates};
@@ -46,7 +48,7 @@ pub struct Interfaces {
     vertices: HashMap<VertexKey, u32>,
     candidates: Candidates,
     /// The direction across the surface at each vertex of the patch.
-    normals: Vec<[f64; 3]>,
+    normals: Vec<DVec3>,
 }
 
 /// What splits the edges of a cell, by the middle of the edge in halves of voxels of the cell, x fastest.
@@ -185,7 +187,7 @@ impl Interfaces {
                 let point = |&(within, vertex): &(u8, u32)| Point {
                     within,
                     place: physical(known, patch.patch.positions[vertex as usize]),
-                    normal: self.normals[vertex as usize].map(|n| sign * n),
+                    normal: sign * self.normals[vertex as usize],
                 };
                 polygon::cut(&ring.iter().map(point).collect::<Vec<_>>()).into_iter().map(number).collect()
             }
@@ -232,12 +234,11 @@ impl Interfaces {
         patch: &mut TaggedPatch,
     ) -> u32 {
         let place = |vertex: u32| physical(known, patch.patch.positions[vertex as usize]);
-        let sum = |a: usize| meeting.iter().map(|&n| place(n)[a]).sum::<f64>();
-        let around = std::array::from_fn(|a| sum(a) / meeting.len() as f64);
+        let around = meeting.iter().map(|&n| place(n)).sum::<DVec3>() / meeting.len() as f64;
         let sides: Vec<Crossing> =
             sides.iter().map(|&n| Crossing { place: place(n), normal: self.normals[n as usize] }).collect();
         let found = creases::peak(tetrahedron.corners.map(|corner| physical(known, corner.place)), &sides, around);
-        let position = std::array::from_fn(|a| found[a] / known.geometry.spacing[a]);
+        let position = (found / DVec3::from(known.geometry.spacing)).into();
         let (corners, _, key) = tetrahedron.sorted(0b1111);
         self.enter(key, patch, |candidates| candidates.at(known, &corners, position))
     }
@@ -277,6 +278,6 @@ fn place_in_cell(cell: [i64; 3], halves: [i64; 3]) -> usize {
 }
 
 /// A place in physical units, from the centre of the domain's first voxel.
-fn physical(known: &Known<'_>, place: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|a| place[a] * known.geometry.spacing[a])
+fn physical(known: &Known<'_>, place: [f64; 3]) -> DVec3 {
+    DVec3::from(place) * DVec3::from(known.geometry.spacing)
 }

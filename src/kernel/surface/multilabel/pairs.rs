@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::kernel::geometry::vector::{cross, dot, sub};
+use glam::DVec3;
 
 /// The surface between two labels. Lengths physical.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,11 +31,10 @@ impl Pairs {
         let far = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
         let new = Pair { labels, area: 0.0, triangles: 0, extent: far, distance: [f64::INFINITY, f64::NEG_INFINITY] };
         let pair = self.known.entry(labels).or_insert(new);
-        let [a, b, c] = corners;
-        let normal = cross(sub(b, a), sub(c, a));
-        pair.area += 0.5 * dot(normal, normal).sqrt();
+        let [a, b, c] = corners.map(DVec3::from);
+        pair.area += 0.5 * (b - a).cross(c - a).length();
         pair.triangles += 1;
-        for (corner, distance) in [a, b, c].into_iter().zip(distances) {
+        for (corner, distance) in corners.into_iter().zip(distances) {
             for (axis, place) in corner.into_iter().enumerate() {
                 pair.extent[0][axis] = pair.extent[0][axis].min(place);
                 pair.extent[1][axis] = pair.extent[1][axis].max(place);

@@ -118,7 +118,7 @@ fn place(part: &Box3, corner: &Corner) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::geometry::vector::{cross, dot, sub};
+    use glam::DVec3;
 
     /// The areas between labels of a volume that `label` tells, which ends within a box of `edge` voxels.
     fn areas(edge: i64, label: impl Fn([f64; 3]) -> u32) -> Vec<([u32; 2], f64)> {
@@ -130,9 +130,8 @@ mod tests {
         Partition::default().extract(&labels, &around, &cells, &mut patch);
         let mut found = std::collections::BTreeMap::new();
         for (triangle, pair) in patch.triangles.iter().zip(&patch.pairs) {
-            let [a, b, c] = triangle.map(|v| patch.positions[v as usize]);
-            let normal = cross(sub(b, a), sub(c, a));
-            *found.entry(*pair).or_insert(0.0) += 0.5 * dot(normal, normal).sqrt();
+            let [a, b, c] = triangle.map(|v| DVec3::from(patch.positions[v as usize]));
+            *found.entry(*pair).or_insert(0.0) += 0.5 * (b - a).cross(c - a).length();
         }
         found.into_iter().collect()
     }

@@ -3,7 +3,9 @@
 //! A diagonal must not lie in a side of the tetrahedron: the tetrahedron behind it might draw it too. Of the cuts that
 //! are left the best is the one whose triangles are turned like the surface at their vertices: it keeps the crease.
 
-use crate::kernel::geometry::vector::{cross, dot, sub, unit};
+use glam::DVec3;
+
+use crate::kernel::geometry::vector::unit;
 
 /// A vertex of the polygon.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,9 +13,9 @@ pub(crate) struct Point {
     /// The corners of the tetrahedron that it lies within, as bits.
     pub(crate) within: u8,
     /// Where it lies, physical.
-    pub(crate) place: [f64; 3],
+    pub(crate) place: DVec3,
     /// The direction across the surface there, seen from where the polygon runs counter-clockwise; 0 where it has none.
-    pub(crate) normal: [f64; 3],
+    pub(crate) normal: DVec3,
 }
 
 /// The triangles of a polygon, by the places of their vertices in it.
@@ -47,9 +49,9 @@ fn best(polygon: &[Point], from: usize, to: usize) -> Option<(f64, Vec<[usize; 3
 /// The cosine between a triangle's direction and that of the surface at its vertices.
 fn turned(points: [Point; 3]) -> f64 {
     let [a, b, c] = points.map(|point| point.place);
-    let across = std::array::from_fn(|n| points.iter().map(|point| point.normal[n]).sum());
+    let across = points.iter().map(|point| point.normal).sum::<DVec3>();
     // Three vertices on a crease tell of no direction.
-    if across == [0.0; 3] { 1.0 } else { dot(unit(cross(sub(b, a), sub(c, a))), unit(across)) }
+    if across == DVec3::ZERO { 1.0 } else { unit((b - a).cross(c - a)).dot(unit(across)) }
 }
 
 #[cfg(test)]
@@ -59,7 +61,8 @@ mod tests {
     /// A roof over four vertices with its ridge along x; two vertices of the ring lie on the ridge.
     #[test]
     fn a_ridge_is_kept() {
-        let point = |within, place, normal| Point { within, place, normal };
+        let point =
+            |within, place: [f64; 3], normal: [f64; 3]| Point { within, place: place.into(), normal: normal.into() };
         let (left, right) = ([0.0, -0.6, 0.8], [0.0, 0.6, 0.8]);
         let ring = [
             point(0b0011, [0.0, -1.0, 0.0], left),

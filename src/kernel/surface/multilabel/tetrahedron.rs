@@ -4,8 +4,9 @@
 //! A piece is a polygon between two labels. Its vertices lie within sets of corners, written as bits: on an edge between
 //! two labels, in a triangle of three, in the tetrahedron of four. Where they lie there, others say.
 
+use glam::DVec3;
+
 use super::corner::Corner;
-use crate::kernel::geometry::vector::{cross, dot, sub};
 use crate::kernel::surface::mesh::vertex_key::VertexKey;
 
 /// Orders in which a way along a cell's edges can take the axes; each is a tetrahedron.
@@ -63,17 +64,15 @@ impl Tetrahedron {
         let [from, to] = corners;
         let [low, high] = self.pair(corners);
         // Which way round is told from the middles of what vertices lie within, which never fall together.
-        let middles = [0, 1, 2].map(|n| self.middle(polygon[n]));
-        let normal = cross(sub(middles[1], middles[0]), sub(middles[2], middles[0]));
-        let along = sub(self.middle(to), self.middle(from));
-        (dot(normal, along) > 0.0) == (low < high)
+        let [a, b, c] = [0, 1, 2].map(|n| self.middle(polygon[n]));
+        let along = self.middle(to) - self.middle(from);
+        ((b - a).cross(c - a).dot(along) > 0.0) == (low < high)
     }
 
     /// The middle of some of its corners, voxel units.
-    fn middle(&self, set: u8) -> [f64; 3] {
-        let corners =
-            || self.corners.iter().enumerate().filter(move |(n, _)| set >> n & 1 == 1).map(|(_, corner)| corner);
-        std::array::from_fn(|a| corners().map(|corner| corner.place[a]).sum::<f64>() / f64::from(set.count_ones()))
+    fn middle(&self, set: u8) -> DVec3 {
+        let corners = self.corners.iter().enumerate().filter(|(n, _)| set >> n & 1 == 1);
+        corners.map(|(_, corner)| DVec3::from(corner.place)).sum::<DVec3>() / f64::from(set.count_ones())
     }
 
     /// Some of its corners in the order of all cells, how many they are, and the key of the vertex within them.
