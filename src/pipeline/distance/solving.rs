@@ -22,7 +22,7 @@ use crate::kernel::distance::methods::shape_distance::ShapeDistance;
 use crate::kernel::distance::methods::tracked::TrackedSource;
 use crate::kernel::distance::methods::vector_distance::VectorDistance;
 use crate::kernel::distance::repair::bends::REACH;
-use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
+use crate::kernel::distance::state::method::{DistanceMethod, DistanceState, OrderedSweeps};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::distance::tracking::parents::{Parents, ShortestWay, UpwindSum};
@@ -94,14 +94,14 @@ pub(super) fn dijkstra_pythagoras<'a, P: Precision>(
 
 impl<'a> Solving<'_, 'a> {
     /// A method's start: its state with the voxels that sources fix.
-    fn start<M: DistanceMethod>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
+    fn start<M: DistanceState>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
         let seeded = initialise::<M>(self.stage, self.sources, &state, None, (start, self.options.farthest))?;
         Ok((state, seeded))
     }
 
     /// The start of a method that keeps no sources, and a field with those of its fixed voxels.
-    fn start_apart<M: DistanceMethod>(&self) -> Result<(BrickArray<M::State>, BrickArray<SourceState>, Seeded)> {
+    fn start_apart<M: DistanceState>(&self) -> Result<(BrickArray<M::State>, BrickArray<SourceState>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
         let sources = BrickArray::blank(self.engine.scratch(), self.set, SourceState::FAR)?;
         let seeded =
@@ -113,7 +113,7 @@ impl<'a> Solving<'_, 'a> {
         let (state, seeded) = self.start::<M>(Start::Told)?;
         let geometry = self.sources.geometry;
         // Where sources are looked at again, those beyond the last voxel that counts are asked too.
-        let beyond = if M::told(0).is_some() { geometry.length([REACH; 3]) } else { 0.0 };
+        let beyond = if M::trial(0).is_some() { geometry.length([REACH; 3]) } else { 0.0 };
         let farthest = self.options.farthest + beyond;
         advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, farthest)?;
         look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
@@ -179,7 +179,7 @@ impl<'a> Solving<'_, 'a> {
         trace_sources::<P, R>(self.stage, geometry, labelled, state, sources, &seeded.bricks)
     }
 
-    fn front_vector<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+    fn front_vector<P: Precision, S: DistanceMethod + TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
         match self.options.neighbours {
             Neighbours::Faces => self.front(sources),
             Neighbours::All => self.front(AllNeighbours::new(sources)),
@@ -197,7 +197,7 @@ impl<'a> Solving<'_, 'a> {
         Ok(self.solved(method, state, &seeded))
     }
 
-    fn heap_marching<P: Precision, M: DistanceMethod<State = P> + 'a, S: TrackedSource>(
+    fn heap_marching<P: Precision, M: DistanceState<State = P> + 'a, S: TrackedSource>(
         &self,
         method: M,
         start: &S,
@@ -209,7 +209,7 @@ impl<'a> Solving<'_, 'a> {
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 
-    fn solved<P: Precision, M: DistanceMethod + 'a>(
+    fn solved<P: Precision, M: DistanceState + 'a>(
         &self,
         method: M,
         state: BrickArray<M::State>,

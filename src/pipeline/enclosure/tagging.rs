@@ -5,9 +5,7 @@
 
 use super::far_regions::FarRegions;
 use crate::error::Result;
-use crate::exec::{
-    Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, checkerboard, one_wave,
-};
+use crate::exec::{Boundary, Engine, FixedPoint, HaloPlan, Reach, Stage, Workers, one_wave, relax_to_fixed_point};
 use crate::grid::{FACES, Face, Slot};
 use crate::kernel::level_set::initial::basins;
 use crate::kernel::level_set::initial::basins::Piece;
@@ -102,12 +100,9 @@ fn flood_all(
         }
     }
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
-    let exchange = &Exchange::new(stage.comm(), &set, &plan)?;
     let edge = set.grid().edge() as usize;
-    let workers = &Workers::new(move || HaloTile::new(edge));
-    let mut flood = Flood { distance, level, far, plan, dirty: vec![true; set.len()] };
-    let rounds = Waves { stage, exchange, workers, waves: &checkerboard(&set) }.relax(&mut flood, Until::QUIET)?;
-    stage.iterated(rounds, 0.0);
+    let mut flood = Flood { distance, level, far, plan };
+    relax_to_fixed_point(stage, Reach::Faces, &Workers::new(move || HaloTile::new(edge)), &mut flood)?;
     Ok(flood.level)
 }
 
@@ -116,24 +111,17 @@ struct Flood<'a> {
     level: BrickArray<f32>,
     far: &'a mut FarRegions,
     plan: HaloPlan,
-    dirty: Vec<bool>,
 }
 
-impl Relax for Flood<'_> {
+impl FixedPoint for Flood<'_> {
     type State = f32;
     type Work = HaloTile<f32>;
-    type Visit = bool;
-    type Note = [f64; 0];
 
     fn field(&self) -> &BrickArray<f32> {
         &self.level
     }
 
-    fn priority(&self, slot: Slot) -> f64 {
-        if self.dirty[slot as usize] { 0.0 } else { f64::INFINITY }
-    }
-
-    fn visit(&self, tile: &mut HaloTile<f32>, slot: Slot, _wave: usize) -> Result<bool> {
+    fn relax(&self, tile: &mut HaloTile<f32>, slot: Slot) -> Result<bool> {
         self.plan.gather(&self.level, slot, Boundary::Constant(f32::INFINITY), tile);
         let rose = self.distance.read(slot, |d| flood::relax(tile, d));
         if rose {
@@ -142,22 +130,13 @@ impl Relax for Flood<'_> {
         Ok(rose)
     }
 
-    fn note(&self, _slot: Slot, rose: &bool) -> Option<[f64; 0]> {
-        rose.then_some([])
-    }
-
-    fn visited(&mut self, slot: Slot, _rose: bool) {
-        self.dirty[slot as usize] = false;
-    }
-
-    /// Marks the bricks beside one that rose; a far region that rises wakes every brick around it.
-    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+    /// A far region beside a brick that rose may rise too, which marks every brick around it.
+    fn changed(&mut self, slot: Slot, mut mark: impl FnMut(Slot)) {
         let set = self.distance.set();
         let grid = set.grid();
         for face in FACES {
             let Some(id) = grid.neighbour(set.id(slot), face.offset()) else { continue };
-            if let Some(neighbour) = set.slot(id) {
-                self.dirty[neighbour as usize] = true;
+            if set.slot(id).is_some() {
                 continue;
             }
             let highest = self.level.read_face(slot, face, flood::highest);
@@ -165,7 +144,7 @@ impl Relax for Flood<'_> {
             for &far_brick in bricks {
                 self.level.set_absent(far_brick, raised);
                 let around = FACES.iter().filter_map(|face| grid.neighbour(far_brick, face.offset()));
-                around.filter_map(|id| set.slot(id)).for_each(|woken| self.dirty[woken as usize] = true);
+                around.filter_map(|id| set.slot(id)).for_each(&mut mark);
             }
         }
     }

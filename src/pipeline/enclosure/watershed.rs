@@ -10,10 +10,8 @@ use std::sync::Arc;
 use super::far_regions::FarRegions;
 use super::tagging::Basin;
 use crate::error::Result;
-use crate::exec::{
-    Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, checkerboard, one_wave,
-};
-use crate::grid::{Box3, BrickId, BrickSet, FACES, Face, Slot};
+use crate::exec::{Boundary, Engine, FixedPoint, HaloPlan, Reach, Stage, Workers, one_wave, relax_to_fixed_point};
+use crate::grid::{Box3, BrickId, BrickSet, Face, Slot};
 use crate::kernel::level_set::initial::ascent::{Ascent, OUTSIDE, renumber};
 use crate::kernel::level_set::initial::contacts::{Contact, contacts, count};
 use crate::kernel::level_set::initial::spaces;
@@ -70,7 +68,8 @@ pub fn watershed(
         workers: Workers::new(make),
     };
     let (of_voxel, mut regions) = flood.peaks(engine, &far)?;
-    flood.descend(&of_voxel)?;
+    let mut descent = Descent { watershed: &flood, of_voxel: &of_voxel };
+    relax_to_fixed_point(stage, Reach::Faces, &flood.workers, &mut descent)?;
     let contacts = flood.contacts(&of_voxel, &mut regions)?;
     let least = |voxels: f64| (voxels * sources.geometry.min_spacing()) as f32;
     let (is_inside, found) =
@@ -142,16 +141,6 @@ impl Watershed<'_> {
         Ok((of_voxel, regions))
     }
 
-    /// Carries regions down until every voxel has one.
-    fn descend(&self, of_voxel: &BrickArray<u32>) -> Result<()> {
-        let (stage, set) = (self.stage, self.set());
-        let exchange = &Exchange::new(stage.comm(), set, &self.plan)?;
-        let waves = Waves { stage, exchange, workers: &self.workers, waves: &checkerboard(set) };
-        let mut descent = Descent { watershed: self, of_voxel, dirty: vec![true; set.len()] };
-        stage.iterated(waves.relax(&mut descent, Until::QUIET)?, 0.0);
-        Ok(())
-    }
-
     /// Where regions meet, with the brick each place is in; counts the voxels of all regions.
     fn contacts(&self, of_voxel: &BrickArray<u32>, regions: &mut [Region]) -> Result<Vec<(Contact, BrickId)>> {
         let set = self.set();
@@ -189,28 +178,21 @@ impl Watershed<'_> {
     }
 }
 
-/// Regions on their way down the distance.
+/// Regions on their way down the distance, until every voxel has one.
 struct Descent<'a> {
     watershed: &'a Watershed<'a>,
     of_voxel: &'a BrickArray<u32>,
-    dirty: Vec<bool>,
 }
 
-impl Relax for Descent<'_> {
+impl FixedPoint for Descent<'_> {
     type State = u32;
     type Work = Worker;
-    type Visit = bool;
-    type Note = [f64; 0];
 
     fn field(&self) -> &BrickArray<u32> {
         self.of_voxel
     }
 
-    fn priority(&self, slot: Slot) -> f64 {
-        if self.dirty[slot as usize] { 0.0 } else { f64::INFINITY }
-    }
-
-    fn visit(&self, w: &mut Worker, slot: Slot, _wave: usize) -> Result<bool> {
+    fn relax(&self, w: &mut Worker, slot: Slot) -> Result<bool> {
         let Watershed { plan, spacing, .. } = self.watershed;
         self.watershed.gather_distance(slot, &mut w.d);
         plan.gather(self.of_voxel, slot, Boundary::Constant(OUTSIDE), &mut w.regions);
@@ -219,20 +201,6 @@ impl Relax for Descent<'_> {
             plan.scatter(&w.regions, self.of_voxel, slot);
         }
         Ok(changed)
-    }
-
-    fn note(&self, _slot: Slot, changed: &bool) -> Option<[f64; 0]> {
-        changed.then_some([])
-    }
-
-    fn visited(&mut self, slot: Slot, _changed: bool) {
-        self.dirty[slot as usize] = false;
-    }
-
-    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
-        let set = self.of_voxel.set();
-        let beside = FACES.into_iter().filter_map(|face| set.neighbour(slot, face.offset()));
-        beside.for_each(|slot| self.dirty[slot as usize] = true);
     }
 }
 

@@ -6,7 +6,7 @@
 //! so the tile is not laid out along diagonals, and its end depends on the sweeps' order where sources are lost. In
 //! and out: a grown tile of source indices, the top bit set on fixed voxels. Halo 1, all 26 directions. No scratch.
 
-use super::tracked::TrackedSource;
+use super::tracked::{CarriesSources, TrackedSource};
 use crate::grid::{Box3, NEIGHBOURS_26, NO_SOURCE, SourceState};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
@@ -41,7 +41,7 @@ impl<S: TrackedSource> AllNeighbours<S> {
                 for x in ordered(0) {
                     let (at, state) = (row + x as usize, tile.data_mut());
                     let kept = state[at];
-                    if S::is_fixed(kept) {
+                    if kept.is_frozen() {
                         continue;
                     }
                     let voxel = [part.lo[0] + x, part.lo[1] + y, part.lo[2] + z];
@@ -90,7 +90,7 @@ impl<S: TrackedSource> AllNeighbours<S> {
             let there: [i64; 3] = std::array::from_fn(|a| voxel[a] + offset[a]);
             let own = state[at.wrapping_add_signed(*step)];
             let passed = (offset[slowest] < 0) == upward[slowest];
-            if !passed || back >> slowest & 1 == 1 || !part.contains(there) || S::is_fixed(own) || own == state[at] {
+            if !passed || back >> slowest & 1 == 1 || !part.contains(there) || own.is_frozen() || own == state[at] {
                 continue;
             }
             let there = self.position(there);
@@ -106,22 +106,16 @@ impl<S: TrackedSource> AllNeighbours<S> {
     }
 }
 
+impl<S: TrackedSource> CarriesSources for AllNeighbours<S> {
+    type Sources = S;
+
+    fn sources(&self) -> &S {
+        &self.sources
+    }
+}
+
 impl<S: TrackedSource> DistanceMethod for AllNeighbours<S> {
-    type State = SourceState;
     type Work = ();
-    const UNKNOWN: SourceState = SourceState::FAR;
-
-    fn fixed(squared: f64, source: u32) -> SourceState {
-        S::fixed(squared, source)
-    }
-
-    fn told(source: u32) -> Option<SourceState> {
-        S::told(source)
-    }
-
-    fn is_fixed(state: SourceState) -> bool {
-        S::is_fixed(state)
-    }
 
     fn work(_: usize) {}
 
@@ -139,21 +133,5 @@ impl<S: TrackedSource> DistanceMethod for AllNeighbours<S> {
 
     fn neighbours(&self) -> Neighbours {
         Neighbours::All
-    }
-
-    fn entering(&self, beside: SourceState, state: SourceState, voxel: [i64; 3]) -> Option<f64> {
-        self.sources.entering(beside, state, voxel)
-    }
-
-    fn distance(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
-        self.sources.distance(state, voxel)
-    }
-
-    fn distance_squared(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
-        self.sources.distance_squared(state, voxel)
-    }
-
-    fn source(state: SourceState) -> Option<u32> {
-        S::source(state)
     }
 }

@@ -10,7 +10,7 @@
 //! on voxels that a source fixed. Halo 1: faces, or all of it where sources are offered to all 26 neighbours. Scratch:
 //! about 20 bytes a voxel. A voxel asks for about five distances.
 
-use super::tracked::TrackedSource;
+use super::tracked::{CarriesSources, TrackedSource};
 use crate::grid::{Box3, Geometry, NEIGHBOURS_26, SourceState};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
@@ -226,22 +226,16 @@ impl<A: Real> Work<A> {
     }
 }
 
+impl<S: TrackedSource> CarriesSources for DijkstraPythagoras<S> {
+    type Sources = S;
+
+    fn sources(&self) -> &S {
+        &self.sources
+    }
+}
+
 impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
-    type State = SourceState;
     type Work = Work<S::Number>;
-    const UNKNOWN: SourceState = SourceState::FAR;
-
-    fn fixed(squared: f64, source: u32) -> SourceState {
-        S::fixed(squared, source)
-    }
-
-    fn told(source: u32) -> Option<SourceState> {
-        S::told(source)
-    }
-
-    fn is_fixed(state: SourceState) -> bool {
-        S::is_fixed(state)
-    }
 
     fn work(edge: usize) -> Self::Work {
         Work::new(edge)
@@ -269,21 +263,5 @@ impl<S: TrackedSource> DistanceMethod for DijkstraPythagoras<S> {
 
     fn neighbours(&self) -> Neighbours {
         self.neighbours
-    }
-
-    fn entering(&self, beside: SourceState, state: SourceState, voxel: [i64; 3]) -> Option<f64> {
-        self.sources.entering(beside, state, voxel)
-    }
-
-    fn distance(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
-        self.sources.distance(state, voxel)
-    }
-
-    fn distance_squared(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
-        self.sources.distance_squared(state, voxel)
-    }
-
-    fn source(state: SourceState) -> Option<u32> {
-        S::source(state)
     }
 }

@@ -14,7 +14,7 @@
 use super::fast_sweeping::FastSweeping;
 use super::upwind::{Axes, godunov};
 use crate::grid::Box3;
-use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::method::{DistanceMethod, DistanceState};
 use crate::kernel::distance::state::precision::{Precision, Real};
 use crate::kernel::distance::tile_order::buckets::{Buckets, LISTED_BYTES, QUEUE_BYTES};
 use crate::tile::{HaloTile, TileCost};
@@ -196,9 +196,8 @@ impl<P: Precision, A: Real> pulp::NullaryFnOnce for March<'_, P, A> {
     }
 }
 
-impl<P: Precision, A: Real> DistanceMethod for FastMarching<P, A> {
+impl<P: Precision, A: Real> DistanceState for FastMarching<P, A> {
     type State = P;
-    type Work = Work<P::Lane>;
     const UNKNOWN: P = P::UNKNOWN;
 
     fn fixed(squared: f64, source: u32) -> P {
@@ -208,6 +207,22 @@ impl<P: Precision, A: Real> DistanceMethod for FastMarching<P, A> {
     fn is_fixed(state: P) -> bool {
         FastSweeping::<P, A>::is_fixed(state)
     }
+
+    fn entering(&self, beside: P, state: P, voxel: [i64; 3]) -> Option<f64> {
+        self.sweeping.entering(beside, state, voxel)
+    }
+
+    fn distance(&self, state: P, voxel: [i64; 3]) -> f64 {
+        self.sweeping.distance(state, voxel)
+    }
+
+    fn source(_: P) -> Option<u32> {
+        None
+    }
+}
+
+impl<P: Precision, A: Real> DistanceMethod for FastMarching<P, A> {
+    type Work = Work<P::Lane>;
 
     fn work(edge: usize) -> Self::Work {
         Work::new(edge)
@@ -232,18 +247,6 @@ impl<P: Precision, A: Real> DistanceMethod for FastMarching<P, A> {
             store(&work.data, tile);
         }
         changed
-    }
-
-    fn entering(&self, beside: P, state: P, voxel: [i64; 3]) -> Option<f64> {
-        self.sweeping.entering(beside, state, voxel)
-    }
-
-    fn distance(&self, state: P, voxel: [i64; 3]) -> f64 {
-        self.sweeping.distance(state, voxel)
-    }
-
-    fn source(_: P) -> Option<u32> {
-        None
     }
 }
 

@@ -11,7 +11,7 @@ use std::marker::PhantomData;
 use super::sweep_sources::Fell;
 use super::upwind::{Axes, Upwind, solve};
 use crate::grid::Box3;
-use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
+use crate::kernel::distance::state::method::{DistanceMethod, DistanceState, OrderedSweeps};
 use crate::kernel::distance::state::precision::{Precision, Real};
 use crate::kernel::distance::tile_order::diagonals::{Diagonals, MOST_LANES, has_wide_vectors};
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
@@ -244,9 +244,8 @@ impl<P: Precision, A: Real> FastSweeping<P, A> {
     }
 }
 
-impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
+impl<P: Precision, A: Real> DistanceState for FastSweeping<P, A> {
     type State = P;
-    type Work = Work<P::Lane>;
     const UNKNOWN: P = P::UNKNOWN;
 
     fn fixed(squared: f64, _: u32) -> P {
@@ -256,6 +255,23 @@ impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
     fn is_fixed(state: P) -> bool {
         state.lane().is_marked()
     }
+
+    fn entering(&self, beside: P, state: P, _: [i64; 3]) -> Option<f64> {
+        let value = beside.lane().magnitude();
+        (value < state.lane()).then(|| value.f64())
+    }
+
+    fn distance(&self, state: P, _: [i64; 3]) -> f64 {
+        state.lane().magnitude().f64()
+    }
+
+    fn source(_: P) -> Option<u32> {
+        None
+    }
+}
+
+impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
+    type Work = Work<P::Lane>;
 
     fn work(edge: usize) -> Self::Work {
         Work { data: vec![P::Lane::default().marked(); Diagonals::len(edge)], layout: Diagonals::new(edge) }
@@ -279,19 +295,6 @@ impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
             work.layout.store(&work.data, tile, P::of_lane);
         }
         changed
-    }
-
-    fn entering(&self, beside: P, state: P, _: [i64; 3]) -> Option<f64> {
-        let value = beside.lane().magnitude();
-        (value < state.lane()).then(|| value.f64())
-    }
-
-    fn distance(&self, state: P, _: [i64; 3]) -> f64 {
-        state.lane().magnitude().f64()
-    }
-
-    fn source(_: P) -> Option<u32> {
-        None
     }
 }
 

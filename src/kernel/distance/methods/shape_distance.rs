@@ -6,53 +6,30 @@
 //! where a neighbour's differs from the kept one and from those just asked. Triangles are numbered after points; so of
 //! equal distances the one to the lower label counts, and among those of one label the one kept.
 
-use super::tracked::TrackedSource;
+use super::tracked::{CarriesSources, TrackedSource};
 use crate::grid::{Box3, DataSets, Geometry, NO_SOURCE, SourceState};
+use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
-use crate::kernel::distance::state::source::squared_distance;
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
-use crate::kernel::geometry::triangle::Triangle;
 use crate::tile::{HaloTile, TileCost};
 
 /// VDT to points and triangles.
 #[derive(Clone, Debug)]
 pub struct ShapeDistance<'a> {
     geometry: &'a Geometry,
-    sets: &'a DataSets,
-    triangles: Vec<Triangle>,
+    shapes: LabelledShapes<'a>,
 }
 
 impl<'a> ShapeDistance<'a> {
     /// For sources in the world and a grid.
     #[must_use]
     pub fn new(geometry: &'a Geometry, sets: &'a DataSets) -> Self {
-        let triangles = (0..sets.mesh.len()).map(|n| Triangle::new(sets.mesh.corners(n))).collect();
-        Self { geometry, sets, triangles }
+        Self { geometry, shapes: LabelledShapes::new(sets) }
     }
 
     /// Whether the first of two sources has a lower label than the second.
     pub(crate) fn has_lower_label(&self, source: u32, than: u32) -> bool {
-        source != NO_SOURCE && self.sets.label(source) < self.sets.label(than)
-    }
-
-    /// The coordinate of a voxel's centre along an axis.
-    pub(crate) fn coordinate(&self, axis: usize, index: i64) -> f64 {
-        self.geometry.origin[axis] + index as f64 * self.geometry.spacing[axis]
-    }
-
-    /// The squared distance of a world position to a source; infinite to none.
-    pub(crate) fn squared(&self, here: [f64; 3], source: u32) -> f64 {
-        let source = source as usize;
-        if let Some(&point) = self.sets.positions.get(source) {
-            return squared_distance(here, point);
-        }
-        let triangle = self.triangles.get(source - self.sets.positions.len());
-        triangle.map_or(f64::INFINITY, |triangle| triangle.distance_squared(here))
-    }
-
-    /// The squared distance of a voxel to a source; infinite to none.
-    pub(crate) fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {
-        self.squared(self.geometry.position(voxel), source)
+        source != NO_SOURCE && self.shapes.label(source) < self.shapes.label(than)
     }
 
     /// The nearest of the kept source and of those beside that were not asked yet.
@@ -178,22 +155,16 @@ fn beside(at: usize, side: usize, strides: [usize; 3]) -> usize {
     if side.is_multiple_of(2) { at - stride } else { at + stride }
 }
 
+impl CarriesSources for ShapeDistance<'_> {
+    type Sources = Self;
+
+    fn sources(&self) -> &Self {
+        self
+    }
+}
+
 impl DistanceMethod for ShapeDistance<'_> {
-    type State = SourceState;
     type Work = Asked;
-    const UNKNOWN: SourceState = SourceState::FAR;
-
-    fn fixed(_: f64, source: u32) -> SourceState {
-        SourceState::frozen(source)
-    }
-
-    fn told(source: u32) -> Option<SourceState> {
-        Some(SourceState::trial(source))
-    }
-
-    fn is_fixed(state: SourceState) -> bool {
-        state.is_frozen()
-    }
 
     fn work(edge: usize) -> Asked {
         Asked::new(edge)
@@ -206,31 +177,9 @@ impl DistanceMethod for ShapeDistance<'_> {
     fn settle(&self, tile: &mut HaloTile<SourceState>, asked: &mut Asked, part: &Box3) -> bool {
         asked.forget();
         let first = downhill(tile, |at, state| {
-            self.distance_squared(state.source(), std::array::from_fn(|a| part.lo[a] + at[a] as i64))
+            self.squared_of_voxel(state.source(), std::array::from_fn(|a| part.lo[a] + at[a] as i64))
         });
         sweep_until_quiet(first, |upward| self.pass(tile, asked, part, upward))
-    }
-
-    fn entering(&self, beside: SourceState, state: SourceState, voxel: [i64; 3]) -> Option<f64> {
-        let [beside, kept] = [beside.source(), state.source()];
-        if state.is_frozen() || beside == kept {
-            return None;
-        }
-        let here = self.geometry.position(voxel);
-        let entering = self.squared(here, beside);
-        self.is_nearer((entering, beside), (self.squared(here, kept), kept)).then(|| entering.sqrt())
-    }
-
-    fn distance(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(state.source(), voxel).sqrt()
-    }
-
-    fn distance_squared(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(state.source(), voxel)
-    }
-
-    fn source(state: SourceState) -> Option<u32> {
-        state.known()
     }
 }
 
@@ -245,11 +194,15 @@ impl TrackedSource for ShapeDistance<'_> {
     type Number = f64;
 
     fn coordinate(&self, axis: usize, index: i64) -> f64 {
-        self.coordinate(axis, index)
+        self.geometry.origin[axis] + index as f64 * self.geometry.spacing[axis]
     }
 
     fn squared(&self, here: [f64; 3], source: u32) -> f64 {
-        self.squared(here, source)
+        self.shapes.distance_squared(here, source)
+    }
+
+    fn squared_of_voxel(&self, source: u32, voxel: [i64; 3]) -> f64 {
+        self.squared(self.geometry.position(voxel), source)
     }
 
     #[inline]

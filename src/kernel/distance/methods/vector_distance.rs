@@ -7,7 +7,7 @@
 //! source indices, the top bit set on voxels that a source fixed. Halo 1, faces. While a tile is worked on every voxel
 //! holds its source's position beside the index, so that sweeps look nothing up.
 
-use super::tracked::TrackedSource;
+use super::tracked::{CarriesSources, TrackedSource};
 use crate::grid::{Box3, Geometry, SourceState};
 use crate::kernel::distance::state::method::{DistanceMethod, OrderedSweeps};
 use crate::kernel::distance::state::precision::Real;
@@ -33,41 +33,6 @@ impl<'a, A: Real> VectorDistance<'a, A> {
         let from = if A::KEEPS_WORLD { [0.0; 3] } else { geometry.origin };
         let points = positions.iter().map(|p| std::array::from_fn(|a| A::of(p[a] - from[a]))).collect();
         Self { geometry, positions, points }
-    }
-
-    /// The coordinate of a voxel's centre along an axis.
-    pub(crate) fn coordinate(&self, axis: usize, index: i64) -> A {
-        let step = index as f64 * self.geometry.spacing[axis];
-        A::of(if A::KEEPS_WORLD { self.geometry.origin[axis] + step } else { step })
-    }
-
-    /// The squared distance of a voxel to a source, in f64; infinite to none.
-    #[inline]
-    pub(crate) fn distance_squared(&self, source: u32, voxel: [i64; 3]) -> f64 {
-        let position = self.positions.get(source as usize);
-        position.map_or(f64::INFINITY, |&p| squared_distance(self.geometry.position(voxel), p))
-    }
-
-    /// Those of a row of voxels along x, the first at `start`, each to its own source; the same bits.
-    pub(crate) fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
-        // Looked up first and computed afterwards: lookups come one by one, sums a vector at a time.
-        const AT_A_TIME: usize = 16;
-        let [_, y, z] = self.geometry.position(start);
-        let chunks = sources.chunks(AT_A_TIME).zip(out.chunks_mut(AT_A_TIME));
-        for (n, (sources, out)) in chunks.enumerate() {
-            let mut from = [[f64::INFINITY; AT_A_TIME]; 3];
-            let mut here = [0.0; AT_A_TIME];
-            for (i, &source) in sources.iter().enumerate() {
-                if let Some(p) = self.positions.get(source as usize) {
-                    (from[0][i], from[1][i], from[2][i]) = (p[0], p[1], p[2]);
-                }
-                here[i] = self.geometry.position([start[0] + (n * AT_A_TIME + i) as i64, 0, 0])[0];
-            }
-            for (i, out) in out.iter_mut().enumerate() {
-                let (dx, dy, dz) = (here[i] - from[0][i], y - from[1][i], z - from[2][i]);
-                *out = dx * dx + dy * dy + dz * dz;
-            }
-        }
     }
 
     pub(crate) fn point(&self, source: u32) -> [A; 3] {
@@ -301,22 +266,16 @@ impl<A: Real> VectorDistance<'_, A> {
     }
 }
 
+impl<A: Real> CarriesSources for VectorDistance<'_, A> {
+    type Sources = Self;
+
+    fn sources(&self) -> &Self {
+        self
+    }
+}
+
 impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
-    type State = SourceState;
     type Work = Work<A>;
-    const UNKNOWN: SourceState = SourceState::FAR;
-
-    fn fixed(_: f64, source: u32) -> SourceState {
-        SourceState::frozen(source)
-    }
-
-    fn told(source: u32) -> Option<SourceState> {
-        Some(SourceState::trial(source))
-    }
-
-    fn is_fixed(state: SourceState) -> bool {
-        state.is_frozen()
-    }
 
     fn work(edge: usize) -> Work<A> {
         Work::new(edge)
@@ -348,34 +307,6 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
         }
         changed
     }
-
-    fn entering(&self, beside: SourceState, state: SourceState, voxel: [i64; 3]) -> Option<f64> {
-        let [beside, kept] = [beside.source(), state.source()];
-        if state.is_frozen() || beside == kept {
-            return None;
-        }
-        // Judged as a sweep judges it, so that nobody is called for nothing.
-        let here: [A; 3] = std::array::from_fn(|a| self.coordinate(a, voxel[a]));
-        let squared = |source| {
-            let p = self.point(source);
-            let (dx, dy, dz) = (here[0] - p[0], here[1] - p[1], here[2] - p[2]);
-            dx * dx + dy * dy + dz * dz
-        };
-        let entering = squared(beside);
-        (entering < squared(kept)).then(|| entering.f64().sqrt())
-    }
-
-    fn distance(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(state.source(), voxel).sqrt()
-    }
-
-    fn distance_squared(&self, state: SourceState, voxel: [i64; 3]) -> f64 {
-        self.distance_squared(state.source(), voxel)
-    }
-
-    fn source(state: SourceState) -> Option<u32> {
-        state.known()
-    }
 }
 
 impl<A: Real> OrderedSweeps for VectorDistance<'_, A> {
@@ -394,7 +325,8 @@ impl<A: Real> TrackedSource for VectorDistance<'_, A> {
     type Number = A;
 
     fn coordinate(&self, axis: usize, index: i64) -> A {
-        self.coordinate(axis, index)
+        let step = index as f64 * self.geometry.spacing[axis];
+        A::of(if A::KEEPS_WORLD { self.geometry.origin[axis] + step } else { step })
     }
 
     #[inline(always)]
@@ -402,7 +334,31 @@ impl<A: Real> TrackedSource for VectorDistance<'_, A> {
         squared(here, self.point(source))
     }
 
+    #[inline]
+    fn squared_of_voxel(&self, source: u32, voxel: [i64; 3]) -> f64 {
+        let position = self.positions.get(source as usize);
+        position.map_or(f64::INFINITY, |&p| squared_distance(self.geometry.position(voxel), p))
+    }
+
+    /// The same bits as one by one.
     fn squared_row(&self, sources: &[u32], start: [i64; 3], out: &mut [f64]) {
-        self.squared_row(sources, start, out);
+        // Looked up first and computed afterwards: lookups come one by one, sums a vector at a time.
+        const AT_A_TIME: usize = 16;
+        let [_, y, z] = self.geometry.position(start);
+        let chunks = sources.chunks(AT_A_TIME).zip(out.chunks_mut(AT_A_TIME));
+        for (n, (sources, out)) in chunks.enumerate() {
+            let mut from = [[f64::INFINITY; AT_A_TIME]; 3];
+            let mut here = [0.0; AT_A_TIME];
+            for (i, &source) in sources.iter().enumerate() {
+                if let Some(p) = self.positions.get(source as usize) {
+                    (from[0][i], from[1][i], from[2][i]) = (p[0], p[1], p[2]);
+                }
+                here[i] = self.geometry.position([start[0] + (n * AT_A_TIME + i) as i64, 0, 0])[0];
+            }
+            for (i, out) in out.iter_mut().enumerate() {
+                let (dx, dy, dz) = (here[i] - from[0][i], y - from[1][i], z - from[2][i]);
+                *out = dx * dx + dy * dy + dz * dz;
+            }
+        }
     }
 }

@@ -21,7 +21,7 @@ use super::distinct::Distinct;
 use super::label_borders::LabelBorders;
 use super::look::Labels;
 use super::look::Look;
-use crate::grid::{Box3, Geometry, NO_SOURCE, SourceState};
+use crate::grid::{Box3, Geometry, NO_SOURCE};
 use crate::kernel::distance::methods::tracked::TrackedSource;
 use crate::kernel::distance::state::precision::Real;
 use crate::kernel::distance::state::source::counts_before;
@@ -102,7 +102,7 @@ impl Seen {
             if squared[at] >= counts_below {
                 return;
             }
-            let to = |source| sources.distance_squared(SourceState::trial(source), voxel);
+            let to = |source| sources.squared_of_voxel(source, voxel);
             let limit = (squared[at].sqrt() + close).powi(2).max(squared[at]);
             let nearly = others.iter().map(|&other| (to(other), other)).filter(|other| other.0 <= limit);
             let own = (squared[at], kept[at]);
@@ -134,7 +134,7 @@ impl Seen {
         let label = |source| look.labels.map_or(0, |labels| labels.sets.label(source));
         self.distinct.list(look.known, look.found, &around, &mut self.around);
         for &source in &self.around {
-            let squared = sources.distance_squared(SourceState::trial(source), voxel);
+            let squared = sources.squared_of_voxel(source, voxel);
             let is_tied = squared == best.1 && source != best.0;
             if squared < best.1 || (is_tied && label(source) < label(best.0)) {
                 best = (source, squared);
@@ -249,7 +249,6 @@ mod tests {
     use super::*;
     use crate::grid::FACES;
     use crate::kernel::distance::methods::vector_distance::VectorDistance;
-    use crate::kernel::distance::state::method::DistanceMethod;
 
     const EDGE: i64 = 14;
 
@@ -332,7 +331,7 @@ mod tests {
             let expected: Vec<u32> = voxels(part).map(|v| whole[all.offset_of(v)]).collect();
             assert_eq!(seen.sources, expected, "{part:?}");
             for ((v, &source), &squared) in voxels(part).zip(&seen.sources).zip(&seen.squared) {
-                assert_eq!(squared.sqrt(), method.distance(SourceState::trial(source), v), "{v:?}");
+                assert_eq!(squared.sqrt(), method.squared_of_voxel(source, v).sqrt(), "{v:?}");
             }
         }
     }

@@ -5,7 +5,7 @@
 //! of equal distances from the lower label, then from the lower index.
 
 use crate::grid::NO_SOURCE;
-use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::method::DistanceState;
 use crate::kernel::distance::state::source::counts_before;
 
 /// The nearest source of each voxel of a brick, of those that were looked at.
@@ -42,7 +42,7 @@ impl Seeds {
 
 /// The states of voxels that are `fixed`, and of others that are `told` of a source (which may have no voxels: none
 /// is). Each source has a `label`.
-pub fn write_states<M: DistanceMethod>(fixed: &Seeds, told: &Seeds, label: impl Fn(u32) -> u32, out: &mut [M::State]) {
+pub fn write_states<M: DistanceState>(fixed: &Seeds, told: &Seeds, label: impl Fn(u32) -> u32, out: &mut [M::State]) {
     for (at, out) in out.iter_mut().enumerate() {
         let nearest = |seeds: &Seeds| (seeds.squared[at], seeds.source[at]);
         let (fixing, beside) = (nearest(fixed), if told.source.is_empty() { NONE } else { nearest(told) });
@@ -52,7 +52,7 @@ pub fn write_states<M: DistanceMethod>(fixed: &Seeds, told: &Seeds, label: impl 
                 let (squared, source) = if farther { fixing } else { beside };
                 M::fixed(squared, source)
             }
-            (true, false) => M::told(beside.1).unwrap_or(M::UNKNOWN),
+            (true, false) => M::trial(beside.1).unwrap_or(M::UNKNOWN),
             (true, true) => M::UNKNOWN,
         };
     }

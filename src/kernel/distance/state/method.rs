@@ -1,19 +1,17 @@
 //! What a distance method is to a schedule: a state for each voxel, and two ways to relax a tile of them.
 //!
-//! A new method is one file that implements [`DistanceMethod`] and one row in `pipeline::distance`'s table.
+//! A new method is one file that implements [`DistanceMethod`] and one row in `pipeline::distance`'s table. What its states
+//! are is [`DistanceState`], of which those that carry sources have one (`methods::tracked`).
 
 use super::neighbours::Neighbours;
 use crate::grid::Box3;
 use crate::store::Element;
 use crate::tile::{HaloTile, TileCost};
 
-/// A way to carry distance from fixed voxels outward. Values only ever fall; fixed voxels keep what they
-/// start with.
-pub trait DistanceMethod: Send + Sync {
+/// What a voxel holds, and what is read off it.
+pub trait DistanceState: Send + Sync {
     /// What a brick keeps of each voxel.
     type State: Element;
-    /// Buffers of one thread.
-    type Work: Send + 'static;
     /// The state of a voxel of which nothing is known.
     const UNKNOWN: Self::State;
 
@@ -23,12 +21,35 @@ pub trait DistanceMethod: Send + Sync {
     /// The state of a voxel that is only told of a source near it, where the method keeps sources: it may learn of a
     /// nearer one.
     #[must_use]
-    fn told(_source: u32) -> Option<Self::State> {
+    fn trial(_source: u32) -> Option<Self::State> {
         None
     }
 
     /// Whether a source fixed the voxel.
     fn is_fixed(state: Self::State) -> bool;
+
+    /// Whether a voxel at `voxel`, whose state is `state`, may fall beside one in state `beside`; the value that would
+    /// enter it: what the front schedule orders bricks by.
+    fn entering(&self, beside: Self::State, state: Self::State, voxel: [i64; 3]) -> Option<f64>;
+
+    /// The distance of a voxel, physical units; infinite where nothing is known.
+    fn distance(&self, state: Self::State, voxel: [i64; 3]) -> f64;
+
+    /// The squared distance of a voxel, physical units; where the method keeps sources [`DistanceState::distance`] is its
+    /// root.
+    fn distance_squared(&self, state: Self::State, voxel: [i64; 3]) -> f64 {
+        self.distance(state, voxel).powi(2)
+    }
+
+    /// The voxel's source, where the method keeps it and one is known.
+    fn source(state: Self::State) -> Option<u32>;
+}
+
+/// A way to carry distance from fixed voxels outward. Values only ever fall; fixed voxels keep what they
+/// start with.
+pub trait DistanceMethod: DistanceState {
+    /// Buffers of one thread.
+    type Work: Send + 'static;
 
     /// Buffers for tiles of `edge`^3 voxels.
     fn work(edge: usize) -> Self::Work;
@@ -44,22 +65,6 @@ pub trait DistanceMethod: Send + Sync {
     fn neighbours(&self) -> Neighbours {
         Neighbours::Faces
     }
-
-    /// Whether a voxel at `voxel`, whose state is `state`, may fall beside one in state `beside`; the value that would
-    /// enter it: what the front schedule orders bricks by.
-    fn entering(&self, beside: Self::State, state: Self::State, voxel: [i64; 3]) -> Option<f64>;
-
-    /// The distance of a voxel, physical units; infinite where nothing is known.
-    fn distance(&self, state: Self::State, voxel: [i64; 3]) -> f64;
-
-    /// The squared distance of a voxel, physical units; where the method keeps sources [`DistanceMethod::distance`] is its
-    /// root.
-    fn distance_squared(&self, state: Self::State, voxel: [i64; 3]) -> f64 {
-        self.distance(state, voxel).powi(2)
-    }
-
-    /// The voxel's source, where the method keeps it and one is known.
-    fn source(state: Self::State) -> Option<u32>;
 }
 
 /// A method of ordered sweeps over the whole domain.

@@ -5,12 +5,12 @@
 //! distance, physical units, or nothing. Faces only are read.
 
 use crate::grid::{Box3, Face};
-use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::method::DistanceState;
 use crate::tile::HaloTile;
 
 /// The smallest value that enters the brick across `face`, among voxels that changed since it was `told` of them.
 #[must_use]
-pub fn leaving<M: DistanceMethod>(
+pub fn leaving<M: DistanceState>(
     method: &M,
     tile: &HaloTile<M::State>,
     part: &Box3,
@@ -49,7 +49,7 @@ pub fn leaving<M: DistanceMethod>(
 
 /// The smallest value that enters the ghosts in a direction from any of their 26 neighbours in the tile.
 #[must_use]
-pub fn leaving_anywhere<M: DistanceMethod>(
+pub fn leaving_anywhere<M: DistanceState>(
     method: &M,
     tile: &HaloTile<M::State>,
     part: &Box3,

@@ -14,7 +14,6 @@ use super::wavefront::Wavefront;
 use crate::grid::Geometry;
 use crate::grid::{NO_SOURCE, SourceState};
 use crate::kernel::distance::methods::tracked::TrackedSource;
-use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
 
 /// Bytes of a voxel beside its state: its bound, whether it is frozen, and its entries in the heap.
@@ -31,7 +30,7 @@ pub struct DijkstraHeap<'a, S> {
     steps: Vec<([i64; 3], f64)>,
 }
 
-impl<'a, S: TrackedSource<Number = f64> + DistanceMethod> DijkstraHeap<'a, S> {
+impl<'a, S: TrackedSource<Number = f64>> DijkstraHeap<'a, S> {
     /// Ready to start from the fixed voxels among `states`; no other has a source.
     #[must_use]
     pub fn new(geometry: &Geometry, method: &'a S, neighbours: Neighbours, states: &'a mut [SourceState]) -> Self {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::exec::Workers;
 use crate::grid::{Box3, NO_SOURCE};
-use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::method::DistanceState;
 use crate::kernel::distance::state::precision::Precision;
 use crate::store::{BoxSource, BrickArray};
 
@@ -50,7 +50,7 @@ impl<P: Precision> Solved<'_, P> {
 }
 
 /// A method's state, read as distances or sources.
-pub(crate) struct Values<M: DistanceMethod> {
+pub(crate) struct Values<M: DistanceState> {
     pub(crate) method: M,
     pub(crate) state: BrickArray<M::State>,
     pub(crate) farthest: f64,
@@ -58,7 +58,7 @@ pub(crate) struct Values<M: DistanceMethod> {
     pub(crate) buffers: Workers<Vec<M::State>>,
 }
 
-impl<M: DistanceMethod> Values<M> {
+impl<M: DistanceState> Values<M> {
     /// What was solved, where sources too are made of the state.
     pub(crate) fn solved<'a, P: Precision>(self, fixed_voxels: u64, triangle_distances: u64) -> Solved<'a, P>
     where
@@ -86,7 +86,7 @@ impl<M: DistanceMethod> Values<M> {
     }
 }
 
-impl<M: DistanceMethod, P: Precision> BoxSource<P> for Values<M> {
+impl<M: DistanceState, P: Precision> BoxSource<P> for Values<M> {
     fn shape(&self) -> [i64; 3] {
         self.state.set().grid().shape()
     }
@@ -99,7 +99,7 @@ impl<M: DistanceMethod, P: Precision> BoxSource<P> for Values<M> {
     }
 }
 
-impl<M: DistanceMethod> BoxSource<u8> for Values<M> {
+impl<M: DistanceState> BoxSource<u8> for Values<M> {
     fn shape(&self) -> [i64; 3] {
         self.state.set().grid().shape()
     }
@@ -109,7 +109,7 @@ impl<M: DistanceMethod> BoxSource<u8> for Values<M> {
     }
 }
 
-impl<M: DistanceMethod> BoxSource<u32> for Values<M> {
+impl<M: DistanceState> BoxSource<u32> for Values<M> {
     fn shape(&self) -> [i64; 3] {
         self.state.set().grid().shape()
     }

@@ -9,7 +9,7 @@ use crate::kernel::distance::methods::shape_distance::ShapeDistance;
 use crate::kernel::distance::seeding::initialise::fix_voxels;
 use crate::kernel::distance::seeding::seeds::{Seeds, write_states};
 use crate::kernel::distance::seeding::triangles;
-use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::method::DistanceState;
 use crate::pipeline::distance::Sources;
 use crate::store::BrickArray;
 
@@ -47,7 +47,7 @@ pub(crate) struct Seeded {
 
 /// Fixes voxels of this rank's bricks; `kept`, where it is given, gets the sources that fix them. Sources
 /// outside of the grid fix none that is farther than `farthest` and some voxels more.
-pub(crate) fn initialise<M: DistanceMethod>(
+pub(crate) fn initialise<M: DistanceState>(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
     array: &BrickArray<M::State>,
@@ -56,7 +56,7 @@ pub(crate) fn initialise<M: DistanceMethod>(
 ) -> Result<Seeded> {
     let set = array.set();
     let (grid, len) = (*set.grid(), set.grid().brick_len());
-    let tells = start == Start::Told && M::told(0).is_some();
+    let tells = start == Start::Told && M::trial(0).is_some();
     let margin = if tells { told_margin(sources.geometry.spacing) } else { [0; 3] };
     let near: Vec<Slot> = set.owned().filter(|&slot| sources.may_seed(set.id(slot), margin)).collect();
     let workers = Workers::new(move || (Seeds::new(len), Seeds::new(if tells { len } else { 0 })));

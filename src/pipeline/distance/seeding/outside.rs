@@ -6,20 +6,20 @@ use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{NO_SOURCE, Slot};
 use crate::kernel::distance::seeding::seeds::Seeds;
-use crate::kernel::distance::state::method::DistanceMethod;
+use crate::kernel::distance::state::method::DistanceState;
 use crate::pipeline::distance::Sources;
 use crate::store::BrickArray;
 
 /// Gives voxels of this rank's bricks the source outside that is nearer than the one they were handed, where there is one,
 /// none that is farther than `farthest` and some voxels more. Faces of bricks stay as they are: nobody is told.
-pub(crate) fn look_outside<M: DistanceMethod>(
+pub(crate) fn look_outside<M: DistanceState>(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
     method: &M,
     array: &BrickArray<M::State>,
     farthest: f64,
 ) -> Result<()> {
-    let Some(outside) = sources.outside.filter(|_| M::told(0).is_some()) else { return Ok(()) };
+    let Some(outside) = sources.outside.filter(|_| M::trial(0).is_some()) else { return Ok(()) };
     let set = array.set();
     let (grid, len, edge) = (*set.grid(), set.grid().brick_len(), set.grid().edge() as usize);
     let farthest = farthest + sources.geometry.length([2; 3]);
@@ -47,7 +47,7 @@ pub(crate) fn look_outside<M: DistanceMethod>(
                     if M::source(state) == Some(source) || source == NO_SOURCE {
                         continue;
                     }
-                    let told = if M::is_fixed(state) { None } else { M::told(source) };
+                    let told = if M::is_fixed(state) { None } else { M::trial(source) };
                     states[at] = told.unwrap_or_else(|| M::fixed(held.squared[at], source));
                 }
             });

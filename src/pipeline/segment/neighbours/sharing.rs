@@ -5,10 +5,8 @@
 use super::fields::Roots;
 use super::walls::Walls;
 use crate::error::Result;
-use crate::exec::{
-    Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, corner_colours, one_wave,
-};
-use crate::grid::{Geometry, NEIGHBOURS_26, Slot};
+use crate::exec::{Boundary, Engine, FixedPoint, HaloPlan, Reach, Stage, Workers, one_wave, relax_to_fixed_point};
+use crate::grid::{Geometry, Slot};
 use crate::kernel::image::morphology::gaps::SEED;
 use crate::kernel::image::morphology::geodesic::{Lengths, UNREACHED, relax};
 use crate::store::{BoxSink, BoxSource, BrickArray};
@@ -75,37 +73,31 @@ fn begin(
 fn flood(stage: &Stage<'_>, geometry: &Geometry, fields: &Fields) -> Result<()> {
     let set = fields.cost.set();
     let plan = HaloPlan::new(*set.grid(), Reach::All);
-    let exchange = &Exchange::new(stage.comm(), set, &plan)?;
     let edge = set.grid().edge() as usize;
     let workers = &Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), HaloTile::new(edge)));
-    let mut flood = Flood { fields, lengths: Lengths::new(geometry.spacing), plan, dirty: vec![true; set.len()] };
-    let rounds = Waves { stage, exchange, workers, waves: &corner_colours(set) }.relax(&mut flood, Until::QUIET)?;
-    stage.iterated(rounds, 0.0);
-    Ok(())
+    relax_to_fixed_point(
+        stage,
+        Reach::All,
+        workers,
+        &mut Flood { fields, lengths: Lengths::new(geometry.spacing), plan },
+    )
 }
 
 struct Flood<'a> {
     fields: &'a Fields,
     lengths: Lengths,
     plan: HaloPlan,
-    dirty: Vec<bool>,
 }
 
-impl Relax for Flood<'_> {
+impl FixedPoint for Flood<'_> {
     type State = u32;
     type Work = (HaloTile<u32>, HaloTile<u32>, HaloTile<u16>);
-    type Visit = bool;
-    type Note = [f64; 0];
 
     fn field(&self) -> &BrickArray<u32> {
         &self.fields.cost
     }
 
-    fn priority(&self, slot: Slot) -> f64 {
-        if self.dirty[slot as usize] { 0.0 } else { f64::INFINITY }
-    }
-
-    fn visit(&self, (cost, label, weight): &mut Self::Work, slot: Slot, _wave: usize) -> Result<bool> {
+    fn relax(&self, (cost, label, weight): &mut Self::Work, slot: Slot) -> Result<bool> {
         let Self { fields, plan, .. } = self;
         plan.gather(&fields.cost, slot, Boundary::Constant(UNREACHED), cost);
         plan.gather(&fields.label, slot, Boundary::Constant(0), label);
@@ -116,19 +108,5 @@ impl Relax for Flood<'_> {
             plan.scatter(label, &fields.label, slot);
         }
         Ok(fell)
-    }
-
-    fn note(&self, _slot: Slot, fell: &bool) -> Option<[f64; 0]> {
-        fell.then_some([])
-    }
-
-    fn visited(&mut self, slot: Slot, _fell: bool) {
-        self.dirty[slot as usize] = false;
-    }
-
-    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
-        let set = self.fields.cost.set();
-        let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
-        beside.for_each(|slot| self.dirty[slot as usize] = true);
     }
 }
