@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use crate::exec::{Boundary, Reach, ThreadComm};
     use crate::grid::{Box3, BrickGrid};
-    use crate::store::{BoxSink, Scratch};
+    use crate::store::Scratch;
     use crate::tile::HaloTile;
 
     /// Runs `check` on each of so many ranks, with its own set of the bricks that `keep` keeps.
@@ -222,7 +222,7 @@ mod tests {
                             let part = grid.brick_box(set.id(slot));
                             let voxels =
                                 part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
-                            array.write_box(&part, &voxels.map(|v| value(shape, v)).collect::<Vec<_>>()).unwrap();
+                            array.write_box(&part, &voxels.map(|v| value(shape, v)).collect::<Vec<_>>());
                             array.refresh_faces(slot);
                         }
                         let exchange = Exchange::new(comm, &set, &plan).unwrap();

@@ -6,7 +6,7 @@ use super::halo::{HaloPlan, Reach};
 use super::relax::{Relax, Until, Waves};
 use super::schedule::{checkerboard, corner_colours};
 use crate::error::Result;
-use crate::grid::{FACES, NEIGHBOURS_26, Slot};
+use crate::grid::{FACES, Face, NEIGHBOURS_26, Slot};
 use crate::store::{BrickArray, Element};
 
 /// A field whose bricks are relaxed to a fixed point, which is the same in any order.
@@ -42,7 +42,7 @@ pub fn relax_to_fixed_point<J: FixedPoint>(
     let set = job.field().set().clone();
     let exchange = &Exchange::new(stage.comm(), &set, &HaloPlan::new(*set.grid(), reach))?;
     let (waves, neighbours) = match reach {
-        Reach::Faces => (checkerboard(&set), FACES.map(|face| face.offset()).to_vec()),
+        Reach::Faces => (checkerboard(&set), FACES.map(Face::offset).to_vec()),
         Reach::All => (corner_colours(&set), NEIGHBOURS_26.to_vec()),
     };
     let mut marked = Marked { job, neighbours, dirty: vec![true; set.len()] };

@@ -229,7 +229,7 @@ mod tests {
 
     use super::*;
     use crate::grid::BrickSet;
-    use crate::store::{BoxSink, Scratch};
+    use crate::store::Scratch;
 
     /// Every ghost equals the voxel the whole volume has there; beyond the domain the nearest one inside.
     #[test]
@@ -241,7 +241,7 @@ mod tests {
             let whole = Box3::from_shape(shape);
             let data: Vec<f32> = (0..whole.len()).map(|n| n as f32).collect();
             let array = BrickArray::with_faces(&Scratch::new(dir.path(), 1 << 30), &set).unwrap();
-            array.write_box(&whole, &data).unwrap();
+            array.write_box(&whole, &data);
             (0..set.len() as Slot).for_each(|slot| array.refresh_faces(slot));
             let plan = HaloPlan::new(grid, Reach::All);
             let mut tile = HaloTile::new(edge as usize);
@@ -273,7 +273,7 @@ mod tests {
         let (a, b) = (BrickArray::with_faces(&scratch, &set).unwrap(), BrickArray::with_faces(&scratch, &set).unwrap());
         let whole = Box3::from_shape(grid.shape());
         let data: Vec<f32> = (0..whole.len()).map(|n| n as f32).collect();
-        a.write_box(&whole, &data).unwrap();
+        a.write_box(&whole, &data);
         (0..set.len() as Slot).for_each(|slot| a.refresh_faces(slot));
         let plan = HaloPlan::new(grid, Reach::Faces);
         let mut tile = HaloTile::new(4);

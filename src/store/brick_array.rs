@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use super::slot_file::SlotFile;
 use super::window::{Traffic, Window};
-use super::{BoxSink, BoxSource, Element};
+use super::{BoxSource, Element};
 use crate::error::Result;
 use crate::grid::{Box3, BrickId, BrickSet, FACES, Face, Slot};
 
@@ -281,13 +281,9 @@ impl<T: Element> BoxSource<T> for BrickArray<T> {
     }
 }
 
-impl<T: Element> BoxSink<T> for BrickArray<T> {
-    fn shape(&self) -> [i64; 3] {
-        self.set.grid().shape()
-    }
-
-    /// Writes the voxels of stored bricks; those of other bricks are passed over.
-    fn write_box(&self, part: &Box3, data: &[T]) -> Result<()> {
+impl<T: Element> BrickArray<T> {
+    /// Writes `data`, dense `[z][y][x]` over `part`, to stored bricks; what lies in others is passed over.
+    pub fn write_box(&self, part: &Box3, data: &[T]) {
         let grid = *self.set.grid();
         for (id, slot) in grid.bricks_in(part).filter_map(|id| Some((id, self.set.slot(id)?))) {
             let shared = grid.brick_box(id).intersect(part);
@@ -300,7 +296,6 @@ impl<T: Element> BoxSink<T> for BrickArray<T> {
                 }
             });
         }
-        Ok(())
     }
 }
 
@@ -334,7 +329,7 @@ mod tests {
         for (edge, window) in [(4, 1 << 30), (8, 0), (16, 1 << 20), (64, 1 << 30)] {
             let set = Arc::new(BrickSet::dense(BrickGrid::new(shape, edge)));
             let array = BrickArray::<f32>::new(&Scratch::new(dir.path(), window), &set).unwrap();
-            array.write_box(&whole, &numbered(shape)).unwrap();
+            array.write_box(&whole, &numbered(shape));
             let part = Box3::new([3, 5, 1], [37, 20, 18]);
             let mut out = vec![0.0; part.len()];
             array.read_box(&part, &mut out).unwrap();
@@ -383,7 +378,7 @@ mod tests {
         let shape = [10, 8, 8];
         let set = Arc::new(BrickSet::dense(BrickGrid::new(shape, 8)));
         let array = BrickArray::<f32>::with_faces(&Scratch::new(dir.path(), 1 << 30), &set).unwrap();
-        array.write_box(&Box3::from_shape(shape), &numbered(shape)).unwrap();
+        array.write_box(&Box3::from_shape(shape), &numbered(shape));
         array.refresh_faces(1);
         let value = |x: i64, y: i64, z: i64| Box3::from_shape(shape).offset_of([x, y, z]) as f32;
         array.read_face(1, FACES[1], |face| assert_eq!(face[3 * 8 + 2], value(9, 2, 3)));

@@ -12,6 +12,6 @@ mod window;
 pub use brick_array::{BrickArray, Scratch};
 pub use element::{Element, ElementType, Sample, SampleWork, SamplesMut};
 pub use free_space::free_space;
-pub use stream::{BoxSink, BoxSource, MeshBuffer, MeshSink, NoMesh, PlaneSource, VolumeSource, Whereabouts};
+pub use stream::{BoxSource, MeshSink, NoMesh, PlaneSource, VolumeSource, Whereabouts};
 pub use unfinished::{Unfinished, remove_all as remove_unfinished};
 pub use window::{Traffic, Window};

@@ -37,18 +37,6 @@ impl<T: Element, S: BoxSource<T> + ?Sized> BoxSource<T> for &S {
     }
 }
 
-/// Something into which any box of a volume can be written, from any thread.
-pub trait BoxSink<T: Element>: Sync {
-    /// Voxels along each axis, `[x, y, z]`.
-    fn shape(&self) -> [i64; 3];
-
-    /// Writes `data`, dense `[z][y][x]` over `part`; `part` lies inside the shape.
-    ///
-    /// # Errors
-    /// When the data cannot be written.
-    fn write_box(&self, part: &Box3, data: &[T]) -> Result<()>;
-}
-
 /// A stack of planes that can be decoded one at a time, in any order and from any thread.
 pub trait PlaneSource: Sync {
     /// Voxels along each axis, `[x, y, z]`.
@@ -200,27 +188,6 @@ pub trait MeshSink {
     /// When the triangle cannot be written.
     fn facet(&mut self, corners: [u32; 3], _labels: [u32; 2]) -> Result<()> {
         self.triangle(corners)
-    }
-}
-
-/// A triangle mesh in memory, in single precision: for meshes that are not far from zero.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct MeshBuffer {
-    /// World positions, `[x, y, z]`.
-    pub vertices: Vec<[f32; 3]>,
-    /// Places in `vertices`, counter-clockwise as seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-impl MeshSink for MeshBuffer {
-    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
-        self.vertices.push(position.map(|v| v as f32));
-        Ok(())
-    }
-
-    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
-        self.triangles.push(corners);
-        Ok(())
     }
 }
 

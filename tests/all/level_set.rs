@@ -12,10 +12,10 @@ use strandline::pipeline::distance::{Method, Sources, cloud_distance};
 use strandline::pipeline::enclosure::tagging::tag;
 use strandline::pipeline::level_set::band::{Reaches, make_band};
 use strandline::pipeline::level_set::evolve::{Evolution, Stop, TimeLoop, evolve};
-use strandline::store::MeshBuffer;
 
 use crate::common::clouds::{grid_around, sponge};
 use crate::common::lab::{Lab, PlainGrid, dense, whole};
+use crate::common::mesh_buffer::MeshBuffer;
 use crate::common::plain_scheme::{gradient_norms, mean_norm};
 
 /// The surface u = 0.5 of a field over the whole grid.

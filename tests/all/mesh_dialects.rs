@@ -8,7 +8,7 @@ use std::path::Path;
 use serde_json::Value;
 use strandline::grid::TriangleMesh;
 use strandline::io::geometry::read::source::Source;
-use strandline::io::geometry::read::sources::read_noted;
+use strandline::io::geometry::read::sources::describe;
 use strandline::kernel::geometry::solid::Solid;
 use strandline::kernel::surface::Measures;
 
@@ -22,7 +22,8 @@ fn read(bytes: &[u8]) -> (Source, Vec<String>) {
     let path = folder.path().join("source");
     fs::write(&path, bytes).unwrap();
     let shown = String::from_utf8_lossy(&bytes[..bytes.len().min(300)]).into_owned();
-    read_noted(&path).unwrap_or_else(|error| panic!("{error}: {shown:?}"))
+    let (source, _, notes) = describe(&path).unwrap_or_else(|error| panic!("{error}: {shown:?}"));
+    (source, notes)
 }
 
 fn mesh(bytes: &[u8]) -> (TriangleMesh, Vec<String>) {
@@ -111,7 +112,7 @@ fn meshes_of_trimesh_are_read_back_equal() {
     assert_eq!(written.len(), 32);
     for expected in &written {
         let name = expected["file"].as_str().unwrap();
-        let (source, notes) = read_noted(&folder.path().join(name)).unwrap();
+        let (source, _, notes) = describe(&folder.path().join(name)).unwrap();
         let Source::Mesh(found) = source else { panic!("{name}: {source:?}") };
         assert!(notes.is_empty(), "{name}: {notes:?}");
         let corners: Vec<[[f64; 3]; 3]> = serde_json::from_value(expected["corners"].clone()).unwrap();

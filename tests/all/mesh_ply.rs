@@ -6,9 +6,11 @@ use std::path::Path;
 
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Ply, Property};
-use strandline::io::geometry::read::points::read_cloud;
 use strandline::io::geometry::write::ply::PlyWriter;
-use strandline::store::{MeshBuffer, MeshSink};
+use strandline::store::MeshSink;
+
+use crate::common::mesh_buffer::MeshBuffer;
+use crate::common::read_cloud;
 
 fn tetrahedron() -> MeshBuffer {
     MeshBuffer {

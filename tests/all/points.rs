@@ -4,10 +4,10 @@ use std::fs;
 
 use strandline::error::{ErrorKind, Result};
 use strandline::grid::PointCloud;
-use strandline::io::geometry::read::points::read_cloud;
 
 use crate::common::damage::damaged;
 use crate::common::random::Random;
+use crate::common::read_cloud;
 use crate::common::{shared_data, shipped};
 
 fn read_bytes(bytes: &[u8]) -> Result<PointCloud> {

@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use proptest::prelude::*;
 use strandline::grid::{Box3, BrickGrid, Geometry};
 use strandline::kernel::surface::{MarchingCubes, Measures, Patch, PatchIndex, SurfaceMeasure, Welder, cells_of_brick};
-use strandline::store::MeshBuffer;
+
+use crate::common::mesh_buffer::MeshBuffer;
 
 const WHOLE: i64 = 1 << 20;
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use strandline::io::stack::tiff::{Select, TiffStack};
+use strandline::io::stack::volume::Stack;
 use strandline::store::PlaneSource;
 
 use crate::common::random::Random;

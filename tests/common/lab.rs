@@ -6,7 +6,7 @@ use strandline::exec::{Budget, Cancel, Engine, Silent};
 use strandline::grid::{Box3, BrickGrid, BrickSet, Slot};
 use strandline::kernel::level_set::cell::CELL;
 use strandline::pipeline::level_set::band::Band;
-use strandline::store::{BoxSink, BoxSource, BrickArray, Element, Scratch};
+use strandline::store::{BoxSource, BrickArray, Element, Scratch};
 
 /// An engine, and the folder it works in for as long as it lives.
 pub(crate) struct Lab {
@@ -31,7 +31,7 @@ impl Lab {
     /// A field with the given values, `[z][y][x]` over the whole grid, on the bricks of `set`.
     pub(crate) fn field<T: Element>(&self, set: &Arc<BrickSet>, values: &[T]) -> BrickArray<T> {
         let field = BrickArray::with_faces(self.engine.scratch(), set).expect("room for a field");
-        field.write_box(&Box3::from_shape(set.grid().shape()), values).expect("memory takes any box");
+        field.write_box(&Box3::from_shape(set.grid().shape()), values);
         (0..set.len() as Slot).for_each(|slot| field.refresh_faces(slot));
         field
     }

@@ -7,6 +7,7 @@ pub(crate) mod damage;
 #[cfg(target_os = "linux")]
 pub(crate) mod held;
 pub(crate) mod lab;
+pub(crate) mod mesh_buffer;
 pub(crate) mod meshes;
 pub(crate) mod npy;
 pub(crate) mod plain_reconstruction;
@@ -24,6 +25,14 @@ pub(crate) mod zarr_files;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+
+use strandline::grid::PointCloud;
+use strandline::io::geometry::read::points::read_points;
+
+/// The points of a file, with its numbers as they stand in it.
+pub(crate) fn read_cloud(path: &Path) -> strandline::Result<PointCloud> {
+    read_points(path).map(|file| file.cloud)
+}
 
 /// A file or folder of the test data that is part of the project: see `tests/data/README.md`.
 pub(crate) fn shipped(part: &str) -> PathBuf {

@@ -6,7 +6,8 @@ use super::lab::PlainGrid;
 use super::plain_scheme::{PlainVelocity, coefficients, gradient_norms};
 use strandline::grid::Geometry;
 use strandline::kernel::surface::{MarchingCubes, Patch, Welder, cells_of_brick};
-use strandline::store::MeshBuffer;
+
+use crate::common::mesh_buffer::MeshBuffer;
 
 /// How the plain program is run.
 #[derive(Clone, Copy, Debug)]

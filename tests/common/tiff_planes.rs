@@ -5,6 +5,7 @@ use std::path::Path;
 use strandline::error::Result;
 use strandline::grid::Box3;
 use strandline::io::stack::tiff::{Select, StackInfo, TiffStack};
+use strandline::io::stack::volume::Stack;
 use strandline::store::PlaneSource;
 
 use super::samples::numbers;

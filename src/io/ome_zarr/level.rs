@@ -70,12 +70,6 @@ impl LevelWriter {
         self.plan.factors
     }
 
-    /// The type of a voxel.
-    #[must_use]
-    pub fn element(&self) -> ElementType {
-        self.element
-    }
-
     /// Voxels of a whole shard, `[x, y, z]`; those at the far ends may be cut short.
     #[must_use]
     pub fn shard_shape(&self) -> [i64; 3] {

@@ -2,6 +2,7 @@
 
 pub mod formats;
 pub mod label_volume;
+mod number;
 pub mod page_axes;
 pub mod tiff;
 pub(super) mod units;

@@ -12,7 +12,7 @@ use crate::kernel::level_set::scheme::mask::CellMask;
 use crate::kernel::level_set::scheme::sor::{Halves, Relaxation, relax};
 use crate::kernel::level_set::scheme::system::SCHEME_LEN;
 use crate::pipeline::level_set::band::read_mask;
-use crate::store::{BoxSink, BoxSource, BrickArray};
+use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
 
 /// Relaxations of a cell each time it is taken up, over-relaxed by [`HEAT_OMEGA`].
@@ -44,9 +44,9 @@ pub(crate) fn heat_step(
         let part = grid.brick_box(set.id(slot));
         let values = &mut values[..part.len()];
         image.read_box(&part, values)?;
-        initial.write_box(&part, values)?;
-        smoothed.write_box(&part, values)?;
-        solved.write_box(&part, &vec![1; values.len()])?;
+        initial.write_box(&part, values);
+        smoothed.write_box(&part, values);
+        solved.write_box(&part, &vec![1; values.len()]);
         smoothed.refresh_faces(slot);
         Ok(())
     })?;

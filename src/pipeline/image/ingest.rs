@@ -8,7 +8,7 @@ use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet};
 use crate::kernel::image::grey::grey_range::GreyRange;
 use crate::kernel::image::grey::histogram::Histogram;
-use crate::store::{BoxSink, BrickArray, Element, Sample, VolumeSource};
+use crate::store::{BrickArray, Element, Sample, VolumeSource};
 
 /// An image in bricks, with what its histogram tells.
 pub struct Image<T: Element> {
@@ -41,7 +41,7 @@ pub fn ingest<T: Sample>(
     stage.run(&volume.natural_boxes(crop), &workers, |voxels, part| {
         voxels.resize(part.len(), T::default());
         volume.read_box(part, T::buffer(voxels))?;
-        bricks.write_box(&part.translate(crop.lo.map(|v| -v)), voxels)?;
+        bricks.write_box(&part.translate(crop.lo.map(|v| -v)), voxels);
         let idle = histograms.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut histogram = idle.unwrap_or_default();
         if let Err(place) = histogram.add(voxels) {

@@ -10,7 +10,7 @@ use crate::grid::{Box3, BrickGrid, BrickSet, Geometry};
 use crate::io::ome_zarr::{ImageWriter, LevelWriter, shard_bytes};
 use crate::kernel::image::filter::downsample;
 use crate::kernel::image::filter::downsample::coarse_box;
-use crate::store::{BoxSink, BoxSource, BrickArray, Element, ElementType};
+use crate::store::{BoxSource, BrickArray, Element, ElementType};
 
 /// How several voxels become one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +110,8 @@ fn put<T: Element>(
     let part = coarse_box(chunk, level.factors());
     buffer.resize(part.len(), T::default());
     reduce.reduce(values, chunk.shape(), level.factors(), buffer);
-    coarser.write_box(&part, buffer)
+    coarser.write_box(&part, buffer);
+    Ok(())
 }
 
 /// Visits of the chunks of levels that have the same grid, so that those of a shard come soon one after the other. A visit

@@ -8,7 +8,7 @@ use super::object_report::ObjectReport;
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::{BrickGrid, BrickSet, Geometry, Slot};
-use crate::store::{BoxSink, BoxSource, BrickArray};
+use crate::store::{BoxSource, BrickArray};
 
 /// Edge of the bricks of the label volume.
 const EDGE: i64 = 64;
@@ -43,7 +43,8 @@ pub(super) fn labels_of(engine: &Engine, geometry: &Geometry, joined: &Joined<'_
         let part = grid.brick_box(set.id(slot));
         labels.resize(part.len(), 0);
         joined.read_box(&part, labels)?;
-        kept.write_box(&part, labels)
+        kept.write_box(&part, labels);
+        Ok(())
     })?;
     stage.finish();
     Ok(kept)

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use strandline::error::Result;
 use strandline::grid::{Box3, Geometry};
-use strandline::io::geometry::read::points::read_cloud;
 use strandline::io::geometry::read::sources::{describe, read_source};
 use strandline::io::stack::formats::open_stack;
 use strandline::io::stack::label_volume::{LabelVolume, labels_of};
@@ -15,6 +14,7 @@ use strandline::io::stack::zarr;
 use strandline::store::{ElementType, Sample};
 
 use super::seeds::{images, meshes, pages, rois, slices, tables};
+use crate::common::read_cloud;
 use crate::common::stores;
 
 /// Files of an input: paths in its folder, and what they hold.

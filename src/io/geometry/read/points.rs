@@ -31,15 +31,6 @@ use names::Form;
 pub use super::point_units::LengthUnit;
 pub(crate) use layout::foreign_line;
 
-/// Reads a point cloud with its numbers as they stand in the file; `objects` and `contours` are empty where the file names
-/// none.
-///
-/// # Errors
-/// As [`read_points`].
-pub fn read_cloud(path: &Path) -> Result<PointCloud> {
-    read_points(path).map(|file| file.cloud)
-}
-
 /// Reads a file of points, or standard input where the path is `-`, and says how it is to be understood.
 ///
 /// # Errors

@@ -21,10 +21,6 @@ use crate::io::text::{first_binary_byte, quoted};
 pub struct Format {
     /// Its usual name.
     pub name: &'static str,
-    /// How names of such files usually end, without the dot; for help texts alone.
-    pub extensions: &'static [&'static str],
-    /// What is read of it, in a few words.
-    pub about: &'static str,
     /// Whether a file that starts with these bytes (64 kB, or all of a smaller file) is of this format.
     pub sniff: fn(&[u8]) -> bool,
     /// Reads a file of this format. Fails with an input error that says what is wrong and where.
@@ -33,59 +29,19 @@ pub struct Format {
 
 /// The formats, in the order in which they are tried.
 pub const FORMATS: &[Format] = &[
-    Format {
-        name: "PLY",
-        extensions: &["ply"],
-        about: "triangle mesh or points; text or binary of either byte order",
-        sniff: ply::is_ply,
-        read: ply::read,
-    },
-    Format {
-        name: "OFF",
-        extensions: &["off", "coff", "noff"],
-        about: "triangle mesh, or points where it has no faces; text",
-        sniff: off::is_off,
-        read: off::read,
-    },
-    Format {
-        name: "STL",
-        extensions: &["stl"],
-        about: "triangle mesh; text or binary",
-        sniff: stl::is_stl,
-        read: stl::read,
-    },
-    Format {
-        name: "OBJ",
-        extensions: &["obj"],
-        about: "triangle mesh, or points where it has no faces; text",
-        sniff: obj::is_obj,
-        read: obj::read,
-    },
-    Format {
-        name: "CSV",
-        extensions: &["csv", "tsv"],
-        about: "points; a header names the columns x, y, z as most programs do, and object and contour where there are any",
-        sniff: points::is_csv,
-        read: read_table,
-    },
-    Format {
-        name: "XYZ",
-        extensions: &["xyz", "txt"],
-        about: "points; three numbers a line, and perhaps more",
-        sniff: points::is_xyz,
-        read: read_table,
-    },
+    Format { name: "PLY", sniff: ply::is_ply, read: ply::read },
+    Format { name: "OFF", sniff: off::is_off, read: off::read },
+    Format { name: "STL", sniff: stl::is_stl, read: stl::read },
+    Format { name: "OBJ", sniff: obj::is_obj, read: obj::read },
+    Format { name: "CSV", sniff: points::is_csv, read: read_table },
+    Format { name: "XYZ", sniff: points::is_xyz, read: read_table },
     Format {
         name: "ROI",
-        extensions: &["roi"],
-        about: "outline of ImageJ, in voxels",
         sniff: roi::is_roi,
         read: |input| roi::read_roi(input).and_then(|file| cloud_of(file, input)),
     },
     Format {
         name: "ROI set",
-        extensions: &["zip"],
-        about: "outlines of ImageJ, in voxels",
         sniff: roi::is_zip,
         read: |input| roi::read_zip(input).and_then(|file| cloud_of(file, input)),
     },
@@ -97,19 +53,11 @@ pub const FORMATS: &[Format] = &[
 /// When the file cannot be read, is of no format in [`FORMATS`], holds neither a point nor a triangle, holds more than
 /// can be numbered, or is damaged: names the file, the place in it and the reason.
 pub fn read_source(path: &Path) -> Result<Source> {
-    read_noted(path).map(|(source, _)| source)
+    describe(path).map(|(source, ..)| source)
 }
 
-/// As [`read_source`], and what the user should know about how the file was understood.
-///
-/// # Errors
-/// As [`read_source`].
-pub fn read_noted(path: &Path) -> Result<(Source, Vec<String>)> {
-    let (source, _, notes) = describe(path)?;
-    Ok((source, notes))
-}
-
-/// As [`read_noted`], and how the points of a table or of ROIs are to be understood; their cloud is left out there.
+/// As [`read_source`], what the user should know about how the file was understood, and how the points of a table or of ROIs
+/// are to be understood; their cloud is left out there.
 ///
 /// # Errors
 /// As [`read_source`].

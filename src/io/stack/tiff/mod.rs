@@ -52,12 +52,6 @@ impl TiffStack {
         Ok(Self { path: path.to_path_buf(), info, images, source, pool: Mutex::new(Vec::new()) })
     }
 
-    /// What the stack is.
-    #[must_use]
-    pub fn info(&self) -> &StackInfo {
-        &self.info
-    }
-
     fn check_request(&self, z: i64, out: &SamplesMut<'_>) -> Result<()> {
         let [width, height, depth] = self.info.shape;
         let (element, len) = match out {

@@ -14,9 +14,9 @@ use zarrs::plugin::{ExtensionName, ZarrVersion};
 use super::codecs::Shards;
 use super::codecs::{Codecs, ValueType, bytes_of, guarded, one_line, slack};
 use super::keys::Keys;
-use super::samples::Kind;
 use super::shard_index::range_of;
 use crate::error::{Error, Result};
+use crate::io::stack::number::Number;
 
 /// The most bytes of a decoded chunk; Blosc packs no more either.
 const MAX_CHUNK: u64 = 1 << 31;
@@ -35,7 +35,9 @@ pub(crate) struct ChunkedArray {
     array: Array<FilesystemStore>,
     codecs: Codecs,
     value: ValueType,
-    pub(crate) kind: Kind,
+    /// What Zarr calls the type of its values.
+    pub(crate) type_name: String,
+    pub(crate) number: Number,
     pub(crate) shape: Vec<u64>,
     /// The shape of what is stored in one file.
     outer: Vec<NonZeroU64>,
@@ -62,12 +64,13 @@ impl ChunkedArray {
         });
         let array = array.map_err(|reason| unreadable(&reason))?;
         let shape = array.shape().to_vec();
-        let name = array.data_type().name(ZarrVersion::V3).unwrap_or_default();
-        let kind = Kind::named(&name).ok_or_else(|| {
-            refuse(format!("holds values of type {name}; integers, bool and float of up to 64 bits are read"))
+        let type_name = array.data_type().name(ZarrVersion::V3).unwrap_or_default().into_owned();
+        // A bool is stored as a byte.
+        let number = Number::named(if type_name == "bool" { "uint8" } else { &type_name }).ok_or_else(|| {
+            refuse(format!("holds values of type {type_name}; integers, bool and float of up to 64 bits are read"))
         })?;
-        let value =
-            ValueType { data_type: array.data_type().clone(), fill: array.fill_value().clone(), size: kind.size() };
+        let (data_type, fill) = (array.data_type().clone(), array.fill_value().clone());
+        let value = ValueType { data_type, fill, size: usize::from(number.bits() / 8) };
         if value.fill.as_ne_bytes().len() != value.size {
             return Err(refuse("has a fill value that is none of its type".into()));
         }
@@ -90,7 +93,7 @@ impl ChunkedArray {
             return Err(refuse(format!("has chunks named like {name}, where its metadata name them like {due}")));
         }
         let (folder, indices) = (folder.to_path_buf(), Mutex::default());
-        Ok(Self { folder, array, codecs, value, kind, shape, outer, chunk, keys, indices })
+        Ok(Self { folder, array, codecs, value, type_name, number, shape, outer, chunk, keys, indices })
     }
 
     /// The shape of the shards, where there are some.

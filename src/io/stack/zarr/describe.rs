@@ -103,7 +103,7 @@ fn describe_level(found: &Found, number: usize, notes: &mut Vec<String>) -> Resu
         spacing: lengths.spacing,
         origin: lengths.origin,
         unit: lengths.unit,
-        element: opened.array.kind.name().to_owned(),
+        element: opened.array.type_name.clone(),
         chunks: plain(&opened.array.chunk),
         shards: opened.array.shards().map(plain),
         codecs: codecs_of(&opened.folder)?,

@@ -71,8 +71,8 @@ impl ZarrImage {
             shape: space.map(|a| array.shape[a] as i64),
             channels: u32::try_from(along(Role::Channel)).unwrap_or(u32::MAX),
             times: u32::try_from(along(Role::Time)).unwrap_or(u32::MAX),
-            file_type: array.kind.name().to_owned(),
-            element: array.kind.element(),
+            file_type: array.type_name.clone(),
+            element: array.number.element(),
             spacing: lengths.spacing,
             origin: lengths.origin,
             unit: lengths.unit,
@@ -114,7 +114,7 @@ impl ZarrImage {
         let shape = shared.shape().map(|n| n as usize);
         let Some(bytes) = self.array.read(&at)? else {
             let place = Place { first: 0, strides: [0; 3] };
-            Values { bytes: self.array.fill(), kind: self.array.kind, place }.copy_to(out, to, shape);
+            Values { bytes: self.array.fill(), number: self.array.number, place }.copy_to(out, to, shape);
             return Ok(());
         };
         let mut strides = vec![1; at.len()];
@@ -124,7 +124,7 @@ impl ZarrImage {
         let mut first: usize = (0..3).map(|a| (shared.lo[a] - lo[a]) as usize * strides[self.space[a]]).sum();
         first += self.chosen.iter().map(|&(axis, index)| (index % chunk(axis)) as usize * strides[axis]).sum::<usize>();
         let place = Place { first, strides: self.space.map(|axis| strides[axis]) };
-        Values { bytes: &bytes, kind: self.array.kind, place }.copy_to(out, to, shape);
+        Values { bytes: &bytes, number: self.array.number, place }.copy_to(out, to, shape);
         Ok(())
     }
 }

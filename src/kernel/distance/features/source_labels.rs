@@ -1,9 +1,6 @@
 //! The labels of the sources that voxels have.
 
-use std::collections::BTreeMap;
-
 use crate::grid::{DataSets, NO_SOURCE};
-use crate::kernel::image::labels::count;
 
 /// Sources whose labels are looked up at once.
 const AT_ONCE: usize = 64;
@@ -28,18 +25,6 @@ pub(crate) fn of_sources(sets: &DataSets, sources: &[u32], out: &mut Vec<u32>) {
     }
 }
 
-/// Voxels of each label but 0, by their sources.
-#[must_use]
-pub fn count_sources(sets: &DataSets, sources: &[u32], labels: &mut Vec<u32>) -> BTreeMap<u32, u64> {
-    match sources.first().map(|first| sets.label(*first)) {
-        Some(label) if label > 0 && sets.share_label(sources) => BTreeMap::from([(label, sources.len() as u64)]),
-        _ => {
-            of_sources(sets, sources, labels);
-            count(labels)
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -52,16 +37,5 @@ mod tests {
         let mut labels = vec![7];
         of_sources(&sets, &[2, 2, 0, 1, u32::MAX], &mut labels);
         assert_eq!(labels, [9, 9, 4, 4, 0]);
-    }
-
-    #[test]
-    fn voxels_are_counted_by_the_labels_of_their_sources() {
-        let mut sets = DataSets::default();
-        sets.add_labelled(4, &[[0.0; 3]; 2]);
-        sets.add_labelled(9, &[[1.0; 3]]);
-        let of = |sources: &[u32]| count_sources(&sets, sources, &mut Vec::new());
-        assert_eq!(of(&[1, 0, 2, NO_SOURCE]), BTreeMap::from([(4, 2), (9, 1)]));
-        assert_eq!(of(&[1, 0, 1]), BTreeMap::from([(4, 3)]));
-        assert!(of(&[NO_SOURCE; 2]).is_empty() && of(&[]).is_empty());
     }
 }

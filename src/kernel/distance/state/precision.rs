@@ -98,6 +98,26 @@ macro_rules! real {
                 self as usize
             }
         }
+
+        impl Precision for $t {
+            type Lane = Self;
+            type Fast = Self;
+            const MAX: f64 = <$t>::MAX as f64;
+            const LEAST: f64 = <$t>::MIN_POSITIVE as f64;
+            const UNKNOWN: Self = <$t>::INFINITY;
+            #[inline(always)]
+            fn lane(self) -> Self {
+                self
+            }
+            #[inline(always)]
+            fn of_lane(lane: Self) -> Self {
+                lane
+            }
+            #[inline(always)]
+            fn round<A: Real>(value: A) -> Self {
+                value.f64() as $t
+            }
+        }
     };
 }
 
@@ -123,48 +143,6 @@ pub trait Precision: Element {
     fn of_lane(lane: Self::Lane) -> Self;
     /// The nearest value that can be stored.
     fn round<A: Real>(value: A) -> Self::Lane;
-}
-
-impl Precision for f64 {
-    type Lane = Self;
-    type Fast = Self;
-    const MAX: f64 = Self::MAX;
-    const LEAST: f64 = Self::MIN_POSITIVE;
-    const UNKNOWN: Self = Self::INFINITY;
-
-    #[inline(always)]
-    fn lane(self) -> Self {
-        self
-    }
-    #[inline(always)]
-    fn of_lane(lane: Self) -> Self {
-        lane
-    }
-    #[inline(always)]
-    fn round<A: Real>(value: A) -> Self {
-        value.f64()
-    }
-}
-
-impl Precision for f32 {
-    type Lane = Self;
-    type Fast = Self;
-    const MAX: f64 = Self::MAX as f64;
-    const LEAST: f64 = Self::MIN_POSITIVE as f64;
-    const UNKNOWN: Self = Self::INFINITY;
-
-    #[inline(always)]
-    fn lane(self) -> Self {
-        self
-    }
-    #[inline(always)]
-    fn of_lane(lane: Self) -> Self {
-        lane
-    }
-    #[inline(always)]
-    fn round<A: Real>(value: A) -> Self {
-        value.f64() as Self
-    }
 }
 
 impl Precision for f16 {

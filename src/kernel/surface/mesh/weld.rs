@@ -47,23 +47,11 @@ impl Welder {
         }
     }
 
-    /// Number of vertices so far.
-    #[must_use]
-    pub fn vertices(&self) -> u64 {
-        self.vertices
-    }
-
     /// Bytes of memory: what later patches may share, and the last one's vertices.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let of_last = self.numbers.capacity() * size_of::<u32>() + self.world.capacity() * size_of::<[f64; 3]>();
         table_bytes(&self.shared) + of_last as u64
-    }
-
-    /// Number of triangles so far.
-    #[must_use]
-    pub fn triangles(&self) -> u64 {
-        self.triangles
     }
 
     /// Adds a patch: its new vertices in world coordinates, then its triangles, outward as the patch has them.
@@ -140,8 +128,8 @@ fn touches_border(key: VertexKey, cells: &Box3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::TriangleMesh;
     use crate::kernel::surface::MarchingCubes;
-    use crate::store::MeshBuffer;
 
     /// A slab of cells that all cross the plane z = 0.5, one patch per cell.
     fn patch(cell: [i64; 3], values: [f32; 8]) -> Patch {
@@ -161,19 +149,18 @@ mod tests {
     #[test]
     fn neighbours_share_their_vertices() {
         let mut welder = Welder::new(&geometry());
-        let mut mesh = MeshBuffer::default();
+        let mut mesh = TriangleMesh::default();
         for cell in [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]] {
             welder.add(&patch(cell, BELOW_INSIDE), &mut mesh).unwrap();
         }
         assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (9, 8));
-        assert_eq!((welder.vertices(), welder.triangles()), (9, 8));
         assert!(mesh.vertices.contains(&[12.0, 24.0, 30.25]) && mesh.vertices.contains(&[10.0, 20.0, 30.25]));
     }
 
     #[test]
     fn keys_of_passed_layers_are_dropped() {
         let mut welder = Welder::new(&geometry());
-        let mut mesh = MeshBuffer::default();
+        let mut mesh = TriangleMesh::default();
         welder.add(&patch([0, 0, 0], BELOW_INSIDE), &mut mesh).unwrap();
         assert_eq!(welder.shared.len(), 4);
         // The plane's edges start at z = 0: nothing of them is left in the cells that start at z = 1.
@@ -184,14 +171,14 @@ mod tests {
     #[test]
     fn the_last_patch_can_be_walked_in_world_coordinates() {
         let mut welder = Welder::new(&geometry());
-        let mut mesh = MeshBuffer::default();
+        let mut mesh = TriangleMesh::default();
         for cell in [[0, 0, 0], [1, 0, 0]] {
             let patch = patch(cell, BELOW_INSIDE);
             let start = mesh.triangles.len();
             welder.add(&patch, &mut mesh).unwrap();
             let walked: Vec<_> = welder.triangles_of(&patch).collect();
             assert_eq!(walked.iter().map(|w| w.0).collect::<Vec<_>>(), mesh.triangles[start..]);
-            assert!(walked.iter().all(|(t, p)| t.map(|v| mesh.vertices[v as usize].map(f64::from)) == *p));
+            assert!(walked.iter().all(|(t, p)| t.map(|v| mesh.vertices[v as usize]) == *p));
         }
     }
 
@@ -199,7 +186,7 @@ mod tests {
     fn too_many_vertices_are_refused() {
         let mut welder = Welder::new(&geometry());
         welder.vertices = VERTEX_LIMIT - 3;
-        let error = welder.add(&patch([0; 3], BELOW_INSIDE), &mut MeshBuffer::default()).unwrap_err();
+        let error = welder.add(&patch([0; 3], BELOW_INSIDE), &mut TriangleMesh::default()).unwrap_err();
         assert!(error.to_string().contains("32-bit"), "{error}");
         assert_eq!(error.exit_code(), 1);
     }

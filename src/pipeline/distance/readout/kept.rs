@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::{BrickGrid, BrickSet, Geometry};
 use crate::kernel::distance::state::precision::Precision;
-use crate::store::{BoxSink, BrickArray};
+use crate::store::BrickArray;
 
 /// Edge of the bricks that it is kept in: as large as what is looked at at a time.
 const EDGE: i64 = 64;
@@ -34,8 +34,8 @@ impl<P: Precision> Kept<P> {
     }
 
     /// Takes what was read of a box.
-    pub(super) fn put(&self, tile: &Tile<'_, P>) -> Result<()> {
-        self.values.write_box(tile.part, tile.values)?;
-        self.sources.as_ref().map_or(Ok(()), |sources| sources.write_box(tile.part, tile.sources))
+    pub(super) fn put(&self, tile: &Tile<'_, P>) {
+        self.values.write_box(tile.part, tile.values);
+        self.sources.iter().for_each(|sources| sources.write_box(tile.part, tile.sources));
     }
 }

@@ -78,7 +78,7 @@ impl<P: Precision> ReadOut<'_, '_, P> {
             visit.iter().try_fold(Measured::default(), |before, part| {
                 let measured = self.look(part, inside.as_ref(), voxels)?;
                 if let Some(kept) = self.kept {
-                    kept.put(&voxels.tile(part, &closest))?;
+                    kept.put(&voxels.tile(part, &closest));
                 }
                 if let Some(images) = &images {
                     images.put(&voxels.tile(part, &closest), buffers)?;

@@ -10,7 +10,7 @@ use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::{Precision, Real};
 use crate::kernel::distance::whole_volume::dijkstra_heap::DijkstraHeap;
 use crate::kernel::distance::whole_volume::marching_heap::MarchingHeap;
-use crate::store::{BoxSink, BoxSource, BrickArray};
+use crate::store::{BoxSource, BrickArray};
 
 /// Voxels frozen between two looks at whether the run was interrupted.
 const STRIDE: usize = 1 << 20;
@@ -34,7 +34,8 @@ pub(crate) fn heap_dijkstra<S: TrackedSource<Number = f64>>(
         engine.check()?;
     }
     drop(heap);
-    states.write_box(&domain, &dense)
+    states.write_box(&domain, &dense);
+    Ok(())
 }
 
 /// What of sources is wanted beside distances.
@@ -77,7 +78,8 @@ pub(crate) fn heap_marching<P: Precision, S: TrackedSource>(
     }
     drop(heap);
     if wanted.sources {
-        states.write_box(&domain, &dense)?;
+        states.write_box(&domain, &dense);
     }
-    distances.write_box(&domain, &values)
+    distances.write_box(&domain, &values);
+    Ok(())
 }

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::BrickSet;
 use crate::kernel::image::morphology::gaps::{GAP, GIVEN, Gaps, OUTSIDE};
-use crate::store::{BoxSink, BoxSource, BrickArray};
+use crate::store::{BoxSource, BrickArray};
 
 /// How deep, in smallest spacings, objects give back what they claimed beside others, where an image tells of walls: the
 /// crest of a wall three voxels wide is found from two voxels on either side of it.
@@ -80,7 +80,7 @@ fn tell(
         let around = roots.around(&part, halo, labels)?;
         out.resize(part.len(), OUTSIDE);
         gaps.tell(labels, &around, &part, out);
-        states.write_box(&part, out)?;
+        states.write_box(&part, out);
         match joining.image {
             Some(image) => Brightness::of(image, labels, &around, &part, out),
             None => Ok(Brightness::default()),
@@ -123,7 +123,7 @@ fn settle(
                 _ => {}
             }
         }
-        settled.write_box(&part, labels)?;
+        settled.write_box(&part, labels);
         Ok([filled, moved])
     })?;
     Ok((settled, counts.into_iter().fold([0; 2], |[a, b], [c, d]| [a + c, b + d])))

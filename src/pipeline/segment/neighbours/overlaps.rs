@@ -13,7 +13,7 @@ use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickId, BrickSet, Geometry};
 use crate::kernel::image::morphology::nearness::Nearness;
 use crate::pipeline::segment::labels::Placed;
-use crate::store::{BoxSink, BrickArray};
+use crate::store::BrickArray;
 
 /// How far, in smallest spacings, is looked at first and at most. Beyond, objects count as equally deep.
 const REACHES: std::ops::RangeInclusive<u32> = 3..=6;
@@ -43,7 +43,7 @@ pub(super) fn settle(
     let labels = BrickArray::new(engine.scratch(), &set)?;
     let contested = stage.run(&survey.overlapping, &Workers::none(), |(), &id| {
         let (settled, contested) = overlaps.settle(id)?;
-        labels.write_box(&survey.grid.brick_box(id), &settled)?;
+        labels.write_box(&survey.grid.brick_box(id), &settled);
         Ok(contested)
     })?;
     Ok(Some((labels, contested.iter().sum())))

@@ -9,7 +9,7 @@ use crate::exec::{Boundary, Engine, FixedPoint, HaloPlan, Reach, Stage, Workers,
 use crate::grid::{Geometry, Slot};
 use crate::kernel::image::morphology::gaps::SEED;
 use crate::kernel::image::morphology::geodesic::{Lengths, UNREACHED, relax};
-use crate::store::{BoxSink, BoxSource, BrickArray};
+use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
 
 /// The fields of the watershed.
@@ -55,12 +55,12 @@ fn begin(
         state.resize(part.len(), 0_u8);
         states.read_box(&part, state)?;
         walls.weights(&part, state, gaussian, weights)?;
-        fields.weight.write_box(&part, weights)?;
+        fields.weight.write_box(&part, weights);
         let is_seed = |n: usize| state[n] == SEED;
         let costs: Vec<u32> = (0..part.len()).map(|n| if is_seed(n) { 0 } else { UNREACHED }).collect();
-        fields.cost.write_box(&part, &costs)?;
+        fields.cost.write_box(&part, &costs);
         labels.iter_mut().enumerate().filter(|(n, _)| !is_seed(*n)).for_each(|(_, label)| *label = 0);
-        fields.label.write_box(&part, labels)?;
+        fields.label.write_box(&part, labels);
         fields.cost.refresh_faces(slot);
         fields.label.refresh_faces(slot);
         fields.weight.refresh_faces(slot);

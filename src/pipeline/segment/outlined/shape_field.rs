@@ -11,7 +11,7 @@ use crate::kernel::outline::spatial::fitted::Fitted;
 use crate::kernel::outline::spatial::lattice::Lattice;
 use crate::kernel::outline::spatial::shape::Shape;
 use crate::pipeline::enclosure::region::voxel_bounds;
-use crate::store::{BoxSink, BrickArray};
+use crate::store::BrickArray;
 
 /// Nodes of the lattice that the function is laid out on, about.
 const NODES: f64 = 60_000.0;
@@ -106,7 +106,7 @@ impl<'a> ShapeField<'a> {
             let part = grid.brick_box(set.id(slot));
             values.resize(part.len(), 0.0);
             self.read(&part, values);
-            field.write_box(&part, values)?;
+            field.write_box(&part, values);
             field.refresh_faces(slot);
             Ok(values.iter().copied().fold(f32::INFINITY, f32::min))
         })?;

@@ -19,7 +19,7 @@ use crate::kernel::image::border::carried::Carried;
 use crate::kernel::image::border::speed::{Grey, Places, Step, Weights, level_offsets, speeds};
 use crate::kernel::image::border::wall::{Fields, Wall, wall_offsets};
 use crate::kernel::outline::spatial::lattice::Lattice;
-use crate::store::{BoxSink, BoxSource, BrickArray};
+use crate::store::{BoxSource, BrickArray};
 
 /// Nodes of the lattices of grey values, about, and how many smallest spacings they are apart at least: grey values
 /// under outlines are averaged over more.
@@ -66,7 +66,7 @@ pub(crate) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
             beyond: &buffers.beyond,
         };
         speeds(at, &buffers.offsets, &buffers.doubts, weights, &mut buffers.speed);
-        field.write_box(&part, &buffers.speed)?;
+        field.write_box(&part, &buffers.speed);
         field.refresh_faces(slot);
         Ok(())
     })?;

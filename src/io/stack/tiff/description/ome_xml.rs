@@ -214,14 +214,14 @@ fn add_spacing(pixels: Node, description: &mut Description) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::stack::number::{ByteOrder, Number};
     use crate::io::stack::tiff::pages::compression::Compression;
-    use crate::io::stack::tiff::pages::ifd::ByteOrder;
     use crate::io::stack::tiff::pages::page::Kind;
     use crate::io::stack::tiff::pages::samples::SampleKind;
 
     fn page(samples: u16) -> Page {
         Page {
-            kind: Kind { width: 4, height: 3, sample: SampleKind::U8, samples },
+            kind: Kind { width: 4, height: 3, sample: SampleKind::Number(Number::U8), samples },
             number: 1,
             order: ByteOrder::Little,
             planar: false,

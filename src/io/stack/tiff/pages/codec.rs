@@ -10,8 +10,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use tiff::decoder::{Decoder, Limits};
 
 use super::compression::Compression;
-use super::ifd::ByteOrder;
 use super::page::Page;
+use crate::io::stack::number::ByteOrder;
 
 const ENTRIES: usize = 11;
 /// Bytes of header and directory in front of the packed bytes.

@@ -2,10 +2,11 @@
 
 use super::codec;
 use super::compression::Compression;
-use super::ifd::{ByteOrder, TiffFile};
+use super::ifd::TiffFile;
 use super::page::{Chunk, MAX_CHUNK, Page};
 use super::samples::Row;
 use crate::error::{Error, Result};
+use crate::io::stack::number::ByteOrder;
 use crate::store::SamplesMut;
 
 /// Uncompressed strips are read in blocks of about this many bytes.
@@ -130,8 +131,8 @@ impl Plane<'_> {
         let step = usize::from(page.interleaved());
         let sample = if page.planar { 0 } else { usize::from(self.sample) };
         for (y, bytes) in (at[1]..at[1] + rows).zip(bytes.chunks_exact(page.row_bytes() as usize)) {
-            let row = Row { bytes, kind: page.kind.sample, order, step, sample };
-            row.copy_to(out, (y * width + at[0]) as usize, count);
+            let row = Row { bytes, kind: page.kind.sample, order, step, sample, count };
+            row.copy_to(out, (y * width + at[0]) as usize);
         }
     }
 

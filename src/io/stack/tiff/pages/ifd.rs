@@ -10,30 +10,10 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::io::stack::number::ByteOrder;
 
 /// More entries than this in one directory mean a damaged file; real pages have 10 to 60.
 const MAX_ENTRIES: u64 = 4096;
-
-/// Byte order of numbers in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ByteOrder {
-    Little,
-    Big,
-}
-
-impl ByteOrder {
-    /// The order of this machine.
-    pub(crate) const NATIVE: Self = if cfg!(target_endian = "big") { Self::Big } else { Self::Little };
-
-    /// The unsigned number in up to eight bytes.
-    pub(crate) fn number(self, bytes: &[u8]) -> u64 {
-        let join = |n: u64, &b: &u8| (n << 8) | u64::from(b);
-        match self {
-            Self::Little => bytes.iter().rev().fold(0, join),
-            Self::Big => bytes.iter().fold(0, join),
-        }
-    }
-}
 
 /// An open TIFF file, shared by all threads.
 #[derive(Debug)]

@@ -3,9 +3,10 @@
 //! Declared sizes are compared with the length of the file before anything is allocated.
 
 use super::compression::Compression;
-use super::ifd::{ByteOrder, Tags};
+use super::ifd::Tags;
 use super::samples::SampleKind;
 use crate::error::Result;
+use crate::io::stack::number::ByteOrder;
 
 /// The most bytes one compressed strip or tile may have, packed or unpacked; both are held in memory once per thread.
 pub(crate) const MAX_CHUNK: u64 = 256 << 20;
