@@ -18,7 +18,8 @@ use plain_scheme::{PlainVelocity, coefficients, gradient_norms};
 use strandline::kernel::level_set::cell::CELL;
 use strandline::kernel::level_set::scheme::velocity::Velocity;
 use strandline::pipeline::level_set::band::{Reaches, make_band};
-use strandline::pipeline::level_set::evolve::{Stop, TimeLoop, evolve};
+use strandline::pipeline::level_set::evolve::evolve;
+use strandline::pipeline::level_set::time_loop::{Stop, TimeLoop};
 
 const STEPS: u32 = 20;
 /// Each program runs this often, taking turns; its fastest run counts.

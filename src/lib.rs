@@ -142,7 +142,7 @@ pub use kernel::surface::{Contact, Hausdorff, Measures, Pair};
 pub use pipeline::distance::{DistanceFound, Init, Method, Schedule};
 pub use pipeline::enclosure::search::Hole;
 pub use pipeline::image::terms::Smoothing;
-pub use pipeline::level_set::evolve::{Evolution, Stop};
+pub use pipeline::level_set::time_loop::{Evolution, Stop};
 pub use pipeline::middle::{LabelMode, SurfaceKind};
 pub use pipeline::segment::{
     CrossValidation, FillGaps, ImageModel, NeighboursFound, ObjectReport, Outcome, Overlap, Refused, Start,

@@ -28,7 +28,7 @@ macro_rules! motion_setters {
         }
 
         /// When the surface counts as at rest.
-        pub fn stop(mut self, stop: $crate::pipeline::level_set::evolve::Stop) -> Self {
+        pub fn stop(mut self, stop: $crate::pipeline::level_set::time_loop::Stop) -> Self {
             self.$($motion).+.stop = stop;
             self
         }

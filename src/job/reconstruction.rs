@@ -14,7 +14,7 @@ use crate::grid::{Geometry, TriangleMesh};
 use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::distance::Method;
 use crate::pipeline::laying::{check_grid, check_spacing};
-use crate::pipeline::level_set::evolve::Evolution;
+use crate::pipeline::level_set::time_loop::Evolution;
 use crate::pipeline::limits::{ABOVE_ZERO, check_given};
 use crate::pipeline::reconstruct;
 use crate::pipeline::reconstruct::{

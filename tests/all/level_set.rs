@@ -11,7 +11,8 @@ use strandline::kernel::surface::{MarchingCubes, Measures, Patch, PatchIndex, Su
 use strandline::pipeline::distance::{Method, Sources, cloud_distance};
 use strandline::pipeline::enclosure::tagging::tag;
 use strandline::pipeline::level_set::band::{Reaches, make_band};
-use strandline::pipeline::level_set::evolve::{Evolution, Stop, TimeLoop, evolve};
+use strandline::pipeline::level_set::evolve::evolve;
+use strandline::pipeline::level_set::time_loop::{Evolution, Stop, TimeLoop};
 
 use crate::common::clouds::{grid_around, sponge};
 use crate::common::lab::{Lab, PlainGrid, dense, whole};

@@ -8,7 +8,8 @@ use strandline::kernel::level_set::scheme::mask::CellMask;
 use strandline::kernel::level_set::scheme::sor::{Halves, Relaxation, relax};
 use strandline::kernel::level_set::scheme::system::SCHEME_LEN;
 use strandline::kernel::level_set::scheme::velocity::{Fields, Velocity};
-use strandline::pipeline::level_set::evolve::{Evolution, Stop, TimeLoop, evolve};
+use strandline::pipeline::level_set::evolve::evolve;
+use strandline::pipeline::level_set::time_loop::{Evolution, Stop, TimeLoop};
 
 use crate::common::lab::{Lab, PlainGrid, whole};
 use crate::common::plain_scheme::{PlainVelocity, coefficients, gradient_norms};

@@ -8,8 +8,8 @@ use strandline::error::Result;
 use strandline::grid::{Geometry, TriangleMesh};
 use strandline::kernel::surface::PatchIndex;
 use strandline::pipeline::distance::Method;
-use strandline::pipeline::level_set::evolve::Stop;
 use strandline::pipeline::level_set::motion::Motion;
+use strandline::pipeline::level_set::time_loop::Stop;
 use strandline::pipeline::reconstruct::{ReconstructSettings, Reconstruction, grid_for, reconstruct};
 use strandline::store::{BoxSource, NoMesh};
 

@@ -13,8 +13,8 @@ use crate::exec::{Engine, StageReport, peak_resident};
 use crate::grid::Geometry;
 use crate::job::resources::Resources;
 use crate::pipeline::image::terms::Smoothing;
-use crate::pipeline::level_set::evolve::Stop;
 use crate::pipeline::level_set::motion::Motion;
+use crate::pipeline::level_set::time_loop::Stop;
 use crate::pipeline::segment::{ObjectReport, Outcome, Overlap, SegmentSettings};
 
 /// The whole report.

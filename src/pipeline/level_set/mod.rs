@@ -4,3 +4,4 @@ pub mod band;
 pub mod evolve;
 pub mod motion;
 pub(crate) mod ranks;
+pub mod time_loop;

@@ -1,7 +1,7 @@
 //! How a surface moves: what pulls it, in which steps, until when. Lengths are physical; those that nobody gave follow
 //! from the grid's spacing.
 
-use super::evolve::{Stop, TimeLoop};
+use super::time_loop::{Stop, TimeLoop};
 use crate::error::Result;
 use crate::grid::Geometry;
 use crate::kernel::level_set::scheme::velocity::Velocity;

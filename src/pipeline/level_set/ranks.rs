@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::band::Band;
-use super::evolve::{Evolution, TimeLoop, evolve};
+use super::evolve::evolve;
+use super::time_loop::{Evolution, TimeLoop};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, HaloPlan, Ownership, Reach, Stage};
 

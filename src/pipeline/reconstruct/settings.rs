@@ -2,8 +2,8 @@
 
 use crate::error::Result;
 use crate::pipeline::distance::Method;
-use crate::pipeline::level_set::evolve::Stop;
 use crate::pipeline::level_set::motion::Motion;
+use crate::pipeline::level_set::time_loop::Stop;
 use crate::pipeline::limits::{ABOVE_ZERO, check_given};
 
 /// What the user may set.

@@ -9,8 +9,8 @@ use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::image::intensity::Normalised;
 use crate::pipeline::image::terms::{edges, presmooth};
 use crate::pipeline::level_set::band::Band;
-use crate::pipeline::level_set::evolve::Evolution;
 use crate::pipeline::level_set::evolve::evolve;
+use crate::pipeline::level_set::time_loop::Evolution;
 use crate::pipeline::marks::ObjectMarks;
 use crate::store::{BrickArray, Element};
 

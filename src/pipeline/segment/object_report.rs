@@ -3,7 +3,7 @@
 use crate::kernel::surface::Hausdorff;
 use crate::kernel::surface::Measures;
 use crate::pipeline::enclosure::search::Hole;
-use crate::pipeline::level_set::evolve::Evolution;
+use crate::pipeline::level_set::time_loop::Evolution;
 
 /// What is reported of a solved object.
 #[derive(Clone, Debug)]
