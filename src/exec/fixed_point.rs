@@ -84,7 +84,7 @@ impl<J: FixedPoint> Relax for Marked<'_, J> {
         self.dirty[slot as usize] = false;
     }
 
-    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+    fn receive(&mut self, slot: Slot, _note: &[f64; 0]) {
         let set = self.job.field().set();
         for beside in self.neighbours.iter().filter_map(|&offset| set.neighbour(slot, offset)) {
             self.dirty[beside as usize] = true;

@@ -2,7 +2,7 @@
 //! each other and other ranks, and when it is over.
 //!
 //! A round takes the waves of a colouring one after the other; bricks of one wave do not read each other. Of a wave those
-//! are visited that are due. What a visit changed is told to the bricks beside it: on this rank by [`Relax::told`], on
+//! are visited that are due. What a visit changed is told to the bricks beside it: on this rank by [`Relax::receive`], on
 //! others by the faces of the brick and a note, which travel while the bricks that nobody else reads are visited. What is
 //! visited follows from values alone, so results depend neither on threads nor on ranks.
 
@@ -42,7 +42,7 @@ pub trait Relax: Sync {
     fn visited(&mut self, slot: Slot, visit: Self::Visit);
 
     /// Takes what a brick tells, of this rank or a ghost: wakes those beside it.
-    fn told(&mut self, slot: Slot, note: &Self::Note);
+    fn receive(&mut self, slot: Slot, note: &Self::Note);
 
     /// All of a wave, on this rank and beside it, was visited and told.
     ///
@@ -117,7 +117,7 @@ impl<W: Send> Waves<'_, '_, W> {
             changed |= !notes.is_empty();
             notes.extend(self.exchange.collect(job.field())?);
             for (slot, note) in &notes {
-                job.told(*slot, note);
+                job.receive(*slot, note);
             }
             job.after_wave()?;
         }

@@ -17,8 +17,8 @@ use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::laying::{check_grid, check_spacing};
 use crate::pipeline::marks::{ObjectMarks, Seed};
 use crate::pipeline::segment::{
-    FillGaps, Grids, Guides, ImageModel, Kept, KeptObject, Looked, Outcome, Overlap, SegmentSettings, Start,
-    check_lengths, check_seed, check_smoothing, estimate, look_at_marks, segment_kept,
+    CheckedMarks, FillGaps, Grids, Guides, ImageModel, Kept, KeptObject, Outcome, Overlap, SegmentSettings, Start,
+    check_all_marks, check_lengths, check_seed, check_smoothing, estimate, segment_kept,
 };
 use crate::pipeline::surface::extract;
 use crate::store::{BoxSource, MeshSink, Sample, VolumeSource};
@@ -207,7 +207,7 @@ impl<'a> Segmentation<'a> {
         settings.check()?;
         self.check_image(&settings)?;
         let mut notes = Vec::new();
-        let Looked { fit, refused, first_error } = self.look(&mut notes)?;
+        let CheckedMarks { fit, refused, first_error } = self.look(&mut notes)?;
         if let Some((_, error)) = first_error.filter(|_| fit.is_empty()) {
             return Err(error);
         }
@@ -236,16 +236,16 @@ impl<'a> Segmentation<'a> {
     }
 
     /// Looks at the marks of all objects.
-    fn look(&self, notes: &mut Vec<String>) -> Result<Looked> {
+    fn look(&self, notes: &mut Vec<String>) -> Result<CheckedMarks> {
         let (seeded, marked): (Vec<_>, Vec<_>) =
             objects_of(&self.marks)?.into_iter().partition(|object| object.seed.is_some());
         seeded.iter().filter_map(|object| object.seed.as_ref()).try_for_each(|s| check_seed(s, &self.geometry))?;
         let grids = Grids { whole: &self.geometry, part: &self.geometry, guessed: [false; 3] };
         let heard = std::cell::RefCell::new(Vec::new());
-        let mut looked = look_at_marks(&marked, &grids, &[], &|text| heard.borrow_mut().push(text.to_owned()));
+        let mut checked = check_all_marks(&marked, &grids, &[], &|text| heard.borrow_mut().push(text.to_owned()));
         heard.into_inner().iter().for_each(|text| self.run.note(notes, text));
-        looked.fit.extend(seeded);
-        Ok(looked)
+        checked.fit.extend(seeded);
+        Ok(checked)
     }
 }
 

@@ -14,7 +14,7 @@ use crate::cli::inputs::sources::{Read, read_sets};
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::disk::Disk;
 use crate::cli::outputs::drawing::Drawing;
-use crate::cli::outputs::files::{mesh_format, tell_of_anchor};
+use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::run_report::{Ran, Report};
@@ -146,7 +146,7 @@ impl Job {
         let mut ply = drawing.start(|path| PlyWriter::tagged_on_grid(path, &self.geometry))?;
         let found = self.solve::<P>(engine, store.as_ref(), ply.sink())?;
         ply.finish()?;
-        tell_of_anchor(mesh, &self.geometry, &self.console);
+        note_anchor(mesh, &self.geometry, &self.console);
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;

@@ -15,7 +15,7 @@ use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::disk::Disk;
 use crate::cli::outputs::drawing::Drawing;
-use crate::cli::outputs::files::{mesh_format, tell_of_anchor};
+use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::print;
 use crate::cli::report::run_report::{Hausdorff, Hole, Moves, Ran, Report};
 use crate::cli::report::table;
@@ -220,8 +220,8 @@ impl Job {
         if let Some(store) = &store {
             found.write(engine, store)?;
         }
-        self.tell_lost(&found);
-        tell_of_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
+        self.note_lost(&found);
+        note_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;
@@ -236,7 +236,7 @@ impl Job {
     }
 
     /// Says where the surface is not that of the points.
-    fn tell_lost(&self, found: &Reconstruction) {
+    fn note_lost(&self, found: &Reconstruction) {
         let (lost, all) = (found.lost_points, self.cloud.len() as u64);
         if MOST_LOST * lost > all {
             self.console.note(&format!(

@@ -9,10 +9,10 @@ use std::time::Instant;
 
 use crate::cli::args::common::SegmentArgs;
 use crate::cli::inputs::image::{chosen_notes, crop_box, open_stack};
-use crate::cli::inputs::marks::{Marks, Objects, Reading, look_at_marks, read_marks};
+use crate::cli::inputs::marks::{Marks, Objects, Reading, check_all_marks, read_marks};
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::{Outputs, numbered};
-use crate::cli::outputs::files::{export_mesh, mesh_format, tell_of_anchor};
+use crate::cli::outputs::files::{export_mesh, mesh_format, note_anchor};
 use crate::cli::print;
 use crate::cli::report::run_report::{Found, Ran, Report, Settings, Solver, crop_xyz};
 use crate::cli::report::{picture, table};
@@ -103,7 +103,7 @@ impl Job {
         let geometry = opened.geometry.crop(&crop);
         check_lengths(&settings, &geometry)?;
         let grids = Grids { whole: &opened.geometry, part: &geometry, guessed: opened.guessed };
-        let objects = look_at_marks(&marks, &grids, &args.seed, &console)?;
+        let objects = check_all_marks(&marks, &grids, &args.seed, &console)?;
         let numbers = objects.numbers();
         if let Some(path) = args.drawn.mesh.as_deref().filter(|_| numbers.len() > 1) {
             let meshes: Vec<PathBuf> = numbers.iter().map(|&object| numbered(path, object)).collect();
@@ -190,8 +190,8 @@ impl Job {
         };
         let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())
             .map_err(|error| self.marks.named_in(error))?;
-        self.tell(&outcome);
-        tell_of_anchor(self.args.drawn.mesh.as_deref(), &self.geometry, &self.console);
+        self.note_findings(&outcome);
+        note_anchor(self.args.drawn.mesh.as_deref(), &self.geometry, &self.console);
         if let Some(store) = &store {
             if self.names.command == "demo" {
                 picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;

@@ -24,9 +24,9 @@ pub(crate) struct OpenStack {
 /// Says which channel and time of several is read, where neither was chosen and nothing says it yet.
 pub(crate) fn chosen_notes(path: &Path, info: &StackInfo, select: Select) -> Vec<String> {
     let of = |what: &str, flag: &str, count: u32, chosen: u32| {
-        let is_told = info.notes.iter().any(|note| note.contains(flag));
+        let is_given = info.notes.iter().any(|note| note.contains(flag));
         let name = path.display();
-        (count > 1 && chosen == 0 && !is_told)
+        (count > 1 && chosen == 0 && !is_given)
             .then(|| format!("{name}: has {count} {what}s; {what} 0 is read, {flag} N picks another"))
     };
     let channel = of("channel", "--channel", info.channels, select.channel);

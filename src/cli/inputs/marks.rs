@@ -13,7 +13,7 @@ use crate::io::geometry::read::point_file::{PointFile, Scale};
 use crate::io::geometry::read::points::{LengthUnit, read_points};
 use crate::pipeline::marks::{ObjectMarks, Seed, split_and_seed};
 use crate::pipeline::segment;
-use crate::pipeline::segment::{Extent, Grids, Looked, Refused, shared};
+use crate::pipeline::segment::{CheckedMarks, Extent, Grids, Refused, shared};
 
 /// What decides how the numbers of a file are read.
 pub(crate) struct Reading<'a> {
@@ -47,8 +47,8 @@ pub(crate) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Con
         let file = read_points(path)?;
         let note = |note: &str| console.note(&format!("{}: {note}", path.display()));
         file.notes.iter().for_each(|told| note(told));
-        let is_told = |axis: usize| file.scales[axis] != Scale::Physical || file.units[axis].is_some();
-        let is_sure = reading.points_in.is_some() || (0..3).all(is_told);
+        let is_given = |axis: usize| file.scales[axis] != Scale::Physical || file.units[axis].is_some();
+        let is_sure = reading.points_in.is_some() || (0..3).all(is_given);
         let cloud = placed(file, reading, note).map_err(|error| error.at(path))?;
         if !marks.cloud.is_empty() && marks.cloud.contours.is_empty() != cloud.contours.is_empty() {
             let (this, other) =
@@ -193,12 +193,12 @@ impl Objects {
 }
 
 /// Checks the marks of each object, and says what is odd about them; refuses all where no object's fit the image.
-pub(crate) fn look_at_marks(marks: &Marks, grids: &Grids<'_>, seeds: &[Seed], console: &Console) -> Result<Objects> {
+pub(crate) fn check_all_marks(marks: &Marks, grids: &Grids<'_>, seeds: &[Seed], console: &Console) -> Result<Objects> {
     let (seeded, marked): (Vec<_>, Vec<_>) =
         split_and_seed(&marks.cloud, seeds).into_iter().partition(|object| object.seed.is_some());
-    let looked = segment::look_at_marks(&marked, grids, &marks.unsure, &|text| console.note(text));
-    let Looked { mut fit, refused, first_error } = looked;
-    tell_twice_marked(&marked, marks, grids.whole, console);
+    let checked = segment::check_all_marks(&marked, grids, &marks.unsure, &|text| console.note(text));
+    let CheckedMarks { mut fit, refused, first_error } = checked;
+    note_twice_marked(&marked, marks, grids.whole, console);
     fit.extend(seeded);
     // One of several that does not fit is refused by itself.
     match first_error {
@@ -214,7 +214,7 @@ const MOST_PAIRS: usize = 1 << 20;
 const MOST_NAMED: usize = 10;
 
 /// Says which objects of two files lie where one object would.
-fn tell_twice_marked(objects: &[ObjectMarks], marks: &Marks, image: &Geometry, console: &Console) {
+fn note_twice_marked(objects: &[ObjectMarks], marks: &Marks, image: &Geometry, console: &Console) {
     if marks.files.values().collect::<BTreeSet<_>>().len() < 2 || objects.len().pow(2) > MOST_PAIRS {
         return;
     }

@@ -39,7 +39,7 @@ pub(crate) fn export_mesh(ply: &Path, geometry: &Geometry, to: &Path) -> Result<
 }
 
 /// Says from where positions are seen in a mesh file that cannot hold them as they are.
-pub(crate) fn tell_of_anchor(mesh: Option<&Path>, geometry: &Geometry, console: &Console) {
+pub(crate) fn note_anchor(mesh: Option<&Path>, geometry: &Geometry, console: &Console) {
     let Some((path, format)) = mesh.and_then(|path| Some((path, Format::of(path)?))) else { return };
     let [x, y, z] = geometry.anchor();
     if format.is_single && [x, y, z] != [0.0; 3] {

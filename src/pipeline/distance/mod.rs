@@ -22,7 +22,7 @@ pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets};
 pub(crate) use needs::tree_bytes;
 pub use needs::{Needs, Writes};
 pub use ranks::solve;
-pub use readout::field::{Solved, Together};
+pub use readout::field::{DistanceWithSource, Solved};
 pub use readout::found::DistanceFound;
 pub(crate) use readout::images::Wanted;
 pub use readout::kept::Kept;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::readout::repair::with_second_look;
+use super::readout::repair::with_repair;
 use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;
@@ -28,7 +28,7 @@ pub fn solve<'a, P: Precision>(
 ) -> Result<Solved<'a, P>> {
     let solved = solve_once(stage, sources, set, method, schedule, options)?;
     Ok(if method.solver::<P>().tracks_sources() {
-        with_second_look(solved, sources, options, schedule == Schedule::Front)
+        with_repair(solved, sources, options, schedule == Schedule::Front)
     } else {
         solved
     })
@@ -59,7 +59,7 @@ pub(super) fn solve_once<'a, P: Precision>(
     Ok(Solved {
         values: joined.join(parts.iter().map(|part| part.values.clone()).collect()),
         sources: joined.join(parts.iter().map(|part| part.sources.clone()).collect()),
-        together: None,
+        with_source: None,
         fixed: joined.join(parts.iter().map(|part| part.fixed.clone()).collect()),
         fixed_voxels: sum(|part| part.fixed_voxels),
         triangle_distances: sum(|part| part.triangle_distances),

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::readout::field::{Solved, Values};
 use super::schedule::front::advance_front;
-use super::schedule::sweep::{Alone, sweep_all};
+use super::schedule::sweep::{NoCompanion, sweep_all};
 use super::schedule::sweep_sources::TrackedSweeps;
 use super::schedule::textbook::{Wanted, heap_dijkstra, heap_marching};
 use super::schedule::trace::{SourceField, trace_sources};
 use super::seeding::initialise::{Seeded, Start, initialise};
-use super::seeding::outside::look_outside;
+use super::seeding::outside::search_outside;
 use super::{Options, Schedule, Sources};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
@@ -110,20 +110,20 @@ impl<'a> Solving<'_, 'a> {
     }
 
     fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
-        let (state, seeded) = self.start::<M>(Start::Told)?;
+        let (state, seeded) = self.start::<M>(Start::Provisional)?;
         let geometry = self.sources.geometry;
         // Where sources are looked at again, those beyond the last voxel that counts are asked too.
         let beyond = if M::trial(0).is_some() { geometry.length([REACH; 3]) } else { 0.0 };
         let farthest = self.options.farthest + beyond;
         advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, farthest)?;
-        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
+        search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
         Ok(self.solved(method, state, &seeded))
     }
 
     fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<M>(Start::Fixed)?;
-        sweep_all(self.stage, &method, &state, &mut Alone(self.set), &seeded.bricks, iterations)?;
-        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
+        sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations)?;
+        search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
         Ok(self.solved(method, state, &seeded))
     }
 
@@ -139,7 +139,7 @@ impl<'a> Solving<'_, 'a> {
         let (state, sources, seeded) = self.start_apart::<FastSweeping<P, f64>>()?;
         if self.labelled().is_some() {
             // An update that lowers nothing is none, so sweeps do not see that another label is as near.
-            sweep_all(self.stage, &method, &state, &mut Alone(self.set), &seeded.bricks, iterations)?;
+            sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations)?;
             self.trace::<P, UpwindSum>(&state, &sources, &seeded)?;
             return Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) });
         }
@@ -193,7 +193,7 @@ impl<'a> Solving<'_, 'a> {
     fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<S>(Start::Fixed)?;
         heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
-        look_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
+        search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
         Ok(self.solved(method, state, &seeded))
     }
 

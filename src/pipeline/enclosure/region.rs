@@ -5,7 +5,7 @@ use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, PointBins};
 use crate::kernel::level_set::cell::CELL;
 
 /// The grid around a cloud, and its cells within a distance of it.
-pub struct Vicinity {
+pub struct RegionOfInterest {
     /// The grid of the box.
     pub geometry: Geometry,
     /// The box in voxels of the grid it was cut out of; may reach past it.
@@ -16,7 +16,7 @@ pub struct Vicinity {
     pub cells: BrickSet,
 }
 
-impl Vicinity {
+impl RegionOfInterest {
     /// The number of cells that the grid of such a box has, near the cloud or not.
     #[must_use]
     pub fn grid_cells(grid: &Geometry, cloud: &[[f64; 3]], farthest: f64) -> u64 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::needs::box_bytes;
 use super::pockets::pockets;
-use super::region::{Vicinity, voxel_bounds};
+use super::region::{RegionOfInterest, voxel_bounds};
 use super::sheets::{Company, hold_sheets};
 use super::tagging::{Basin, tag};
 use super::watershed::{Sides, watershed};
@@ -193,7 +193,7 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         if !sides.basins.is_empty() && (all || enough(&sides)) {
             let reaches = Reaches { inner: half_width as f32, outer: half_width as f32 };
             let Sides { inside, basins, lost } = sides;
-            let geometry = &around.vicinity.geometry;
+            let geometry = &around.region.geometry;
             let sheet = hold_sheets(geometry, search.cloud, &lost, Company::AT_THE_START, &inside);
             return Ok(Found::Enclosed(Box::new(around.enclosed(0.0, reaches, inside, basins, sheet))));
         }
@@ -216,7 +216,7 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|basin| search.holds(basin, beta))) else {
             stage.finish();
             // The deepest comes first; noise is as deep as its saddle.
-            let deepest = Deepest::of(&tagging.basins, &around.vicinity.geometry);
+            let deepest = Deepest::of(&tagging.basins, &around.region.geometry);
             let persists = deepest.filter(|d| d.depth >= f64::from(PERSISTENCE) * 0.5 * d.hole.width);
             if let (Some(_), Some(deepest)) = (search.beta, persists) {
                 return Ok(Found::Leaks(deepest));
@@ -234,7 +234,7 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
             farthest = half_width.max(outer) + 3.0 * grid.max_spacing();
             continue;
         }
-        let deepest = Deepest::of(&tagging.basins, &around.vicinity.geometry);
+        let deepest = Deepest::of(&tagging.basins, &around.region.geometry);
         tagging.basins.retain(|basin| search.holds(basin, beta));
         let inside = tagging.inside(&stage, engine, beta as f32)?;
         stage.finish();
@@ -251,7 +251,7 @@ fn automatic_beta(basins: &[Basin], grid: &Geometry) -> Option<f64> {
 
 /// The distance within some reach of the cloud.
 struct Around {
-    vicinity: Vicinity,
+    region: RegionOfInterest,
     distance: BrickArray<f32>,
     held: Hold,
 }
@@ -259,29 +259,30 @@ struct Around {
 impl Around {
     fn new(engine: &Engine, search: &Search<'_>, farthest: f64) -> Result<Self> {
         // The box grows with the reach: what it takes is held again, the tables of its grid before they are made.
-        let (points, cells) = (search.cloud.len() as u64, Vicinity::grid_cells(search.grid, search.cloud, farthest));
+        let (points, cells) =
+            (search.cloud.len() as u64, RegionOfInterest::grid_cells(search.grid, search.cloud, farthest));
         let tables = engine.hold(box_bytes(points, cells, 0))?;
-        let vicinity = Vicinity::new(search.grid, search.cloud, farthest);
+        let region = RegionOfInterest::new(search.grid, search.cloud, farthest);
         drop(tables);
-        let held = engine.hold(vicinity.held(search.cloud))?;
-        let set = Arc::new(vicinity.cells.clone());
-        let sources = Sources::cloud(&vicinity.geometry, search.cloud, &vicinity.bins);
+        let held = engine.hold(region.held(search.cloud))?;
+        let set = Arc::new(region.cells.clone());
+        let sources = Sources::cloud(&region.geometry, search.cloud, &region.bins);
         let stage = engine.stage(&format!("distance{}", search.suffix), 11 * set.len() as u64);
         stage.voxels((set.len() * set.grid().brick_len()) as u64);
         let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
         stage.finish();
-        Ok(Self { vicinity, distance, held })
+        Ok(Self { region, distance, held })
     }
 
     fn sources<'a>(&'a self, search: &Search<'a>) -> Sources<'a> {
-        Sources::cloud(&self.vicinity.geometry, search.cloud, &self.vicinity.bins)
+        Sources::cloud(&self.region.geometry, search.cloud, &self.region.bins)
     }
 
     /// The sides of the cloud; with a radius, what is open is closed by a ball of it, what is inside stays so.
     fn sides(&self, engine: &Engine, search: &Search<'_>, ball: Option<(f64, &BrickArray<u8>)>) -> Result<Sides> {
         let stage = self.tagging(engine, search);
         let pockets = ball
-            .map(|(radius, inside)| pockets(&stage, engine, &self.vicinity.geometry, &self.distance, inside, radius))
+            .map(|(radius, inside)| pockets(&stage, engine, &self.region.geometry, &self.distance, inside, radius))
             .transpose()?;
         let sides = watershed(&stage, engine, &self.sources(search), &self.distance, pockets.as_ref())?;
         stage.finish();
@@ -293,7 +294,7 @@ impl Around {
         let stage = self.tagging(engine, search);
         let tagging = tag(&stage, engine, &self.sources(search), &self.distance, 1.0)?;
         stage.finish();
-        Ok(Deepest::of(&tagging.basins, &self.vicinity.geometry))
+        Ok(Deepest::of(&tagging.basins, &self.region.geometry))
     }
 
     fn tagging<'a>(&self, engine: &'a Engine, search: &Search<'_>) -> Stage<'a> {
@@ -311,7 +312,7 @@ impl Around {
         basins: Vec<Basin>,
         sheet: Vec<u32>,
     ) -> Enclosure {
-        let (geometry, window) = (self.vicinity.geometry.clone(), self.vicinity.window);
+        let (geometry, window) = (self.region.geometry.clone(), self.region.window);
         let deepest = Deepest::of(&basins, &geometry);
         let Self { distance, held, .. } = self;
         Enclosure { geometry, window, beta, reaches, distance, inside, basins, deepest, sheet, held }

@@ -169,7 +169,7 @@ impl Watershed<'_> {
         }
         self.stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
             of_voxel.read(slot, |regions| {
-                inside.write(slot, |inside| spaces::tell(regions, is_inside, inside));
+                inside.write(slot, |inside| spaces::mark_sides(regions, is_inside, inside));
             });
             inside.refresh_faces(slot);
             Ok(())

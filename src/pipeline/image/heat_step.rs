@@ -128,7 +128,7 @@ impl Relax for Heat<'_> {
         self.squares[slot as usize] = squares;
     }
 
-    fn told(&mut self, _slot: Slot, _note: &[f64; 0]) {}
+    fn receive(&mut self, _slot: Slot, _note: &[f64; 0]) {}
 }
 
 /// No flux into cells that are not stored.

@@ -256,7 +256,7 @@ impl Solver<'_> {
 
     /// True when the corrections that a cell was left with, and those for what moved beside it since, which is unknown
     /// to it, may exceed the tolerance (root mean square).
-    fn is_due(&self, slot: Slot) -> bool {
+    fn is_unsolved(&self, slot: Slot) -> bool {
         let here = &self.visits[slot as usize];
         let corrections = here.left.sqrt() + GHOST_WEIGHT * self.unknown[slot as usize].iter().sum::<f64>();
         corrections > self.settings.solver_tolerance * f64::from(here.count).sqrt()
@@ -318,7 +318,7 @@ impl Relax for Solver<'_> {
     }
 
     fn priority(&self, slot: Slot) -> f64 {
-        if self.round == 0 || self.is_due(slot) { 0.0 } else { f64::INFINITY }
+        if self.round == 0 || self.is_unsolved(slot) { 0.0 } else { f64::INFINITY }
     }
 
     /// Takes up a cell: makes its scheme, relaxes it, writes it back.
@@ -363,7 +363,7 @@ impl Relax for Solver<'_> {
         self.visited += 1;
     }
 
-    fn told(&mut self, slot: Slot, border: &[f64; 6]) {
+    fn receive(&mut self, slot: Slot, border: &[f64; 6]) {
         for (face, &beside) in FACES.iter().zip(&self.cells.beside[slot as usize]) {
             if beside != Slot::MAX {
                 self.unknown[beside as usize][face.opposite().index()] += border[face.index()];

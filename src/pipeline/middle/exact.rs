@@ -11,14 +11,14 @@ use crate::exec::{Hold, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId};
 use crate::kernel::distance::features::exact_labels::ExactLabels;
 use crate::kernel::distance::state::precision::Precision;
-use crate::pipeline::distance::{Solved, Together};
+use crate::pipeline::distance::{DistanceWithSource, Solved};
 use crate::store::BoxSource;
 
 /// A solved distance, with other sources where the tracked ones have the wrong label.
 struct Corrected<'a, P> {
     values: Arc<dyn BoxSource<P> + Send + 'a>,
     sources: Arc<dyn BoxSource<u32> + Send + 'a>,
-    together: Option<Arc<dyn Together<P> + Send + 'a>>,
+    with_source: Option<Arc<dyn DistanceWithSource<P> + Send + 'a>>,
     grid: BrickGrid,
     /// By brick.
     changes: BTreeMap<BrickId, Vec<Change>>,
@@ -78,10 +78,10 @@ impl<P: Precision> BoxSource<u32> for Corrected<'_, P> {
     }
 }
 
-impl<P: Precision> Together<P> for Corrected<'_, P> {
-    fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
-        if let Some(together) = &self.together {
-            together.read_together(part, values, sources)?;
+impl<P: Precision> DistanceWithSource<P> for Corrected<'_, P> {
+    fn read_both(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
+        if let Some(with_source) = &self.with_source {
+            with_source.read_both(part, values, sources)?;
         } else {
             self.values.read_box(part, values)?;
             self.sources.read_box(part, sources)?;
@@ -117,7 +117,7 @@ pub(super) fn with_exact_labels<'a, P: Precision>(
     let bytes = changes.iter().map(|changes| (changes.capacity() * size_of::<Change>()) as u64).sum();
     let held = stage.hold(bytes)?;
     let changes: BTreeMap<_, _> = bricks.into_iter().zip(changes).filter(|(_, changes)| !changes.is_empty()).collect();
-    let Solved { values, sources, together, .. } = solved;
-    let corrected = Arc::new(Corrected { values, sources, together, grid: *grid, changes, _held: held });
-    Ok(Solved { values: corrected.clone(), sources: corrected.clone(), together: Some(corrected), ..solved })
+    let Solved { values, sources, with_source, .. } = solved;
+    let corrected = Arc::new(Corrected { values, sources, with_source, grid: *grid, changes, _held: held });
+    Ok(Solved { values: corrected.clone(), sources: corrected.clone(), with_source: Some(corrected), ..solved })
 }

@@ -7,7 +7,7 @@ use crate::grid::digits::{bytes, grouped};
 use crate::grid::{BrickGrid, Geometry};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
 use crate::pipeline::enclosure::needs::{COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL_BYTES, THREAD_BYTES};
-use crate::pipeline::enclosure::region::Vicinity;
+use crate::pipeline::enclosure::region::RegionOfInterest;
 use crate::pipeline::enclosure::search::first_reach_for;
 use crate::pipeline::laying::check_counts;
 
@@ -70,13 +70,13 @@ pub(super) const BUFFERS: Footprint = Footprint::of_thread(THREAD_BYTES);
 pub(super) const WRITING: Footprint = Footprint::of_thread(COARSE_VOXELS * size_of::<f32>() as u64);
 
 /// The box that the search begins with.
-pub(super) fn begin(grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructSettings) -> Vicinity {
-    Vicinity::new(grid, cloud, first_reach_for(grid, settings.beta))
+pub(super) fn begin(grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructSettings) -> RegionOfInterest {
+    RegionOfInterest::new(grid, cloud, first_reach_for(grid, settings.beta))
 }
 
 /// What that box holds; it may grow.
-pub(super) fn boxes(vicinity: &Vicinity, cloud: &[[f64; 3]]) -> Footprint {
-    Footprint::of_boxes(vicinity.held(cloud))
+pub(super) fn boxes(region: &RegionOfInterest, cloud: &[[f64; 3]]) -> Footprint {
+    Footprint::of_boxes(region.held(cloud))
 }
 
 /// Estimates a reconstruction on a grid with so many threads; `writes` says whether there is an output.
@@ -88,11 +88,11 @@ pub fn estimate(
     threads: u64,
     writes: bool,
 ) -> Estimate {
-    let vicinity = begin(grid, cloud, settings);
-    let near_voxels = (vicinity.cells.len() * CELL_LEN) as u64;
+    let region = begin(grid, cloud, settings);
+    let near_voxels = (region.cells.len() * CELL_LEN) as u64;
     let working = if writes { BUFFERS.or(WRITING, threads) } else { BUFFERS };
     Estimate {
-        held: boxes(&vicinity, cloud).and(working).bytes(threads),
+        held: boxes(&region, cloud).and(working).bytes(threads),
         scratch: SIDES_BYTES * near_voxels,
         least_scratch: DISTANCE_BYTES * near_voxels,
         near_voxels,

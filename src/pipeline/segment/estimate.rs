@@ -14,7 +14,7 @@ use crate::kernel::level_set::cell::{CELL, CELL_LEN};
 use crate::pipeline::enclosure::needs::{
     COARSE_VOXELS, DISTANCE_BYTES, KEPT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES, THREAD_BYTES, box_bytes,
 };
-use crate::pipeline::enclosure::region::Vicinity;
+use crate::pipeline::enclosure::region::RegionOfInterest;
 use crate::pipeline::image::smoothing::thread_bytes;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::marks::{ObjectMarks, cloud_of, contour_gap};
@@ -103,9 +103,9 @@ impl Counts {
                 continue;
             }
             let cloud = cloud_of(marks, guides.geometry, settings.caps);
-            let vicinity = Vicinity::new(guides.geometry, &cloud, first_reach(marks, guides.geometry, settings));
-            let first = vicinity.cells.len() as u64;
-            counts.add(vicinity.cells.grid().len(), [first, likely_band(&vicinity, marks).min(first)]);
+            let region = RegionOfInterest::new(guides.geometry, &cloud, first_reach(marks, guides.geometry, settings));
+            let first = region.cells.len() as u64;
+            counts.add(region.cells.grid().len(), [first, likely_band(&region, marks).min(first)]);
             counts.points = counts.points.max(cloud.len() as u64);
             let most = marks.contours.len() as u64 * OUTLINE_BYTES + OUTLINED_BYTES;
             counts.outlines[0] += most;
@@ -127,9 +127,9 @@ impl Counts {
 /// any direction where it passes within half of the cell's mean width, which is 3/2 of its edge (Cauchy), and a band that
 /// reaches `r` to either side meets cells that lie so much farther away. Where outlines are farther apart than a cell is
 /// wide, cells between them hold no point.
-fn likely_band(vicinity: &Vicinity, marks: &ObjectMarks) -> u64 {
-    let (geometry, grid) = (&vicinity.geometry, vicinity.bins.grid());
-    let held = (0..grid.len()).filter(|&id| !vicinity.bins.of(id).is_empty()).count() as f64;
+fn likely_band(region: &RegionOfInterest, marks: &ObjectMarks) -> u64 {
+    let (geometry, grid) = (&region.geometry, region.bins.grid());
+    let held = (0..grid.len()).filter(|&id| !region.bins.of(id).is_empty()).count() as f64;
     let mean_spacing = libm::cbrt(geometry.voxel_volume());
     let edge = CELL as f64 * mean_spacing;
     let thickness = 1.0 + 2.0 * BAND[0] * geometry.min_spacing() / (1.5 * edge);

@@ -23,9 +23,9 @@ mod seed;
 mod settings;
 mod tissue;
 
+pub use checks::all_marks::{CheckedMarks, check_all_marks};
 pub use checks::doubts::{doubts, open_outlines, spans_slices};
 pub use checks::lengths::{Grids, check_lengths, check_marks, check_seed, check_smoothing};
-pub use checks::look::{Looked, look_at_marks};
 pub use checks::same_object::{Extent, shared};
 pub use estimate::{Estimate, estimate};
 pub use kept::{Kept, KeptObject};

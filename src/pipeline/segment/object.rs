@@ -79,7 +79,7 @@ fn leak(marks: &ObjectMarks, settings: &SegmentSettings, deepest: &Deepest, worl
     let larger = deepest.beta().map_or(String::new(), |beta| format!(", or give --beta {beta}"));
     Error::input(format!(
         "with --beta {beta} the start of object {object} leaks through {}; leave --beta out{larger}",
-        world.told(&deepest.hole)
+        world.describe(&deepest.hole)
     ))
 }
 
@@ -88,7 +88,7 @@ fn encloses_nothing<T: Element>(marks: &ObjectMarks, picture: &Picture<'_, T>, d
     // A hole, and what closes it, are worth telling where the flood found any space at all.
     let told = deepest.and_then(|deepest| Some((deepest, deepest.beta()?)));
     let hole = told.map_or(String::new(), |(deepest, beta)| {
-        format!(", or give --beta {beta}: the deepest space has {}", picture.world.told(&deepest.hole))
+        format!(", or give --beta {beta}: the deepest space has {}", picture.world.describe(&deepest.hole))
     });
     if !marks.drawn {
         return Error::input(format!(

@@ -30,7 +30,7 @@ pub(crate) struct World<'a> {
 
 impl World<'_> {
     /// A hole in an object's marks: how wide it is, and where; with the slice, where it is none beyond the image.
-    pub(super) fn told(&self, hole: &Hole) -> String {
+    pub(super) fn describe(&self, hole: &Hole) -> String {
         let whole = self.whole;
         let place: [f64; 3] = std::array::from_fn(|a| hole.place[a] + self.origin[a]);
         let slice = whole.to_voxels(place)[2].round();

@@ -9,15 +9,15 @@ use crate::pipeline::segment::{ImageModel, LARGEST_WHOLE, ObjectReport, Outcome,
 
 impl Job {
     /// Says what deserves a second look.
-    pub(crate) fn tell(&self, outcome: &Outcome) {
-        self.tell_rounded(outcome.extremes);
+    pub(crate) fn note_findings(&self, outcome: &Outcome) {
+        self.note_rounded(outcome.extremes);
         for object in outcome.objects.iter().filter(|object| object.marks_off > 0) {
             let verb = if object.marks_off == 1 { "mark lies" } else { "marks lie" };
             let (label, off) = (object.label, object.marks_off);
             self.console.note(&format!("object {label}: {off} {verb} more than a voxel from the surface"));
         }
         for object in &outcome.objects {
-            self.tell_odd(object, outcome.label_voxels.get(&object.label).copied().unwrap_or(0));
+            self.note_odd(object, outcome.label_voxels.get(&object.label).copied().unwrap_or(0));
             if self.settings.cross_validate && object.cross_validation.is_none() {
                 let label = object.label;
                 self.console.note(&format!("object {label}: --cross-validate needs three outlines in parallel planes"));
@@ -35,7 +35,7 @@ impl Job {
     }
 
     /// Says that grey values are not those of the file: 64-bit integers are read as doubles, which do not hold all of them.
-    fn tell_rounded(&self, extremes: [f64; 2]) {
+    fn note_rounded(&self, extremes: [f64; 2]) {
         let file_type = &self.stack.info().file_type;
         if ["int64", "uint64"].contains(&file_type.as_str()) && extremes.iter().any(|v| v.abs() >= LARGEST_WHOLE) {
             self.console.note(&format!(
@@ -49,7 +49,7 @@ impl Job {
     }
 
     /// What a good result would not show.
-    fn tell_odd(&self, object: &ObjectReport, voxels: u64) {
+    fn note_odd(&self, object: &ObjectReport, voxels: u64) {
         let (label, pieces) = (object.label, object.measures.components);
         if voxels == 0 {
             self.console.note(&format!("object {label}: all of its voxels went to others that lie where it does"));

@@ -97,7 +97,7 @@ impl Input {
     }
 
     /// Tells what stands after `what`, the last that is read; blanks do not count.
-    pub(crate) fn tell_rest(&mut self, what: &str) -> Result<()> {
+    pub(crate) fn note_rest(&mut self, what: &str) -> Result<()> {
         let (mut bytes, mut is_blank) = (0, true);
         while bytes < FAR {
             let piece = self.reader.fill_buf().map_err(|e| unreadable(&e))?;

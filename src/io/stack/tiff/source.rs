@@ -47,7 +47,7 @@ pub(crate) fn open_file(path: &Path, select: Select) -> Result<Opened> {
         let tags = Tags::read(&file, places[0].1, places[0].0)?;
         Source::Contiguous { stack: Contiguous::new(&tags, first, total)?, file, sample, order }
     } else {
-        look_at_count(&file, &mut description, total, available, images.len())?;
+        check_count(&file, &mut description, total, available, images.len())?;
         let planes: Vec<u64> = (0..dimensions.size(Axis::Z)).map(|z| order.plane(z)).collect();
         let pages = description.pages(&file, &planes, total, available)?;
         let places: Vec<PagePlace> = pages.iter().map(|&page| places[page as usize]).collect();
@@ -109,7 +109,7 @@ fn named(
 }
 
 /// Compares the planes that the description promises with the pages that are there.
-fn look_at_count(
+fn check_count(
     file: &TiffFile,
     description: &mut Description,
     total: u64,

@@ -47,24 +47,24 @@ impl ExactLabels<'_> {
         found
     }
 
-    /// Tells for all voxels of a box whose they are: calls `tell` with boxes of voxels and sources of one label, which
+    /// Tells for all voxels of a box whose they are: calls `report` with boxes of voxels and sources of one label, which
     /// those nearest to the voxels are among. The candidates from `first` on hold all that can be nearest.
-    fn settle(&self, part: &Box3, work: &mut Work, first: usize, tell: &mut impl FnMut(&Box3, &[Candidate])) {
+    fn settle(&self, part: &Box3, work: &mut Work, first: usize, report: &mut impl FnMut(&Box3, &[Candidate])) {
         let left = work.candidates.len();
         if part.is_empty() || first == left {
             return;
         }
         if part.len() == 1 {
             let nearest = self.nearest(part.lo, &work.candidates[first..]);
-            return nearest.into_iter().for_each(|nearest| tell(part, &[nearest]));
+            return nearest.into_iter().for_each(|nearest| report(part, &[nearest]));
         }
         work.culling.keep(self.shapes, &Around::centres(self.geometry, part), &mut work.candidates, first);
         let kept = &work.candidates[left..];
         if kept.iter().all(|(_, label)| *label == kept[0].1) {
-            tell(part, kept);
+            report(part, kept);
         } else {
             for half in halves(part) {
-                self.settle(&half, work, left, tell);
+                self.settle(&half, work, left, report);
             }
         }
         work.candidates.truncate(left);

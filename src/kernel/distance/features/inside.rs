@@ -35,7 +35,7 @@ impl<'a> Inside<'a> {
 
     /// For each voxel of a box whether it lies inside, into `inside`. `fixed` is not 0 where a triangle or a point fixed the
     /// voxel. Both are dense `[z][y][x]` over the box.
-    pub fn tell(&self, part: &Box3, fixed: &[u8], flood: &mut Flood, inside: &mut Vec<bool>) {
+    pub fn classify(&self, part: &Box3, fixed: &[u8], flood: &mut Flood, inside: &mut Vec<bool>) {
         inside.clear();
         inside.resize(part.len(), false);
         flood.is_known.clear();

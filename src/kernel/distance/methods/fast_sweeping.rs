@@ -232,7 +232,7 @@ impl<P: Precision, A: Real> FastSweeping<P, A> {
 
     /// As [`OrderedSweeps::sweep`]; `fell` becomes the voxels that fell, those whose sources others take before these,
     /// as in the triple loop.
-    pub fn sweep_telling(
+    pub fn sweep_recording(
         &self,
         tile: &mut HaloTile<P>,
         work: &mut Work<P::Lane>,

@@ -41,9 +41,9 @@ impl<'a> ShapeDistance<'a> {
         strides: [usize; 3],
         here: [f64; 3],
     ) -> SourceState {
-        let due = std::mem::take(&mut asked.due[at]);
+        let dirty = std::mem::take(&mut asked.dirty[at]);
         let (mut best, mut now) = (state[at].source(), [NO_SOURCE; 6]);
-        for side in (0..6).filter(|side| due >> side & 1 == 1) {
+        for side in (0..6).filter(|side| dirty >> side & 1 == 1) {
             let source = state[beside(at, side, strides)].source();
             if source == NO_SOURCE || source == best || now.contains(&source) {
                 continue;
@@ -72,13 +72,13 @@ impl<'a> ShapeDistance<'a> {
                 for x in ordered(0) {
                     let (at, state) = (row + x, tile.data_mut());
                     let kept = state[at];
-                    if kept.is_frozen() || asked.due[at] == 0 {
+                    if kept.is_frozen() || asked.dirty[at] == 0 {
                         continue;
                     }
                     let voxel = [part.lo[0] + x as i64, part.lo[1] + y as i64, part.lo[2] + z as i64];
                     state[at] = self.nearest(state, asked, at, strides, self.geometry.position(voxel));
                     if state[at] != kept {
-                        (0..6).for_each(|side| asked.due[beside(at, side, strides)] |= 1 << (side ^ 1));
+                        (0..6).for_each(|side| asked.dirty[beside(at, side, strides)] |= 1 << (side ^ 1));
                         let first = [x, y, z].map(|n| n == 0);
                         let last: [bool; 3] = std::array::from_fn(|a| [x, y, z][a] + 1 == valid[a]);
                         let inside = std::array::from_fn(|a| if upward[a] { !first[a] } else { !last[a] });
@@ -124,18 +124,18 @@ pub struct Asked {
     squared: Vec<f64>,
     /// The sides, a bit each, whose sources changed since a voxel asked them. Its own only comes nearer: whoever was
     /// not nearer before need not be asked again.
-    due: Vec<u8>,
+    dirty: Vec<u8>,
 }
 
 impl Asked {
     fn new(edge: usize) -> Self {
         let len = (edge + 2).pow(3);
-        Self { squared: vec![f64::NAN; len], due: vec![ALL_SIDES; len] }
+        Self { squared: vec![f64::NAN; len], dirty: vec![ALL_SIDES; len] }
     }
 
     fn forget(&mut self) {
         self.squared.fill(f64::NAN);
-        self.due.fill(ALL_SIDES);
+        self.dirty.fill(ALL_SIDES);
     }
 
     /// The squared distance of the voxel at `place` to its source, found by `ask` if need be.

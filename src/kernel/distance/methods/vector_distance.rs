@@ -14,7 +14,7 @@ use crate::kernel::distance::state::precision::Real;
 use crate::kernel::distance::state::source::squared_distance;
 use crate::kernel::distance::tile_order::diagonals::{Diagonals, MOST_LANES, Run, has_wide_vectors};
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
-use crate::kernel::distance::tile_order::dirty::Due;
+use crate::kernel::distance::tile_order::dirty::Dirty;
 use crate::tile::{HaloTile, TileCost};
 
 /// VDT to points, compared in `A`.
@@ -44,7 +44,7 @@ impl<'a, A: Real> VectorDistance<'a, A> {
 #[derive(Debug)]
 pub struct Work<A> {
     layout: Diagonals,
-    due: Due,
+    dirty: Dirty,
     source: Vec<SourceState>,
     point: [Vec<A>; 3],
     /// Coordinates of voxels along x (from the upper end on), y and z, by index from the lower ghost.
@@ -68,7 +68,7 @@ pub(crate) fn squared<A: Real>(here: [A; 3], point: [A; 3]) -> A {
 impl<A: Real> Nearest<A> {
     /// Looks at a source beside the voxel; without branches, so that lanes stay together.
     #[inline(always)]
-    fn look(self, here: [A; 3], free: bool, source: SourceState, point: [A; 3]) -> Self {
+    fn offered(self, here: [A; 3], free: bool, source: SourceState, point: [A; 3]) -> Self {
         let squared = squared(here, point);
         let nearer = (squared < self.squared) & free;
         let pick = |a: A, b: A| if nearer { a } else { b };
@@ -132,8 +132,8 @@ fn nearest<A: Real, const N: usize, const TURNED: bool>(
         let start = Nearest { squared: squared(here, point), source: source[i], point };
         let [(s0, p0), (s1, p1), (s2, p2)] = [at(0), at(1), at(yl)];
         let [(s3, p3), (s4, p4), (s5, p5)] = [at(yu), at(4), at(5)];
-        let found = start.look(here, free, s0, p0).look(here, free, s1, p1).look(here, free, s2, p2);
-        let found = found.look(here, free, s3, p3).look(here, free, s4, p4).look(here, free, s5, p5);
+        let found = start.offered(here, free, s0, p0).offered(here, free, s1, p1).offered(here, free, s2, p2);
+        let found = found.offered(here, free, s3, p3).offered(here, free, s4, p4).offered(here, free, s5, p5);
         kept[i] = found.source;
         falls[i] = u32::from(found.squared < start.squared);
         (points[0][i], points[1][i], points[2][i]) = (found.point[0], found.point[1], found.point[2]);
@@ -161,7 +161,7 @@ fn nearest<A: Real, const N: usize, const TURNED: bool>(
 /// One ordered pass, `N` voxels at a time.
 #[inline(always)]
 fn pass<A: Real, const N: usize, const TURNED: bool>(work: &mut Work<A>, upward: [bool; 2]) -> Swept {
-    let Work { layout, due, source, point: [px, py, pz], at: [at_x, at_y, at_z] } = work;
+    let Work { layout, dirty, source, point: [px, py, pz], at: [at_x, at_y, at_z] } = work;
     let (depth, last_x) = (layout.valid[2], layout.edge() + 1);
     let passed = Diagonals::passed(upward);
     // Coordinates along x are kept from the upper end on.
@@ -172,7 +172,7 @@ fn pass<A: Real, const N: usize, const TURNED: bool>(work: &mut Work<A>, upward:
         let z_places = [at_z[z], at_z[before(z, upward[1])]];
         for (start, count) in layout.diagonals(upward[0]) {
             let (s, y) = (start / layout.row, start % layout.row);
-            if !due.take(z, s) {
+            if !dirty.take(z, s) {
                 continue;
             }
             let count = count.next_multiple_of(N);
@@ -191,7 +191,7 @@ fn pass<A: Real, const N: usize, const TURNED: bool>(work: &mut Work<A>, upward:
                 let points = [Lanes::new(&mut run_x, at), Lanes::new(&mut run_y, at), Lanes::new(&mut run_z, at)];
                 fell |= nearest::<A, N, TURNED>(Lanes::new(&mut sources, at), points, &places, passed);
             }
-            due.tell(z, s, fell, upward);
+            dirty.mark(z, s, fell, upward);
             swept |= fell;
         }
     }
@@ -222,7 +222,7 @@ impl<A: Real> Work<A> {
         let len = Diagonals::len(edge);
         Self {
             layout: Diagonals::new(edge),
-            due: Due::new(edge),
+            dirty: Dirty::new(edge),
             source: vec![SourceState::FAR.freeze(); len],
             point: std::array::from_fn(|_| vec![A::INFINITY; len]),
             at: std::array::from_fn(|_| vec![A::default(); edge + 3 + MOST_LANES]),
@@ -284,7 +284,7 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
     fn cost(edge: usize) -> TileCost {
         // Sources and their three coordinates along diagonals; a flag for each of these.
         let laid_out = Diagonals::len(edge) * (size_of::<SourceState>() + 3 * size_of::<A>());
-        TileCost { halo: 1, scratch: (laid_out + Due::len(edge)) as u64 }
+        TileCost { halo: 1, scratch: (laid_out + Dirty::len(edge)) as u64 }
     }
 
     fn settle(&self, tile: &mut HaloTile<SourceState>, work: &mut Work<A>, part: &Box3) -> bool {
@@ -293,12 +293,12 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
             squared(here, self.point(state.source())).f64()
         });
         self.lay_out(work, tile, part, first);
-        work.due.all(tile.valid());
+        work.dirty.all(tile.valid());
         let changed = sweep_until_quiet(first, |upward| {
             if (upward[0] != upward[1]) != work.layout.turned {
                 work.layout.store(&work.source, tile, |s| s);
                 self.lay_out(work, tile, part, upward);
-                work.due.turn();
+                work.dirty.turn();
             }
             work.sweep(upward)
         });
@@ -312,7 +312,7 @@ impl<A: Real> DistanceMethod for VectorDistance<'_, A> {
 impl<A: Real> OrderedSweeps for VectorDistance<'_, A> {
     fn sweep(&self, tile: &mut HaloTile<SourceState>, work: &mut Work<A>, part: &Box3, upward: [bool; 3]) -> bool {
         self.lay_out(work, tile, part, upward);
-        work.due.all(tile.valid());
+        work.dirty.all(tile.valid());
         let changed = work.sweep(upward) & CHANGED != 0;
         if changed {
             work.layout.store(&work.source, tile, |s| s);

@@ -19,8 +19,8 @@
 use super::descent::BesideSources;
 use super::distinct::Distinct;
 use super::label_borders::LabelBorders;
-use super::look::Labels;
-use super::look::Look;
+use super::repair_box::Labels;
+use super::repair_box::RepairBox;
 use crate::grid::{Box3, Geometry, NO_SOURCE};
 use crate::kernel::distance::methods::tracked::TrackedSource;
 use crate::kernel::distance::state::precision::Real;
@@ -40,7 +40,7 @@ const RIDGE: f64 = 0.02;
 
 /// What a look ends with, dense `[z][y][x]` over its part.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
+pub struct Repair {
     /// The nearer sources.
     pub sources: Vec<u32>,
     /// The squared distances to them; infinite where none is known. Zeros where nothing needed them.
@@ -58,24 +58,24 @@ pub struct Seen {
     beside: BesideSources,
 }
 
-impl Seen {
+impl Repair {
     /// Looks again at all voxels of a part.
-    pub fn look<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
-        let labels = look.labels.filter(|labels| !labels.sets.share_label(look.found));
-        self.measure(sources, look, look.lost_within.is_some() || labels.is_some());
-        if look.lost_within.is_some() {
-            self.find_lost(sources, look);
+    pub fn run<S: TrackedSource>(&mut self, sources: &S, repair_box: &RepairBox<'_>) {
+        let labels = repair_box.labels.filter(|labels| !labels.sets.share_label(repair_box.found));
+        self.measure(sources, repair_box, repair_box.lost_within.is_some() || labels.is_some());
+        if repair_box.lost_within.is_some() {
+            self.find_lost(sources, repair_box);
         }
         if let Some(labels) = labels {
-            self.settle_labels(sources, look, labels);
+            self.settle_labels(sources, repair_box, labels);
         }
     }
 
-    fn find_lost<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>) {
-        let Look { geometry, part, .. } = *look;
-        self.distinct.mark(look.known, look.found);
+    fn find_lost<S: TrackedSource>(&mut self, sources: &S, repair_box: &RepairBox<'_>) {
+        let RepairBox { geometry, part, .. } = *repair_box;
+        self.distinct.mark(repair_box.known, repair_box.found);
         let [width, height, _] = part.shape().map(|n| n as usize);
-        let counts_below = look.counts_below();
+        let counts_below = repair_box.counts_below();
         for (plane, z) in (part.lo[2]..part.hi[2]).enumerate() {
             self.bends(geometry, part, z);
             let bent = std::mem::take(&mut self.bent);
@@ -84,7 +84,7 @@ impl Seen {
                 if self.squared[at] < counts_below {
                     let voxel = [part.lo[0] + (n % width) as i64, part.lo[1] + (n / width) as i64, z];
                     let kept = (self.sources[at], self.squared[at]);
-                    (self.sources[at], self.squared[at]) = self.nearest(sources, look, voxel, kept);
+                    (self.sources[at], self.squared[at]) = self.nearest(sources, repair_box, voxel, kept);
                 }
             }
             self.bent = bent;
@@ -92,13 +92,13 @@ impl Seen {
     }
 
     /// Looks closer where another label's source is hardly farther than a voxel's own.
-    fn settle_labels<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>, labels: Labels<'_>) {
+    fn settle_labels<S: TrackedSource>(&mut self, sources: &S, repair_box: &RepairBox<'_>, labels: Labels<'_>) {
         let Self { sources: kept, squared, borders, beside, .. } = self;
         let Labels { sets, trees } = labels;
-        let close = if trees.is_some() { CLOSE * look.geometry.min_spacing() } else { 0.0 };
-        let counts_below = look.counts_below();
-        borders.each(look, sets, |voxel, others| {
-            let at = look.part.offset_of(voxel);
+        let close = if trees.is_some() { CLOSE * repair_box.geometry.min_spacing() } else { 0.0 };
+        let counts_below = repair_box.counts_below();
+        borders.each(repair_box, sets, |voxel, others| {
+            let at = repair_box.part.offset_of(voxel);
             if squared[at] >= counts_below {
                 return;
             }
@@ -125,14 +125,14 @@ impl Seen {
     fn nearest<S: TrackedSource>(
         &mut self,
         sources: &S,
-        look: &Look<'_>,
+        repair_box: &RepairBox<'_>,
         voxel: [i64; 3],
         kept: (u32, f64),
     ) -> (u32, f64) {
         let mut best = kept;
-        let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(look.known);
-        let label = |source| look.labels.map_or(0, |labels| labels.sets.label(source));
-        self.distinct.list(look.known, look.found, &around, &mut self.around);
+        let around = Box3::new(voxel, voxel.map(|v| v + 1)).grow(MARGIN).intersect(repair_box.known);
+        let label = |source| repair_box.labels.map_or(0, |labels| labels.sets.label(source));
+        self.distinct.list(repair_box.known, repair_box.found, &around, &mut self.around);
         for &source in &self.around {
             let squared = sources.squared_of_voxel(source, voxel);
             let is_tied = squared == best.1 && source != best.0;
@@ -144,8 +144,8 @@ impl Seen {
     }
 
     /// Fills in the sources as they are, and how far they are, where that is `needed`.
-    fn measure<S: TrackedSource>(&mut self, sources: &S, look: &Look<'_>, needed: bool) {
-        let Look { part, known, found, .. } = *look;
+    fn measure<S: TrackedSource>(&mut self, sources: &S, repair_box: &RepairBox<'_>, needed: bool) {
+        let RepairBox { part, known, found, .. } = *repair_box;
         let grown = part.grow(1);
         self.sources.resize(part.len(), NO_SOURCE);
         self.squared.resize(part.len(), f64::INFINITY);
@@ -273,10 +273,16 @@ mod tests {
         part.rows().flat_map(move |(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]))
     }
 
-    fn looked(method: &VectorDistance<'_, f32>, geometry: &Geometry, known: &Box3, found: &[u32], part: &Box3) -> Seen {
-        let mut seen = Seen::default();
-        seen.look(method, &Look { geometry, part, known, found, lost_within: Some(f64::INFINITY), labels: None });
-        seen
+    fn repaired(
+        method: &VectorDistance<'_, f32>,
+        geometry: &Geometry,
+        known: &Box3,
+        found: &[u32],
+        part: &Box3,
+    ) -> Repair {
+        let mut repair = Repair::default();
+        repair.run(method, &RepairBox { geometry, part, known, found, lost_within: Some(f64::INFINITY), labels: None });
+        repair
     }
 
     /// The nearest points of a voxel, the very nearest first.
@@ -292,9 +298,9 @@ mod tests {
     fn a_lost_source_is_found_two_steps_away() {
         let (grid, cloud) = (geometry(), cloud());
         let (method, all) = (VectorDistance::<f32>::new(&grid, &cloud), grid.domain());
-        let look = |found: &[u32]| looked(&method, &grid, &all, found, &all);
+        let repair_box = |found: &[u32]| repaired(&method, &grid, &all, found, &all);
         let exact: Vec<u32> = voxels(all).map(|v| ranked(&cloud, v)[0].1).collect();
-        assert_eq!(look(&exact).sources, exact, "an exact field stays as it is");
+        assert_eq!(repair_box(&exact).sources, exact, "an exact field stays as it is");
         let mut lost = 0;
         for v in voxels(all.grow(-2)) {
             let nearest = ranked(&cloud, v);
@@ -306,7 +312,7 @@ mod tests {
             }
             let mut found = exact.clone();
             found[all.offset_of(v)] = nearest[1].1;
-            assert_eq!(look(&found).sources, exact, "{v:?}");
+            assert_eq!(repair_box(&found).sources, exact, "{v:?}");
             lost += 1;
         }
         assert!(lost > 0, "the cloud has no thin tips");
@@ -320,17 +326,17 @@ mod tests {
         let rank = |n: i64| usize::from(n % 7 == 0);
         let known = |n: i64, s: u32| if n % 31 == 0 { NO_SOURCE } else { s };
         let found: Vec<u32> = voxels(all).zip(0..).map(|(v, n)| known(n, ranked(&cloud, v)[rank(n)].1)).collect();
-        let whole = looked(&method, &grid, &all, &found, &all).sources;
+        let whole = repaired(&method, &grid, &all, &found, &all).sources;
         assert!(whole.iter().zip(&found).any(|(a, b)| a != b));
         for part in
             [Box3::new([0, 3, 5], [7, 4, 14]), Box3::new([6, 6, 6], [7, 7, 7]), Box3::new([9, 0, 2], [14, 14, 9])]
         {
             let known = part.grow(MARGIN).intersect(&all);
             let around: Vec<u32> = voxels(known).map(|v| found[all.offset_of(v)]).collect();
-            let seen = looked(&method, &grid, &known, &around, &part);
+            let repair = repaired(&method, &grid, &known, &around, &part);
             let expected: Vec<u32> = voxels(part).map(|v| whole[all.offset_of(v)]).collect();
-            assert_eq!(seen.sources, expected, "{part:?}");
-            for ((v, &source), &squared) in voxels(part).zip(&seen.sources).zip(&seen.squared) {
+            assert_eq!(repair.sources, expected, "{part:?}");
+            for ((v, &source), &squared) in voxels(part).zip(&repair.sources).zip(&repair.squared) {
                 assert_eq!(squared.sqrt(), method.squared_of_voxel(source, v).sqrt(), "{v:?}");
             }
         }

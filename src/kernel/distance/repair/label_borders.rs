@@ -4,7 +4,7 @@
 //! sources are equally near: which of them a method found first hangs on the order in which it visits voxels. Either way
 //! a neighbour's source is hardly farther than the voxel's own.
 
-use super::look::Look;
+use super::repair_box::RepairBox;
 use crate::grid::{Box3, DataSets, FACES, Face, NO_SOURCE};
 use crate::kernel::distance::features::source_labels;
 
@@ -18,9 +18,14 @@ pub(crate) struct LabelBorders {
 }
 
 impl LabelBorders {
-    /// Calls `tell` with each voxel of the part that has face neighbours of other labels, and with their sources.
-    pub(crate) fn each(&mut self, look: &Look<'_>, sets: &DataSets, mut tell: impl FnMut([i64; 3], &[u32])) {
-        let Look { part, known, found, .. } = *look;
+    /// Calls `report` with each voxel of the part that has face neighbours of other labels, and with their sources.
+    pub(crate) fn each(
+        &mut self,
+        repair_box: &RepairBox<'_>,
+        sets: &DataSets,
+        mut report: impl FnMut([i64; 3], &[u32]),
+    ) {
+        let RepairBox { part, known, found, .. } = *repair_box;
         source_labels::of_sources(sets, found, &mut self.labels);
         for (y, z) in part.rows() {
             self.flag(part, known, y, z);
@@ -34,7 +39,7 @@ impl LabelBorders {
                         count += 1;
                     }
                 }
-                tell([x, y, z], &others[..count]);
+                report([x, y, z], &others[..count]);
             }
         }
     }
@@ -98,7 +103,7 @@ mod tests {
                 }
             }
             let (mut borders, mut told) = (LabelBorders::default(), Vec::new());
-            let look = Look {
+            let repair_box = RepairBox {
                 geometry: &geometry,
                 part: &part,
                 known: &known,
@@ -106,7 +111,7 @@ mod tests {
                 lost_within: None,
                 labels: None,
             };
-            borders.each(&look, &sets, |voxel, others| told.push((voxel, others.to_vec())));
+            borders.each(&repair_box, &sets, |voxel, others| told.push((voxel, others.to_vec())));
             assert_eq!(told, wanted);
             assert!(!told.is_empty());
         }

@@ -4,4 +4,4 @@ pub mod bends;
 pub(crate) mod descent;
 pub(crate) mod distinct;
 pub(crate) mod label_borders;
-pub(crate) mod look;
+pub(crate) mod repair_box;

@@ -142,8 +142,8 @@ impl<'a> OutsideSources<'a> {
                 // All of them are farther than the grid's face.
                 (held.squared[at] >= depth * depth).then_some((held.squared[at], held.source[at]))
             });
-            block.look(&self.outside.points, farthest, label);
-            block.look(&self.outside.triangles, farthest, label);
+            block.search(&self.outside.points, farthest, label);
+            block.search(&self.outside.triangles, farthest, label);
             block.each_nearer(|voxel, nearer| {
                 let at = place(voxel);
                 (held.squared[at], held.source[at]) = nearer;

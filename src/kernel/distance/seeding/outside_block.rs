@@ -157,7 +157,7 @@ impl Block {
     }
 
     /// Looks a tree's sources up, none farther than `farthest`. Each source has a label.
-    pub(crate) fn look<T: Source>(&mut self, tree: &RTree<T>, farthest: f64, label: impl Fn(u32) -> u32) {
+    pub(crate) fn search<T: Source>(&mut self, tree: &RTree<T>, farthest: f64, label: impl Fn(u32) -> u32) {
         if self.within.iter().all(|within| *within < 0.0) {
             return;
         }

@@ -8,14 +8,14 @@ use crate::grid::{Box3, Face};
 use crate::kernel::distance::state::method::DistanceState;
 use crate::tile::HaloTile;
 
-/// The smallest value that enters the brick across `face`, among voxels that changed since it was `told` of them.
+/// The smallest value that enters the brick across `face`, among voxels that changed since it read its `ghosts`.
 #[must_use]
-pub fn leaving<M: DistanceState>(
+pub fn outgoing<M: DistanceState>(
     method: &M,
     tile: &HaloTile<M::State>,
     part: &Box3,
     face: Face,
-    told: Option<&[M::State]>,
+    ghosts: Option<&[M::State]>,
 ) -> Option<f64> {
     let valid = tile.valid();
     let [u, v] = [[1, 2], [0, 2], [0, 1]][face.axis];
@@ -29,17 +29,17 @@ pub fn leaving<M: DistanceState>(
         ghost[face.axis] += if face.upper { 1 } else { -1 };
         let line = |[x, y, z]: [isize; 3]| tile.data()[tile.at(x, y, z)..].iter().step_by(stride).take(valid[u]);
         let mut voxel: [i64; 3] = std::array::from_fn(|a| part.lo[a] + ghost[a] as i64);
-        let mut enter = |here: M::State, beside: M::State, told: M::State| {
-            if here != told {
+        let mut enter = |here: M::State, beside: M::State, ghosts: M::State| {
+            if here != ghosts {
                 least = method.entering(here, beside, voxel).map_or(least, |value| least.min(value));
             }
             voxel[u] += 1;
         };
         let pairs = line(inside).zip(line(ghost));
-        match told {
-            Some(told) => {
-                let told = &told[j * tile.edge()..][..valid[u]];
-                pairs.zip(told).for_each(|((&here, &beside), &told)| enter(here, beside, told));
+        match ghosts {
+            Some(ghosts) => {
+                let ghosts = &ghosts[j * tile.edge()..][..valid[u]];
+                pairs.zip(ghosts).for_each(|((&here, &beside), &ghosts)| enter(here, beside, ghosts));
             }
             None => pairs.for_each(|(&here, &beside)| enter(here, beside, M::UNKNOWN)),
         }
@@ -49,7 +49,7 @@ pub fn leaving<M: DistanceState>(
 
 /// The smallest value that enters the ghosts in a direction from any of their 26 neighbours in the tile.
 #[must_use]
-pub fn leaving_anywhere<M: DistanceState>(
+pub fn outgoing_anywhere<M: DistanceState>(
     method: &M,
     tile: &HaloTile<M::State>,
     part: &Box3,

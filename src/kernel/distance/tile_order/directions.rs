@@ -33,7 +33,7 @@ pub(crate) fn downhill<T: Copy + Default>(tile: &HaloTile<T>, value: impl Fn([is
     let valid = tile.valid().map(|n| n as isize);
     let middle = valid.map(|n| n / 2);
     let mut least = (f64::INFINITY, middle);
-    let mut look = |at: [isize; 3]| {
+    let mut visit = |at: [isize; 3]| {
         let value = value(at, tile.data()[tile.at(at[0], at[1], at[2])]);
         if value < least.0 {
             least = (value, at);
@@ -46,7 +46,7 @@ pub(crate) fn downhill<T: Copy + Default>(tile: &HaloTile<T>, value: impl Fn([is
                 for j in (0..valid[v]).step_by(4).chain([valid[v] - 1]) {
                     let mut at = [layer; 3];
                     (at[u], at[v]) = (i, j);
-                    look(at);
+                    visit(at);
                 }
             }
         }

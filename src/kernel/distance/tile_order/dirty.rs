@@ -13,7 +13,7 @@ const ACROSS: Swept = 4;
 
 /// The diagonals of all planes, by x + y and z counted from the lower ghosts.
 #[derive(Clone, Debug)]
-pub(crate) struct Due {
+pub(crate) struct Dirty {
     flags: Vec<bool>,
     /// Diagonals of a plane and of its ghosts.
     row: usize,
@@ -24,7 +24,7 @@ pub(crate) struct Due {
 /// The first diagonal that holds a voxel.
 const FIRST: usize = 2;
 
-impl Due {
+impl Dirty {
     /// For a tile of `edge`^3 voxels.
     pub(crate) fn new(edge: usize) -> Self {
         Self { flags: vec![false; Self::len(edge)], row: 2 * (edge + 2), last: 2 * edge }
@@ -44,7 +44,7 @@ impl Due {
     /// Planes are laid out along other diagonals: all of one are due where any was.
     pub(crate) fn turn(&mut self) {
         for plane in self.flags.chunks_exact_mut(self.row) {
-            let any = plane[FIRST..=self.last].iter().fold(false, |any, due| any | due);
+            let any = plane[FIRST..=self.last].iter().fold(false, |any, dirty| any | dirty);
             plane.fill(any);
         }
     }
@@ -57,7 +57,7 @@ impl Due {
 
     /// What a sweep told of it; `upward` along the plane's diagonals, and along z.
     #[inline(always)]
-    pub(crate) fn tell(&mut self, z: usize, s: usize, swept: Swept, upward: [bool; 2]) {
+    pub(crate) fn mark(&mut self, z: usize, s: usize, swept: Swept, upward: [bool; 2]) {
         if swept & CHANGED == 0 {
             return;
         }
@@ -76,21 +76,21 @@ mod tests {
 
     #[test]
     fn what_is_beside_a_fall_is_due() {
-        let mut due = Due::new(4);
-        due.all([4, 4, 4]);
-        let is_due = |due: &mut Due| {
+        let mut dirty = Dirty::new(4);
+        dirty.all([4, 4, 4]);
+        let is_due = |dirty: &mut Dirty| {
             let all = (1..5).flat_map(|z| (2..9).map(move |s| (z, s)));
-            all.filter(|&(z, s)| due.take(z, s)).collect::<Vec<_>>()
+            all.filter(|&(z, s)| dirty.take(z, s)).collect::<Vec<_>>()
         };
-        assert_eq!(is_due(&mut due).len(), 28);
-        due.tell(2, 5, 0, [true; 2]);
-        assert_eq!(is_due(&mut due), []);
-        due.tell(2, 5, CHANGED, [true, false]);
-        assert_eq!(is_due(&mut due), [(1, 5), (2, 6)]);
-        due.tell(2, 5, CHANGED | 2, [true; 2]);
-        assert_eq!(is_due(&mut due), [(2, 4), (2, 6), (3, 5)]);
-        due.tell(2, 5, CHANGED | 4, [false, true]);
-        due.turn();
-        assert_eq!(is_due(&mut due).len(), 21);
+        assert_eq!(is_due(&mut dirty).len(), 28);
+        dirty.mark(2, 5, 0, [true; 2]);
+        assert_eq!(is_due(&mut dirty), []);
+        dirty.mark(2, 5, CHANGED, [true, false]);
+        assert_eq!(is_due(&mut dirty), [(1, 5), (2, 6)]);
+        dirty.mark(2, 5, CHANGED | 2, [true; 2]);
+        assert_eq!(is_due(&mut dirty), [(2, 4), (2, 6), (3, 5)]);
+        dirty.mark(2, 5, CHANGED | 4, [false, true]);
+        dirty.turn();
+        assert_eq!(is_due(&mut dirty).len(), 21);
     }
 }

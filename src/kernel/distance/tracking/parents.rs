@@ -24,7 +24,7 @@ pub trait Parents: Clone + Send + Sync + 'static {
 
     /// Looks at the rows of a grown tile of distances, halo 1, all 26 directions, that start at these places; sign bit
     /// on fixed voxels.
-    fn look<P: Precision>(&mut self, _distance: &HaloTile<P>, _rows: &[usize]) {}
+    fn find<P: Precision>(&mut self, _distance: &HaloTile<P>, _rows: &[usize]) {}
 
     /// The parent of the voxel at a place of that tile.
     fn parent<P: Precision>(&self, distance: &[P], place: usize) -> Option<Parent>;
@@ -115,9 +115,9 @@ impl Parents for UpwindSum {
         }
     }
 
-    fn look<P: Precision>(&mut self, distance: &HaloTile<P>, rows: &[usize]) {
+    fn find<P: Precision>(&mut self, distance: &HaloTile<P>, rows: &[usize]) {
         let Self { axes, from, tied, .. } = self;
-        pulp::Arch::new().dispatch(Look { distance, rows, axes, from, tied });
+        pulp::Arch::new().dispatch(FindParents { distance, rows, axes, from, tied });
     }
 
     #[inline]
@@ -157,7 +157,7 @@ impl Parents for UpwindSum {
 }
 
 /// Which neighbours enter the update of each voxel, compiled for each vector unit.
-struct Look<'a, P> {
+struct FindParents<'a, P> {
     distance: &'a HaloTile<P>,
     rows: &'a [usize],
     axes: &'a Axes<f64>,
@@ -165,7 +165,7 @@ struct Look<'a, P> {
     tied: &'a mut [u8],
 }
 
-impl<P: Precision> pulp::NullaryFnOnce for Look<'_, P> {
+impl<P: Precision> pulp::NullaryFnOnce for FindParents<'_, P> {
     type Output = ();
 
     #[inline(always)]
@@ -174,7 +174,7 @@ impl<P: Precision> pulp::NullaryFnOnce for Look<'_, P> {
     }
 }
 
-impl<P: Precision> Look<'_, P> {
+impl<P: Precision> FindParents<'_, P> {
     #[inline(always)]
     fn all<const ISOTROPIC: bool>(self) {
         let (width, pitch) = (self.distance.valid()[0], self.distance.pitch());

@@ -49,7 +49,7 @@ impl<R: Parents> Tracer<R> {
         let rows = (1..=nz).flat_map(|z| (1..=ny).map(move |y| (z * pitch + y) * pitch + 1));
         self.rows.clear();
         self.rows.extend(rows.filter(|&row| lacks(&state.data()[row..][..nx])));
-        self.parents.look(distance, &self.rows);
+        self.parents.find(distance, &self.rows);
         for &row in &self.rows {
             self.followed[row..][..nx].fill(false);
         }

@@ -79,7 +79,7 @@ impl Gaps {
     }
 
     /// Tells what each voxel of `part` is, into `out`; `labels` is dense over `around`, which reaches the halo around.
-    pub fn tell(&mut self, labels: &[u32], around: &Box3, part: &Box3, out: &mut [u8]) {
+    pub fn classify(&mut self, labels: &[u32], around: &Box3, part: &Box3, out: &mut [u8]) {
         // What lies between two objects, and how deep, is seen from less far than the ball comes from.
         let depth = self.depth.as_ref().map_or([0; 3], Nearness::halo);
         let reach: [i64; 3] = std::array::from_fn(|a| self.across.halo()[a].max(depth[a] + 1));
@@ -225,7 +225,7 @@ mod tests {
         let voxels = around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
         let labels: Vec<u32> = voxels.map(label).collect();
         let mut out = vec![9; part.len()];
-        gaps.tell(&labels, &around, &part, &mut out);
+        gaps.classify(&labels, &around, &part, &mut out);
         out.iter().map(|state| char::from(b'0' + state)).collect()
     }
 

@@ -92,7 +92,7 @@ pub fn inside(
 }
 
 /// Tells each voxel its side, 1 inside and 0 outside, from its region.
-pub fn tell(regions: &[u32], is_inside: &[bool], side: &mut [u8]) {
+pub fn mark_sides(regions: &[u32], is_inside: &[bool], side: &mut [u8]) {
     for (side, &region) in side.iter_mut().zip(regions) {
         *side = side_of(region, is_inside);
     }

@@ -67,7 +67,7 @@ impl Candidates {
                 self.distance(known, 0, here) - self.distance(known, 1, here)
             };
             t = root(difference, RESOLUTION * length).clamp(MARGIN, 1.0 - MARGIN);
-            if n == LOOKUPS || (t - last).abs() < SETTLED || !self.look_up(known, &labels, place(t)) {
+            if n == LOOKUPS || (t - last).abs() < SETTLED || !self.search_nearest(known, &labels, place(t)) {
                 break;
             }
             last = t;
@@ -95,7 +95,7 @@ impl Candidates {
             };
             weights = balance(at);
             let is_settled = (0..N).all(|n| (weights[n] - last[n]).abs() < SETTLED);
-            if n == LOOKUPS || is_settled || !self.look_up(known, &labels, place(weights)) {
+            if n == LOOKUPS || is_settled || !self.search_nearest(known, &labels, place(weights)) {
                 break;
             }
             last = weights;
@@ -109,7 +109,7 @@ impl Candidates {
     pub(crate) fn at(&mut self, known: &Known<'_>, corners: &[Corner], position: [f64; 3]) -> Between {
         self.gather(known, corners);
         let labels: Vec<u32> = corners.iter().map(|corner| corner.label).collect();
-        self.look_up(known, &labels, position);
+        self.search_nearest(known, &labels, position);
         let here = known.world(position);
         let distance = (0..labels.len()).map(|n| self.distance(known, n, here)).fold(f64::INFINITY, f64::min);
         Between { position, distance, normal: DVec3::ZERO }
@@ -159,7 +159,7 @@ impl Candidates {
     }
 
     /// Collects the nearest source of each label at a place; returns whether any was new.
-    fn look_up(&mut self, known: &Known<'_>, labels: &[u32], place: [f64; 3]) -> bool {
+    fn search_nearest(&mut self, known: &Known<'_>, labels: &[u32], place: [f64; 3]) -> bool {
         let mut is_new = false;
         for (sources, &label) in self.of_label.iter_mut().zip(labels).filter(|(_, label)| **label > 0) {
             let nearest = known.nearest(label, place);

@@ -87,7 +87,7 @@ impl Splits {
         let place = 7 * known.part.offset_of(lower) + usize::from(step) - 1;
         if self.edges[place] == UNKNOWN {
             let upper = std::array::from_fn(|a| lower[a] + i64::from(step >> a & 1));
-            let found = self.look(known, [lower, upper]);
+            let found = self.search(known, [lower, upper]);
             self.edges[place] = if found.is_some() { WHOLE + 1 + self.corners.len() as u32 } else { WHOLE };
             self.corners.extend(found);
         }
@@ -95,7 +95,7 @@ impl Splits {
     }
 
     /// Looks at an edge.
-    fn look(&mut self, known: &Known<'_>, ends: [[i64; 3]; 2]) -> Option<Corner> {
+    fn search(&mut self, known: &Known<'_>, ends: [[i64; 3]; 2]) -> Option<Corner> {
         let places = ends.map(|voxel| known.part.offset_of(voxel));
         let own = places.map(|place| known.labels[place]);
         if own.contains(&0) || !places.iter().any(|&place| self.is_near[place]) {

@@ -17,7 +17,7 @@ pub struct Solved<'a, P> {
     /// For each voxel the index of its nearest known source, or [`NO_SOURCE`].
     pub sources: Arc<dyn BoxSource<u32> + Send + 'a>,
     /// Both at once, where they are made of the same and that is cheaper.
-    pub together: Option<Arc<dyn Together<P> + Send + 'a>>,
+    pub with_source: Option<Arc<dyn DistanceWithSource<P> + Send + 'a>>,
     /// 1 where a source fixed the voxel, else 0.
     pub fixed: Arc<dyn BoxSource<u8> + Send + 'a>,
     /// Voxels that sources fixed.
@@ -27,12 +27,12 @@ pub struct Solved<'a, P> {
 }
 
 /// Distances and sources that are made of the same state.
-pub trait Together<P>: Sync {
+pub trait DistanceWithSource<P>: Sync {
     /// Reads both for a box, dense `[z][y][x]`.
     ///
     /// # Errors
     /// When they cannot be read.
-    fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()>;
+    fn read_both(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()>;
 }
 
 impl<P: Precision> Solved<'_, P> {
@@ -41,8 +41,8 @@ impl<P: Precision> Solved<'_, P> {
     /// # Errors
     /// When they cannot be read.
     pub fn read_both(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
-        if let Some(together) = &self.together {
-            return together.read_together(part, values, sources);
+        if let Some(with_source) = &self.with_source {
+            return with_source.read_both(part, values, sources);
         }
         self.values.read_box(part, values)?;
         self.sources.read_box(part, sources)
@@ -64,9 +64,9 @@ impl<M: DistanceState> Values<M> {
     where
         M: 'a,
     {
-        let (values, together) = (Arc::new(self), None);
+        let (values, with_source) = (Arc::new(self), None);
         let (sources, fixed) = (values.clone(), values.clone());
-        Solved { values, sources, together, fixed, fixed_voxels, triangle_distances }
+        Solved { values, sources, with_source, fixed, fixed_voxels, triangle_distances }
     }
 
     /// Reads the state of a box and hands each voxel on, with its place in the box.

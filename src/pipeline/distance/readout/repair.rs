@@ -5,16 +5,16 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::field::Together;
+use super::field::DistanceWithSource;
 use crate::error::Result;
 use crate::exec::Workers;
 use crate::grid::{Box3, Geometry, NO_SOURCE};
 use crate::kernel::distance::methods::shape_distance::ShapeDistance;
 use crate::kernel::distance::methods::tracked::TrackedSource;
 use crate::kernel::distance::methods::vector_distance::VectorDistance;
-use crate::kernel::distance::repair::bends::{MARGIN, Seen};
-use crate::kernel::distance::repair::look::Labels;
-use crate::kernel::distance::repair::look::Look;
+use crate::kernel::distance::repair::bends::{MARGIN, Repair};
+use crate::kernel::distance::repair::repair_box::Labels;
+use crate::kernel::distance::repair::repair_box::RepairBox;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::{Options, Solved, Sources};
 use crate::store::BoxSource;
@@ -24,7 +24,7 @@ const PIECE: i64 = 64;
 
 /// A solved distance of a method that tracks sources, each voxel looked at again as it is read: for sources that were
 /// lost too where a `front` solved it.
-pub(crate) fn with_second_look<'a, P: Precision>(
+pub(crate) fn with_repair<'a, P: Precision>(
     solved: Solved<'a, P>,
     sources: &Sources<'a>,
     options: Options,
@@ -57,44 +57,47 @@ fn join<'a, P: Precision, S: TrackedSource + 'a>(
     kind: Kind<'a>,
 ) -> Solved<'a, P> {
     let buffers = Workers::new(Default::default);
-    let seen = Arc::new(SecondLook { method, geometry, found: solved.sources, kind, buffers });
+    let repair = Arc::new(Repaired { method, geometry, found: solved.sources, kind, buffers });
     if kind.is_front {
-        Solved { values: seen.clone(), together: Some(seen.clone()), sources: seen, ..solved }
+        Solved { values: repair.clone(), with_source: Some(repair.clone()), sources: repair, ..solved }
     } else {
-        Solved { sources: seen, ..solved }
+        Solved { sources: repair, ..solved }
     }
 }
 
 /// Sources as a method left them, and what tells how far they are.
-struct SecondLook<'a, S> {
+struct Repaired<'a, S> {
     method: S,
     geometry: &'a Geometry,
     found: Arc<dyn BoxSource<u32> + Send + 'a>,
     kind: Kind<'a>,
     /// Kept from one read to the next: fresh memory would cost more than what is computed in it.
-    buffers: Workers<(Vec<u32>, Seen)>,
+    buffers: Workers<(Vec<u32>, Repair)>,
 }
 
-impl<S: TrackedSource> SecondLook<'_, S> {
+impl<S: TrackedSource> Repaired<'_, S> {
     /// Looks at a box, a piece at a time so that buffers stay small, and hands on what was seen of each.
-    fn see(&self, part: &Box3, mut then: impl FnMut(&Box3, &Seen)) -> Result<()> {
+    fn see(&self, part: &Box3, mut then: impl FnMut(&Box3, &Repair)) -> Result<()> {
         let (geometry, Kind { is_front, labels, farthest }) = (self.geometry, self.kind);
         let lost_within = is_front.then_some(farthest);
-        self.buffers.with(|(found, seen)| {
+        self.buffers.with(|(found, repair)| {
             for piece in pieces(part) {
                 let known = piece.grow(MARGIN).intersect(&geometry.domain());
                 found.resize(known.len().max(found.len()), NO_SOURCE);
                 let found = &mut found[..known.len()];
                 self.found.read_box(&known, found)?;
-                seen.look(&self.method, &Look { geometry, part: &piece, known: &known, found, lost_within, labels });
-                then(&piece, seen);
+                repair.run(
+                    &self.method,
+                    &RepairBox { geometry, part: &piece, known: &known, found, lost_within, labels },
+                );
+                then(&piece, repair);
             }
             Ok(())
         })
     }
 }
 
-impl<S> SecondLook<'_, S> {
+impl<S> Repaired<'_, S> {
     fn distances<P: Precision>(&self, squared: &[f64], out: &mut [P]) {
         for (out, squared) in out.iter_mut().zip(squared) {
             *out = P::from_f64(squared.sqrt().min(self.kind.farthest));
@@ -123,37 +126,37 @@ fn each_row(part: &Box3, piece: &Box3, mut copy: impl FnMut(Range<usize>, Range<
     }
 }
 
-impl<S: TrackedSource> BoxSource<u32> for SecondLook<'_, S> {
+impl<S: TrackedSource> BoxSource<u32> for Repaired<'_, S> {
     fn shape(&self) -> [i64; 3] {
         self.geometry.shape
     }
 
     fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
-        self.see(part, |piece, seen| {
-            each_row(part, piece, |to, from| out[to].copy_from_slice(&seen.sources[from]));
+        self.see(part, |piece, repair| {
+            each_row(part, piece, |to, from| out[to].copy_from_slice(&repair.sources[from]));
         })
     }
 }
 
-impl<S: TrackedSource, P: Precision> Together<P> for SecondLook<'_, S> {
-    fn read_together(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
-        self.see(part, |piece, seen| {
+impl<S: TrackedSource, P: Precision> DistanceWithSource<P> for Repaired<'_, S> {
+    fn read_both(&self, part: &Box3, values: &mut [P], sources: &mut [u32]) -> Result<()> {
+        self.see(part, |piece, repair| {
             each_row(part, piece, |to, from| {
-                sources[to.clone()].copy_from_slice(&seen.sources[from.clone()]);
-                self.distances(&seen.squared[from], &mut values[to]);
+                sources[to.clone()].copy_from_slice(&repair.sources[from.clone()]);
+                self.distances(&repair.squared[from], &mut values[to]);
             });
         })
     }
 }
 
-impl<S: TrackedSource, P: Precision> BoxSource<P> for SecondLook<'_, S> {
+impl<S: TrackedSource, P: Precision> BoxSource<P> for Repaired<'_, S> {
     fn shape(&self) -> [i64; 3] {
         self.geometry.shape
     }
 
     fn read_box(&self, part: &Box3, out: &mut [P]) -> Result<()> {
-        self.see(part, |piece, seen| {
-            each_row(part, piece, |to, from| self.distances(&seen.squared[from], &mut out[to]));
+        self.see(part, |piece, repair| {
+            each_row(part, piece, |to, from| self.distances(&repair.squared[from], &mut out[to]));
         })
     }
 }

@@ -76,7 +76,7 @@ impl<P: Precision> ReadOut<'_, '_, P> {
         let workers = Workers::new(|| (Voxels::default(), Buffers::default()));
         let measured = stage.run(&visits, &workers, |(voxels, buffers), visit| {
             visit.iter().try_fold(Measured::default(), |before, part| {
-                let measured = self.look(part, inside.as_ref(), voxels)?;
+                let measured = self.measure(part, inside.as_ref(), voxels)?;
                 if let Some(kept) = self.kept {
                     kept.put(&voxels.tile(part, &closest));
                 }
@@ -94,12 +94,12 @@ impl<P: Precision> ReadOut<'_, '_, P> {
         Ok(self.found(measured))
     }
 
-    fn look(&self, part: &Box3, inside: Option<&Inside<'_>>, voxels: &mut Voxels<P>) -> Result<Measured> {
+    fn measure(&self, part: &Box3, inside: Option<&Inside<'_>>, voxels: &mut Voxels<P>) -> Result<Measured> {
         self.read(part, voxels)?;
         if let Some(inside) = inside {
             voxels.fixed.resize(part.len(), 0);
             self.solved.fixed.read_box(part, &mut voxels.fixed)?;
-            inside.tell(part, &voxels.fixed, &mut voxels.flood, &mut voxels.inside);
+            inside.classify(part, &voxels.fixed, &mut voxels.flood, &mut voxels.inside);
             for (value, _) in voxels.values.iter_mut().zip(&voxels.inside).filter(|(_, inside)| **inside) {
                 *value = P::from_f64(-value.to_f64());
             }

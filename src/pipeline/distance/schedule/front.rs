@@ -14,7 +14,7 @@ use crate::exec::{checkerboard, corner_colours};
 use crate::grid::{Box3, FACES, NEIGHBOURS_26, Slot};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
-use crate::kernel::distance::tile_order::arrival::{leaving, leaving_anywhere};
+use crate::kernel::distance::tile_order::arrival::{outgoing, outgoing_anywhere};
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
 
@@ -45,10 +45,10 @@ pub(crate) fn advance_front<M: DistanceMethod>(
         plan,
         offsets: method.neighbours().offsets(),
         arrival: vec![f64::INFINITY; set.len()],
-        untold: vec![false; set.len()],
+        unsent: vec![false; set.len()],
     };
     for &slot in start {
-        (front.arrival[slot as usize], front.untold[slot as usize]) = (0.0, true);
+        (front.arrival[slot as usize], front.unsent[slot as usize]) = (0.0, true);
     }
     let workers = &Workers::new(move || (HaloTile::new(edge), M::work(edge)));
     let width = ROUND_WIDTH * edge as f64 * spacing.iter().copied().fold(f64::INFINITY, f64::min);
@@ -66,24 +66,24 @@ struct Front<'a, M: DistanceMethod> {
     /// The smallest value that enters each brick since it was visited.
     arrival: Vec<f64>,
     /// Nobody was told of the fixed voxels on these bricks' faces yet.
-    untold: Vec<bool>,
+    unsent: Vec<bool>,
 }
 
 /// The smallest value that enters each brick beside one, in the order of `offsets`; infinite where none does.
-type Leaving = [f64; NEIGHBOURS_26.len()];
+type Outgoing = [f64; NEIGHBOURS_26.len()];
 
 impl<M: DistanceMethod> Front<'_, M> {
-    fn leaving(&self, tile: &HaloTile<M::State>, slot: Slot, part: &Box3) -> Leaving {
+    fn outgoing(&self, tile: &HaloTile<M::State>, slot: Slot, part: &Box3) -> Outgoing {
         let mut values = [f64::INFINITY; NEIGHBOURS_26.len()];
-        let written = !self.untold[slot as usize] && self.array.unwritten(slot).is_none();
+        let written = !self.unsent[slot as usize] && self.array.unwritten(slot).is_none();
         for (value, (n, &offset)) in values.iter_mut().zip(self.offsets.iter().enumerate()) {
             let found = match (self.method.neighbours(), written) {
-                (Neighbours::All, _) => leaving_anywhere(self.method, tile, part, offset),
-                (Neighbours::Faces, false) => leaving(self.method, tile, part, FACES[n], None),
+                (Neighbours::All, _) => outgoing_anywhere(self.method, tile, part, offset),
+                (Neighbours::Faces, false) => outgoing(self.method, tile, part, FACES[n], None),
                 // Only what is new on a face can lower a voxel beyond it.
-                (Neighbours::Faces, true) => {
-                    self.array.read_face(slot, FACES[n], |told| leaving(self.method, tile, part, FACES[n], Some(told)))
-                }
+                (Neighbours::Faces, true) => self
+                    .array
+                    .read_face(slot, FACES[n], |ghosts| outgoing(self.method, tile, part, FACES[n], Some(ghosts))),
             };
             *value = found.unwrap_or(f64::INFINITY);
         }
@@ -94,8 +94,8 @@ impl<M: DistanceMethod> Front<'_, M> {
 impl<M: DistanceMethod> Relax for Front<'_, M> {
     type State = M::State;
     type Work = (HaloTile<M::State>, M::Work);
-    type Visit = Option<Leaving>;
-    type Note = Leaving;
+    type Visit = Option<Outgoing>;
+    type Note = Outgoing;
 
     fn field(&self) -> &BrickArray<M::State> {
         self.array
@@ -105,28 +105,28 @@ impl<M: DistanceMethod> Relax for Front<'_, M> {
         self.arrival[slot as usize]
     }
 
-    fn visit(&self, (tile, work): &mut Self::Work, slot: Slot, _wave: usize) -> Result<Option<Leaving>> {
+    fn visit(&self, (tile, work): &mut Self::Work, slot: Slot, _wave: usize) -> Result<Option<Outgoing>> {
         self.plan.gather(self.array, slot, Boundary::Constant(M::UNKNOWN), tile);
         let part = self.array.set().grid().brick_box(self.array.set().id(slot));
         let changed = self.method.settle(tile, work, &part);
-        let leaving = (changed || self.untold[slot as usize]).then(|| self.leaving(tile, slot, &part));
+        let outgoing = (changed || self.unsent[slot as usize]).then(|| self.outgoing(tile, slot, &part));
         if changed {
             self.plan.scatter(tile, self.array, slot);
         }
-        Ok(leaving)
+        Ok(outgoing)
     }
 
-    fn note(&self, _slot: Slot, visit: &Option<Leaving>) -> Option<Leaving> {
+    fn note(&self, _slot: Slot, visit: &Option<Outgoing>) -> Option<Outgoing> {
         *visit
     }
 
-    fn visited(&mut self, slot: Slot, _visit: Option<Leaving>) {
-        (self.arrival[slot as usize], self.untold[slot as usize]) = (f64::INFINITY, false);
+    fn visited(&mut self, slot: Slot, _visit: Option<Outgoing>) {
+        (self.arrival[slot as usize], self.unsent[slot as usize]) = (f64::INFINITY, false);
     }
 
-    fn told(&mut self, slot: Slot, leaving: &Leaving) {
+    fn receive(&mut self, slot: Slot, outgoing: &Outgoing) {
         let set = self.array.set();
-        for (&offset, &value) in self.offsets.iter().zip(leaving) {
+        for (&offset, &value) in self.offsets.iter().zip(outgoing) {
             if let Some(beside) = set.neighbour(slot, offset) {
                 let arrival = &mut self.arrival[beside as usize];
                 *arrival = arrival.min(value);

@@ -49,9 +49,9 @@ pub(crate) struct Swept<'t, M: OrderedSweeps, W> {
 }
 
 /// Nothing goes along.
-pub(crate) struct Alone<'a>(pub(crate) &'a BrickSet);
+pub(crate) struct NoCompanion<'a>(pub(crate) &'a BrickSet);
 
-impl<M: OrderedSweeps> Companion<M> for Alone<'_> {
+impl<M: OrderedSweeps> Companion<M> for NoCompanion<'_> {
     type Work = ();
 
     fn work(_: usize) {}
@@ -84,7 +84,7 @@ pub(crate) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
     let mut sweeps = Sweeps { method, array, companion, plan, upward: SWEEPS[0], quiet, changed };
     for &slot in start.iter().chain(&begun_elsewhere) {
         sweeps.quiet[slot as usize] = false;
-        sweeps.told(slot, &[]);
+        sweeps.receive(slot, &[]);
     }
     for _ in 0..iterations {
         let mut resting = true;
@@ -148,7 +148,7 @@ impl<M: OrderedSweeps, C: Companion<M>> Relax for Sweeps<'_, M, C> {
         }
     }
 
-    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+    fn receive(&mut self, slot: Slot, _note: &[f64; 0]) {
         let set = self.array.set();
         let beside = FACES.iter().filter_map(|face| set.neighbour(slot, face.offset()));
         beside.for_each(|n| self.quiet[n as usize] = false);

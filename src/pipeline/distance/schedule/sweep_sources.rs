@@ -121,7 +121,7 @@ impl<P: Precision> Companion<FastSweeping<P, f64>> for TrackedSweeps<'_> {
         slot: Slot,
         upward: [bool; 3],
     ) -> Visit {
-        let changed = method.sweep_telling(tile, work, upward, fell);
+        let changed = method.sweep_recording(tile, work, upward, fell);
         Visit { changed, left: changed && self.take(fell, ghosts, slot, upward) }
     }
 

@@ -80,9 +80,9 @@ pub(crate) struct Missing<'a, W, F> {
     states: &'a BrickArray<SourceState>,
     visit: F,
     /// Bricks in which something may be found.
-    due: Vec<bool>,
+    dirty: Vec<bool>,
     /// Nobody was told of what these bricks hold yet.
-    untold: Vec<bool>,
+    unsent: Vec<bool>,
     /// Bricks in which nothing is missing.
     complete: Vec<bool>,
     /// How far from the sources bricks are: about in this order they are visited.
@@ -108,14 +108,14 @@ fn middles<P: Precision>(distances: &BrickArray<P>) -> Result<Vec<f64>> {
 impl<'a, W, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Missing<'a, W, F> {
     pub(crate) fn new(states: &'a BrickArray<SourceState>, complete: Vec<bool>, visit: F) -> Self {
         let bricks = complete.len();
-        let (due, untold) = (vec![false; bricks], vec![false; bricks]);
-        Self { states, visit, due, untold, complete, far: vec![0.0; bricks], work: PhantomData }
+        let (dirty, unsent) = (vec![false; bricks], vec![false; bricks]);
+        Self { states, visit, dirty, unsent, complete, far: vec![0.0; bricks], work: PhantomData }
     }
 
-    /// Makes bricks due; with `untold` also those beside them, afterwards, whether anything is found in them or not.
-    pub(crate) fn begin(&mut self, start: &[Slot], untold: bool) {
+    /// Makes bricks due; with `unsent` also those beside them, afterwards, whether anything is found in them or not.
+    pub(crate) fn begin(&mut self, start: &[Slot], unsent: bool) {
         for &slot in start {
-            (self.due[slot as usize], self.untold[slot as usize]) = (true, untold);
+            (self.dirty[slot as usize], self.unsent[slot as usize]) = (true, unsent);
         }
     }
 }
@@ -132,7 +132,7 @@ impl<W: Send, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Relax for Missing<'_, 
 
     fn priority(&self, slot: Slot) -> f64 {
         let at = slot as usize;
-        if self.due[at] && !self.complete[at] { self.far[at] } else { f64::INFINITY }
+        if self.dirty[at] && !self.complete[at] { self.far[at] } else { f64::INFINITY }
     }
 
     fn visit(&self, work: &mut W, slot: Slot, _wave: usize) -> Result<(bool, bool)> {
@@ -140,18 +140,18 @@ impl<W: Send, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Relax for Missing<'_, 
     }
 
     fn note(&self, slot: Slot, (found, _): &(bool, bool)) -> Option<[f64; 0]> {
-        (*found || self.untold[slot as usize]).then_some([])
+        (*found || self.unsent[slot as usize]).then_some([])
     }
 
     fn visited(&mut self, slot: Slot, (_, left): (bool, bool)) {
         let at = slot as usize;
-        (self.due[at], self.untold[at], self.complete[at]) = (false, false, !left);
+        (self.dirty[at], self.unsent[at], self.complete[at]) = (false, false, !left);
     }
 
-    fn told(&mut self, slot: Slot, _note: &[f64; 0]) {
+    fn receive(&mut self, slot: Slot, _note: &[f64; 0]) {
         let set = self.states.set();
         let beside = NEIGHBOURS_26.iter().filter_map(|&offset| set.neighbour(slot, offset));
-        beside.for_each(|n| self.due[n as usize] = true);
+        beside.for_each(|n| self.dirty[n as usize] = true);
     }
 }
 

@@ -21,7 +21,7 @@ const FARTHEST_TOLD: i64 = 4;
 ///
 /// It lets fixed voxels start from the nearest point of all. And a point whose voxels are all nearer to others would
 /// else be walled in by them, and nobody beyond would ever hear of it.
-fn told_margin(spacing: [f64; 3]) -> [i64; 3] {
+fn trial_margin(spacing: [f64; 3]) -> [i64; 3] {
     let diagonal = spacing.iter().map(|h| h * h).sum::<f64>().sqrt();
     spacing.map(|h| ((diagonal / h).ceil().min(1e3) as i64 - 1).clamp(1, FARTHEST_TOLD))
 }
@@ -33,7 +33,7 @@ pub(crate) enum Start {
     Fixed,
     /// Where a method keeps sources, voxels beside them too; and of all these points a fixed voxel has the nearest,
     /// also one that does not fix it.
-    Told,
+    Provisional,
 }
 
 /// What the sources made of this rank's bricks.
@@ -56,10 +56,10 @@ pub(crate) fn initialise<M: DistanceState>(
 ) -> Result<Seeded> {
     let set = array.set();
     let (grid, len) = (*set.grid(), set.grid().brick_len());
-    let tells = start == Start::Told && M::trial(0).is_some();
-    let margin = if tells { told_margin(sources.geometry.spacing) } else { [0; 3] };
+    let spreads = start == Start::Provisional && M::trial(0).is_some();
+    let margin = if spreads { trial_margin(sources.geometry.spacing) } else { [0; 3] };
     let near: Vec<Slot> = set.owned().filter(|&slot| sources.may_seed(set.id(slot), margin)).collect();
-    let workers = Workers::new(move || (Seeds::new(len), Seeds::new(if tells { len } else { 0 })));
+    let workers = Workers::new(move || (Seeds::new(len), Seeds::new(if spreads { len } else { 0 })));
     let counts = stage.run(&near, &workers, |(fixed, told), &slot| {
         let id = set.id(slot);
         let (part, edge) = (grid.brick_box(id), grid.edge() as usize);
@@ -80,7 +80,7 @@ pub(crate) fn initialise<M: DistanceState>(
             let beside = sources.geometry.length([2; 3]);
             outside.fix_voxels(&part, edge, farthest + beside, fixed);
         }
-        if tells {
+        if spreads {
             let points = sources.points_seeding(id, margin);
             fix_voxels(sources.geometry, &part, edge, points, &mut told.squared, &mut told.source);
         }

@@ -12,7 +12,7 @@ use crate::store::BrickArray;
 
 /// Gives voxels of this rank's bricks the source outside that is nearer than the one they were handed, where there is one,
 /// none that is farther than `farthest` and some voxels more. Faces of bricks stay as they are: nobody is told.
-pub(crate) fn look_outside<M: DistanceState>(
+pub(crate) fn search_outside<M: DistanceState>(
     stage: &Stage<'_>,
     sources: &Sources<'_>,
     method: &M,

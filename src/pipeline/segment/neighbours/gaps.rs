@@ -47,7 +47,7 @@ pub(super) fn fill(
         joined.found = found;
         return Ok(());
     }
-    let (states, brightness) = tell(&stage, engine, joining, &roots, &set, [widest, depth])?;
+    let (states, brightness) = classify(&stage, engine, joining, &roots, &set, [widest, depth])?;
     stage.finish();
     let walls = Walls::new(joining.image, brightness);
     found.wall = walls.contrast();
@@ -63,7 +63,7 @@ pub(super) fn fill(
 }
 
 /// What each voxel is, and how bright the image is within objects and between them.
-fn tell(
+fn classify(
     stage: &Stage<'_>,
     engine: &Engine,
     joining: &Joining<'_>,
@@ -79,7 +79,7 @@ fn tell(
         let part = set.grid().brick_box(set.id(slot));
         let around = roots.around(&part, halo, labels)?;
         out.resize(part.len(), OUTSIDE);
-        gaps.tell(labels, &around, &part, out);
+        gaps.classify(labels, &around, &part, out);
         states.write_box(&part, out);
         match joining.image {
             Some(image) => Brightness::of(image, labels, &around, &part, out),

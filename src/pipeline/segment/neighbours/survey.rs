@@ -59,7 +59,7 @@ pub(super) fn survey(stage: &Stage<'_>, geometry: &Geometry, objects: &[Placed<'
     }
     let bricks: Vec<BrickId> = (0..grid.len()).collect();
     let found = stage.run(&bricks, &Workers::new(Vec::new), |values, &id| {
-        look(objects, &near[id as usize], &grid.brick_box(id), values)
+        examine(objects, &near[id as usize], &grid.brick_box(id), values)
     })?;
     let mut survey = Survey {
         grid,
@@ -81,7 +81,7 @@ pub(super) fn survey(stage: &Stage<'_>, geometry: &Geometry, objects: &[Placed<'
     Ok(survey)
 }
 
-fn look(objects: &[Placed<'_>], near: &[usize], part: &Box3, values: &mut Vec<f32>) -> Result<Brick> {
+fn examine(objects: &[Placed<'_>], near: &[usize], part: &Box3, values: &mut Vec<f32>) -> Result<Brick> {
     let mut brick = Brick::default();
     // The objects at each voxel, where there are several in the brick.
     let mut masks: Vec<Vec<bool>> = Vec::new();

@@ -12,7 +12,7 @@ use crate::kernel::outline::planar::marked::Scatter;
 use crate::kernel::outline::planar::section::Section;
 use crate::kernel::outline::spatial::cross_validation::{HeldOut, leave_out};
 use crate::kernel::outline::spatial::fitted::{Fit, Fitted, LEAST_BESIDE, MOST_SAMPLES};
-use crate::pipeline::enclosure::region::Vicinity;
+use crate::pipeline::enclosure::region::RegionOfInterest;
 use crate::pipeline::image::intensity::Normalised;
 use crate::pipeline::image::smoothing::smoothed;
 use crate::pipeline::marks::ObjectMarks;
@@ -147,8 +147,8 @@ fn profiles<T: Element>(
     let every = places.len().div_ceil(MOST_PROFILES).max(1);
     let places: Vec<(usize, [f64; 3])> = places.into_iter().step_by(every).collect();
     let points: Vec<[f64; 3]> = places.iter().map(|place| place.1).collect();
-    let Vicinity { geometry, window, cells, .. } =
-        Vicinity::new(picture.geometry, &points, (REACH as f64 * STEP + 1.5) * h);
+    let RegionOfInterest { geometry, window, cells, .. } =
+        RegionOfInterest::new(picture.geometry, &points, (REACH as f64 * STEP + 1.5) * h);
     let stage = engine.stage(&name("profiles", marks), 0);
     let image = Normalised::new(picture.voxels, picture.range, window);
     let grey = smoothed(&stage, engine, &image, &std::sync::Arc::new(cells), geometry.spacing, [SIGMA * h; 3])?;

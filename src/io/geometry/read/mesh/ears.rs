@@ -9,7 +9,7 @@
 use std::collections::VecDeque;
 
 use super::corner_cells::Cells;
-use super::flat_polygon::{STRAIGHT, Seen, is_star, seen_flat, turn, turns_once};
+use super::flat_polygon::{Flattened, STRAIGHT, flattened, is_star, turn, turns_once};
 
 /// At most so many looks at points for each corner, as long as spare ones are left: polygons that cross themselves
 /// everywhere must come to an end.
@@ -34,11 +34,11 @@ pub(crate) enum Cut {
 
 /// Cuts the polygon with these corners, four at least, and takes what it needs of the spare looks of its file.
 pub(crate) fn cut(corners: &[[f64; 3]], spare: &mut u64) -> Cut {
-    let points = match seen_flat(corners) {
-        Seen::Line => return Cut::Fan,
-        Seen::Cancelled => return Cut::Crossed((2..corners.len() as u32).map(|n| [0, n - 1, n]).collect()),
-        Seen::Plane(points) if is_star(&points) => return Cut::Fan,
-        Seen::Plane(points) => points,
+    let points = match flattened(corners) {
+        Flattened::Line => return Cut::Fan,
+        Flattened::Cancelled => return Cut::Crossed((2..corners.len() as u32).map(|n| [0, n - 1, n]).collect()),
+        Flattened::Plane(points) if is_star(&points) => return Cut::Fan,
+        Flattened::Plane(points) => points,
     };
     let turns_once = turns_once(&points);
     let mut ring = Ring::new(points);

@@ -4,7 +4,7 @@
 pub(crate) const STRAIGHT: f64 = 1e-12;
 
 /// A polygon as seen from where its area is largest.
-pub(crate) enum Seen {
+pub(crate) enum Flattened {
     /// All corners lie on a line.
     Line,
     /// Parts of it are wound around one way and parts the other way, so that no area is left.
@@ -14,12 +14,12 @@ pub(crate) enum Seen {
 }
 
 /// A polygon's corners in the plane that shows most of it.
-pub(crate) fn seen_flat(corners: &[[f64; 3]]) -> Seen {
+pub(crate) fn flattened(corners: &[[f64; 3]]) -> Flattened {
     let from = corners[0];
     let local: Vec<[f64; 3]> = corners.iter().map(|p| std::array::from_fn(|a| p[a] / 4.0 - from[a] / 4.0)).collect();
     let size = local.iter().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
     if size == 0.0 {
-        return Seen::Line;
+        return Flattened::Line;
     }
     let (_, exponent) = libm::frexp(size);
     let scaled: Vec<[f64; 3]> = local.iter().map(|p| p.map(|x| libm::ldexp(x, -exponent))).collect();
@@ -35,13 +35,13 @@ pub(crate) fn seen_flat(corners: &[[f64; 3]]) -> Seen {
     }
     let axis = (1..3).fold(0, |most, a| if area[a].abs() > area[most].abs() { a } else { most });
     if area[axis].abs() <= STRAIGHT {
-        return if plain > 1e-9 { Seen::Cancelled } else { Seen::Line };
+        return if plain > 1e-9 { Flattened::Cancelled } else { Flattened::Line };
     }
     let (mut i, mut j) = ((axis + 1) % 3, (axis + 2) % 3);
     if area[axis] < 0.0 {
         (i, j) = (j, i);
     }
-    Seen::Plane(scaled.iter().map(|p| [p[i], p[j]]).collect())
+    Flattened::Plane(scaled.iter().map(|p| [p[i], p[j]]).collect())
 }
 
 /// Twice the area of a triangle, positive where its corners turn counterclockwise.

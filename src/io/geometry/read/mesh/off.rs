@@ -123,7 +123,7 @@ pub(crate) fn read(input: &mut Input) -> Result<Source> {
             .map_err(|error| Error::input(format!("line {}: {error}", lines.number)).caused_by(error))?;
         faces.end(|| format!("line {}", lines.number));
     }
-    input.tell_rest(&format!("the {face_count} faces that it declares"))?;
+    input.note_rest(&format!("the {face_count} faces that it declares"))?;
     let triangles = faces.finish(&vertices, &mut input.notes);
     mesh_or_cloud(vertices, triangles)
 }

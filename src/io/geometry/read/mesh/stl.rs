@@ -111,7 +111,7 @@ fn read_binary(input: &mut Input) -> Result<Vec<[f64; 3]>> {
             corners.push(position);
         }
     }
-    input.tell_rest(&format!("the {count} triangles that it declares"))?;
+    input.note_rest(&format!("the {count} triangles that it declares"))?;
     Ok(corners)
 }
 

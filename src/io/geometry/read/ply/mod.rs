@@ -55,7 +55,7 @@ pub(crate) fn read(input: &mut Input) -> Result<Source> {
         }
     }
     if last + 1 == header.elements.len() {
-        input.tell_rest("the elements that it declares")?;
+        input.note_rest("the elements that it declares")?;
     }
     let triangles = found.finish(&vertices, &mut input.notes);
     if !triangles.is_empty() {

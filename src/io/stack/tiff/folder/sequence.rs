@@ -130,7 +130,7 @@ fn kinds(names: Vec<Name>, notes: &mut Vec<String>) -> Result<Vec<Vec<Name>>, St
         let kept: Vec<Name> =
             names.into_iter().filter(|name| left.is_empty() || left.len() == all || !name.is_derived()).collect();
         if kept.len() < all {
-            tell_of_strangers(&left, &kept[0], notes);
+            note_foreign_files(&left, &kept[0], notes);
         }
         if kept.len() > 1 {
             notes.push(format!(
@@ -163,12 +163,12 @@ fn kinds(names: Vec<Name>, notes: &mut Vec<String>) -> Result<Vec<Vec<Name>>, St
         ));
     }
     if !strangers.is_empty() {
-        tell_of_strangers(&strangers, &kept[0][0], notes);
+        note_foreign_files(&strangers, &kept[0][0], notes);
     }
     Ok(kept)
 }
 
-fn tell_of_strangers(strangers: &[Name], slice: &Name, notes: &mut Vec<String>) {
+fn note_foreign_files(strangers: &[Name], slice: &Name, notes: &mut Vec<String>) {
     let listed: Vec<String> = strangers.iter().take(4).map(Name::file).collect();
     let more = if strangers.len() > 4 { format!(" and {} more", strangers.len() - 4) } else { String::new() };
     let verb = if strangers.len() == 1 { "is not named like the slices" } else { "are not named like the slices" };
@@ -314,7 +314,7 @@ fn by_numbers(kinds: Vec<Vec<Name>>, roles: &[(Axis, usize)], mut notes: Vec<Str
     };
     let [channels, times, slices] = [Axis::Channel, Axis::Time, Axis::Z].map(values);
     let held = if kinds.len() > 1 { kinds.len() } else { channels.len() };
-    tell_of_axes(&kinds, roles, &slices, &mut notes);
+    note_axes(&kinds, roles, &slices, &mut notes);
     let order = [(Axis::Z, slices.len()), (Axis::Channel, held), (Axis::Time, times.len())];
     let dimensions = Dimensions(order.map(|(axis, n)| (axis, n as u64)));
     let counted = column(Axis::Z).is_some();
@@ -343,7 +343,7 @@ fn by_numbers(kinds: Vec<Vec<Name>>, roles: &[(Axis, usize)], mut notes: Vec<Str
 }
 
 /// Says what the numbers and words were taken for, where there is more than slices one by one.
-fn tell_of_axes(kinds: &[Vec<Name>], roles: &[(Axis, usize)], slices: &[u128], notes: &mut Vec<String>) {
+fn note_axes(kinds: &[Vec<Name>], roles: &[(Axis, usize)], slices: &[u128], notes: &mut Vec<String>) {
     if kinds.len() > 1 {
         let listed: Vec<String> =
             kinds.iter().enumerate().map(|(n, kind)| format!("{n}: {}", kind[0].file())).collect();

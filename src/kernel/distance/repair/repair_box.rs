@@ -5,7 +5,7 @@ use crate::kernel::distance::features::source_trees::SourceTrees;
 
 /// The voxels that are looked at, and what is known of them and of those around.
 #[derive(Clone, Copy, Debug)]
-pub struct Look<'a> {
+pub struct RepairBox<'a> {
     /// The grid.
     pub geometry: &'a Geometry,
     /// The voxels that are looked at.
@@ -21,7 +21,7 @@ pub struct Look<'a> {
     pub labels: Option<Labels<'a>>,
 }
 
-impl Look<'_> {
+impl RepairBox<'_> {
     /// Voxels are looked at whose squared distance is below that.
     pub(super) fn counts_below(&self) -> f64 {
         self.lost_within.map_or(f64::INFINITY, |farthest| (farthest + self.geometry.max_spacing()).powi(2))

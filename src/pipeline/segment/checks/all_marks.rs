@@ -9,7 +9,7 @@ use crate::pipeline::segment::outlined::outlines::crossed;
 
 /// What was seen.
 #[derive(Debug, Default)]
-pub struct Looked {
+pub struct CheckedMarks {
     /// The objects whose marks can be those of the image.
     pub fit: Vec<ObjectMarks>,
     /// Those whose marks cannot.
@@ -24,24 +24,24 @@ const MOST_NAMED: usize = 8;
 /// Checks the marks of each object; `note` hears what is odd about them. Of those numbered in `unsure` nobody said whether
 /// their marks count voxels.
 #[must_use]
-pub fn look_at_marks(marked: &[ObjectMarks], grids: &Grids<'_>, unsure: &[u32], note: &dyn Fn(&str)) -> Looked {
-    let mut looked = Looked::default();
+pub fn check_all_marks(marked: &[ObjectMarks], grids: &Grids<'_>, unsure: &[u32], note: &dyn Fn(&str)) -> CheckedMarks {
+    let mut checked = CheckedMarks::default();
     for object in marked {
         let label = object.object;
         match check_marks(object, grids) {
             Ok(notes) => {
                 let doubts = if unsure.contains(&label) { doubts(object, grids.whole) } else { Vec::new() };
                 notes.iter().chain(&doubts).for_each(|text| note(text));
-                looked.fit.push(object.clone());
+                checked.fit.push(object.clone());
             }
             Err(error) => {
-                looked.refused.push(Refused { label, reason: error.to_string() });
-                looked.first_error.get_or_insert((label, error));
+                checked.refused.push(Refused { label, reason: error.to_string() });
+                checked.first_error.get_or_insert((label, error));
             }
         }
         note_outlines(object, grids, note);
     }
-    looked
+    checked
 }
 
 /// Says what is odd about the outlines of an object.
