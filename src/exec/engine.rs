@@ -340,6 +340,11 @@ impl<W: Send> Workers<W> {
         Self { idle: Mutex::default(), make: Box::new(make) }
     }
 
+    /// What a function tells of each set that is idle.
+    pub fn idle<R>(&self, tell: impl FnMut(&W) -> R) -> Vec<R> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).iter().map(tell).collect()
+    }
+
     /// Lends out a set that is idle, or a new one.
     pub fn with<R>(&self, f: impl FnOnce(&mut W) -> R) -> R {
         let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();

@@ -10,6 +10,7 @@ pub mod multilabel;
 pub use cubes::marching_cubes::{MarchingCubes, cells_of_brick};
 pub use mesh::components::Components;
 pub use mesh::edge_tally::EdgeTally;
+pub use mesh::growing::Growing;
 pub use mesh::measure::{Measures, SurfaceMeasure};
 pub use mesh::nearest::{Hausdorff, Nearest, PatchIndex};
 pub use mesh::patch::Patch;

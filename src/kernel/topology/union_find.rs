@@ -18,10 +18,9 @@ impl Forest {
         Self { above: (0..len as u32).collect() }
     }
 
-    /// Bytes of memory.
-    #[must_use]
-    pub fn bytes(&self) -> u64 {
-        (self.above.capacity() * size_of::<u32>()) as u64
+    /// What is held in memory: a place for each thing.
+    pub(crate) fn places(&self) -> &Vec<u32> {
+        &self.above
     }
 
     /// Enters a thing as a tree of its own; false when it is known.

@@ -12,7 +12,7 @@ use crate::kernel::surface::{
     Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder,
     cells_of_brick,
 };
-use crate::pipeline::output::drawn::{Drawn, STATED};
+use crate::pipeline::output::drawn::{Drawn, STATED, Wave};
 use crate::store::{BoxSource, MeshSink};
 
 /// Edge of the boxes that the surface is drawn in, whatever the bricks are: so these do not tell the order of vertices.
@@ -71,7 +71,7 @@ pub(super) fn draw(
     let (mut drawn, mut left) = (Drawn::new(stage), bricks.as_slice());
     while !left.is_empty() {
         let batch;
-        (batch, left) = left.split_at(drawn.batch().min(left.len()));
+        (batch, left) = left.split_at(drawn.next().min(left.len()));
         let patches = stage.run(batch, &workers, |worker, &id| worker.patch(labelled, &grid.brick_box(id), kind))?;
         for patch in patches.iter().filter(|patch| !patch.patch.triangles.is_empty()) {
             welder.add(&patch.patch, sink)?;
@@ -81,12 +81,23 @@ pub(super) fn draw(
                 pairs.add(patch.patch.pairs[n], positions, distances);
             }
         }
-        drawn.took(patches.iter().map(TaggedPatch::bytes), welder.bytes() + measure.bytes(), left.len())?;
+        drawn.took(&Wave {
+            patches: &patches.iter().map(TaggedPatch::bytes).collect::<Vec<_>>(),
+            buffers: &workers.idle(Worker::bytes),
+            last: welder.bytes_of_last(),
+            tables: &[welder.tables().as_slice(), &measure.tables()].concat(),
+            left: left.len(),
+        })?;
     }
     Ok((measure.measures(), pairs.finish()))
 }
 
 impl Worker {
+    fn bytes(&self) -> u64 {
+        let dense = (self.sources.capacity() + self.labels.capacity()) * size_of::<u32>();
+        self.interfaces.bytes() + self.nearby.bytes() + self.cubes.bytes() + dense as u64
+    }
+
     fn patch(&mut self, labelled: &Labelled<'_>, brick: &Box3, kind: SurfaceKind) -> Result<TaggedPatch> {
         let mut patch = TaggedPatch::default();
         let Labelled { geometry, shapes, trees, .. } = *labelled;
@@ -116,6 +127,7 @@ impl Worker {
                 patch.distances = self.distances_of(labelled, &part, &patch);
             }
         }
+        patch.shrink();
         Ok(patch)
     }
 

@@ -60,6 +60,12 @@ pub struct Culling {
 }
 
 impl Culling {
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (self.closest.capacity() * size_of::<([f64; 3], f64)>()) as u64
+    }
+
     /// Appends those of the candidates from `first` on that can be the nearest of them to a place in a box.
     pub fn keep(
         &mut self,

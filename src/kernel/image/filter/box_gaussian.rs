@@ -34,6 +34,12 @@ impl Gaussian {
         self.weights.len() as i64 - 1
     }
 
+    /// Bytes of memory that stay between boxes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.passes.iter().map(|pass| (pass.capacity() * size_of::<f32>()) as u64).sum()
+    }
+
     /// Fills `out` with the smoothed values on `part`; `values` are dense over `around`.
     pub fn smooth(&mut self, values: impl Iterator<Item = f32>, around: &Box3, part: &Box3, out: &mut Vec<f32>) {
         let [first, second] = &mut self.passes;

@@ -63,6 +63,12 @@ impl MarchingCubes {
         Self { profile: Profile::Logistic, ..Self::new(0.5) }
     }
 
+    /// Bytes of memory that stay between bricks.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (self.vertex_on.capacity() * size_of::<u32>()) as u64
+    }
+
     /// Fills `patch` with the surface in `cells`, given by their lowest corners.
     ///
     /// `values` is dense `[z][y][x]` over `part`, in voxel indices of the domain; it holds no NaN.

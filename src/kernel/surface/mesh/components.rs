@@ -1,5 +1,6 @@
 //! `Components`: how many connected pieces a mesh has, counted while its triangles pass.
 
+use super::growing::Growing;
 use crate::kernel::topology::union_find::Forest;
 
 /// The pieces of a mesh; two vertices are in one when triangles connect them.
@@ -28,10 +29,10 @@ impl Components {
         self.count
     }
 
-    /// Bytes of memory.
+    /// What it holds in memory.
     #[must_use]
-    pub fn bytes(&self) -> u64 {
-        self.forest.bytes()
+    pub fn table(&self) -> Growing {
+        Growing::of_list(self.forest.places())
     }
 
     /// Number of vertices that triangles have.

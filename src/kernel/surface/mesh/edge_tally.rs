@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use super::growing::Growing;
+
 /// The directed edges whose opposite has not come yet.
 ///
 /// In a closed, consistently oriented mesh each edge is walked once in either direction for every pair of triangles
@@ -11,6 +13,8 @@ use std::collections::HashMap;
 pub struct EdgeTally {
     waiting: HashMap<(u32, u32), u32>,
     open: u64,
+    /// Entries that waited at the same time.
+    most: usize,
 }
 
 impl EdgeTally {
@@ -29,10 +33,10 @@ impl EdgeTally {
         self.open
     }
 
-    /// Bytes of memory.
+    /// What it holds in memory.
     #[must_use]
-    pub fn bytes(&self) -> u64 {
-        table_bytes(&self.waiting)
+    pub fn table(&self) -> Growing {
+        Growing::of_table(&self.waiting, self.most)
     }
 
     fn walk(&mut self, from: u32, to: u32) {
@@ -45,13 +49,9 @@ impl EdgeTally {
         } else {
             self.open += 1;
             *self.waiting.entry((from, to)).or_insert(0) += 1;
+            self.most = self.most.max(self.waiting.len());
         }
     }
-}
-
-/// Bytes of a table: for each place an entry and a byte, an eighth of them empty.
-pub(super) fn table_bytes<K, V>(table: &HashMap<K, V>) -> u64 {
-    (table.capacity() + table.capacity() / 7) as u64 * (size_of::<(K, V)>() as u64 + 1)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::growing::Growing;
 use crate::kernel::surface::{Components, EdgeTally};
 
 /// Running sums over triangles, in f64 and in the order the triangles come.
@@ -68,10 +69,10 @@ impl SurfaceMeasure {
         self.components.add(corners);
     }
 
-    /// Bytes of memory: edges of the layer that is drawn, and a number for each vertex.
+    /// What it holds in memory: edges of the layer that is drawn, and a number for each vertex.
     #[must_use]
-    pub fn bytes(&self) -> u64 {
-        self.edges.bytes() + self.components.bytes()
+    pub fn tables(&self) -> [Growing; 2] {
+        [self.edges.table(), self.components.table()]
     }
 
     /// The measures of all triangles so far.

@@ -2,6 +2,7 @@
 
 pub(crate) mod components;
 pub(crate) mod edge_tally;
+pub(crate) mod growing;
 pub(crate) mod measure;
 pub(crate) mod nearest;
 pub(crate) mod patch;

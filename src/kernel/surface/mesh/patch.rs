@@ -19,6 +19,14 @@ pub struct Patch {
 }
 
 impl Patch {
+    /// Gives back what it does not fill: it waits to be welded.
+    pub fn shrink(&mut self) {
+        self.keys.shrink_to_fit();
+        self.positions.shrink_to_fit();
+        self.triangles.shrink_to_fit();
+        self.pairs.shrink_to_fit();
+    }
+
     /// Bytes of memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::edge_tally::table_bytes;
+use super::growing::Growing;
 use super::patch::Patch;
 use super::vertex_key::VertexKey;
 use crate::error::{Error, Result};
@@ -22,6 +22,8 @@ pub struct Welder {
     is_single: bool,
     /// Numbers of the vertices that a later patch may share.
     shared: HashMap<VertexKey, u32>,
+    /// How many there were at the same time.
+    most_shared: usize,
     /// The z index at which the current layer of cells starts.
     layer: i64,
     vertices: u64,
@@ -39,6 +41,7 @@ impl Welder {
             geometry: geometry.clone(),
             is_single: geometry.fits_single(),
             shared: HashMap::new(),
+            most_shared: 0,
             layer: i64::MIN,
             vertices: 0,
             triangles: 0,
@@ -47,11 +50,16 @@ impl Welder {
         }
     }
 
-    /// Bytes of memory: what later patches may share, and the last one's vertices.
+    /// What it holds in memory whatever patches are next: those of their vertices that later ones may share.
     #[must_use]
-    pub fn bytes(&self) -> u64 {
-        let of_last = self.numbers.capacity() * size_of::<u32>() + self.world.capacity() * size_of::<[f64; 3]>();
-        table_bytes(&self.shared) + of_last as u64
+    pub fn tables(&self) -> [Growing; 1] {
+        [Growing::of_table(&self.shared, self.most_shared)]
+    }
+
+    /// Bytes of memory that the last patch's vertices take.
+    #[must_use]
+    pub fn bytes_of_last(&self) -> u64 {
+        (self.numbers.capacity() * size_of::<u32>() + self.world.capacity() * size_of::<[f64; 3]>()) as u64
     }
 
     /// Adds a patch: its new vertices in world coordinates, then its triangles, outward as the patch has them.
@@ -109,6 +117,7 @@ impl Welder {
         self.vertices += 1;
         if is_shared {
             self.shared.insert(key, number);
+            self.most_shared = self.most_shared.max(self.shared.len());
         }
         Ok(number)
     }

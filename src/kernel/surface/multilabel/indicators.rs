@@ -80,6 +80,14 @@ impl Indicators {
         }
     }
 
+    /// Bytes of memory.
+    pub(crate) fn bytes(&self) -> u64 {
+        let of_fields: usize =
+            self.narrow.iter().chain(&self.excess).map(|field| field.capacity() * size_of::<f32>()).sum();
+        let of_labels = self.labels.capacity() * size_of::<u32>();
+        (of_fields + of_labels) as u64 + self.gaussians.iter().map(Gaussian::bytes).sum::<u64>()
+    }
+
     /// Whether there is one label only.
     pub(crate) fn is_one(&self) -> bool {
         self.names.len() < 2

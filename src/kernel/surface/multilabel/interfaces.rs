@@ -18,6 +18,7 @@ use super::polygon::{self, Point};
 use super::splits::Splits;
 use super::tetrahedron::{ORDERS, Tetrahedron, corner_of};
 use crate::grid::Box3;
+use crate::kernel::surface::mesh::growing::table_bytes;
 use crate::kernel::surface::mesh::patch::Patch;
 use crate::kernel::surface::mesh::vertex_key::VertexKey;
 
@@ -31,6 +32,12 @@ pub struct TaggedPatch {
 }
 
 impl TaggedPatch {
+    /// Gives back what it does not fill: it waits to be welded.
+    pub fn shrink(&mut self) {
+        self.patch.shrink();
+        self.distances.shrink_to_fit();
+    }
+
     /// Bytes of memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {
@@ -74,6 +81,13 @@ impl Interfaces {
                 }
             }
         }
+    }
+
+    /// Bytes of memory that stay between bricks.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let normals = self.normals.capacity() * size_of::<[f64; 3]>();
+        self.splits.bytes() + table_bytes(&self.vertices) + normals as u64
     }
 
     fn cut_cell(&mut self, known: &Known<'_>, cell: [i64; 3], patch: &mut TaggedPatch) {

@@ -72,6 +72,15 @@ impl Nearby {
         }
     }
 
+    /// Bytes of memory that stay between boxes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let of_blocks = self.blocks.capacity() * size_of::<Range<usize>>();
+        let of_lists = self.lists.capacity() * size_of::<(u32, Range<usize>)>();
+        let of_sources = self.sources.capacity() * size_of::<Candidate>();
+        (of_blocks + of_lists + of_sources) as u64 + self.culling.bytes()
+    }
+
     /// Keeps what a small block needs of the sources, by label, of the large one around it; of none where they are many.
     fn enter_block(
         &mut self,

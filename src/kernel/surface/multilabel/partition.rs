@@ -12,6 +12,7 @@ use super::indicators::{Indicators, RADIUS};
 use super::polygon;
 use super::tetrahedron::{ORDERS, Tetrahedron, corner_of};
 use crate::grid::Box3;
+use crate::kernel::surface::mesh::growing::table_bytes;
 use crate::kernel::surface::mesh::patch::Patch;
 use crate::kernel::surface::mesh::vertex_key::VertexKey;
 
@@ -44,6 +45,12 @@ impl Partition {
                 self.cut_cell(&part, [x, y, z], patch);
             }
         }
+    }
+
+    /// Bytes of memory that stay between bricks.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.indicators.bytes() + table_bytes(&self.vertices)
     }
 
     fn cut_cell(&mut self, part: &Box3, cell: [i64; 3], patch: &mut Patch) {

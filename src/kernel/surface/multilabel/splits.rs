@@ -45,6 +45,13 @@ struct Others {
 }
 
 impl Splits {
+    /// Bytes of memory.
+    pub(crate) fn bytes(&self) -> u64 {
+        let of_voxels = self.is_near.capacity() + self.others.capacity() * size_of::<Option<Others>>();
+        let of_edges = self.edges.capacity() * size_of::<u32>() + self.corners.capacity() * size_of::<Corner>();
+        (of_voxels + of_edges) as u64
+    }
+
     /// Forgets the last brick, and finds out where in this one different labels are near.
     pub(crate) fn enter(&mut self, known: &Known<'_>) {
         let part = known.part;

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
 use crate::kernel::surface::{Contact, Contacts, PARTITION_REACH, Partition, Patch, Welder, cells_of_brick};
-use crate::pipeline::output::drawn::Drawn;
+use crate::pipeline::output::drawn::{Drawn, Wave};
 use crate::store::{BoxSource, MeshSink};
 
 /// Sends the surfaces between labels, and to what has none, to `sink`; measures what lies between each two.
@@ -26,7 +26,7 @@ pub fn draw(
     let (mut drawn, mut left) = (Drawn::new(stage), bricks.as_slice());
     while !left.is_empty() {
         let batch;
-        (batch, left) = left.split_at(drawn.batch().min(left.len()));
+        (batch, left) = left.split_at(drawn.next().min(left.len()));
         let patches = stage.run(batch, &workers, |(partition, values), &id| {
             patch(partition, values, joined, geometry, &grid.brick_box(id))
         })?;
@@ -36,7 +36,13 @@ pub fn draw(
                 contacts.add(pair, positions);
             }
         }
-        drawn.took(patches.iter().map(Patch::bytes), welder.bytes(), left.len())?;
+        drawn.took(&Wave {
+            patches: &patches.iter().map(Patch::bytes).collect::<Vec<_>>(),
+            buffers: &workers.idle(|(partition, values)| partition.bytes() + 4 * values.capacity() as u64),
+            last: welder.bytes_of_last(),
+            tables: &welder.tables(),
+            left: left.len(),
+        })?;
     }
     Ok(contacts.finish())
 }
@@ -64,5 +70,6 @@ fn patch(
         values[around.offset_of([inside.lo[0], y, z])..][..row.len()].copy_from_slice(row);
     }
     partition.extract(values, &around, &cells, &mut patch);
+    patch.shrink();
     Ok(patch)
 }
