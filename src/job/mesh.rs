@@ -56,6 +56,10 @@ impl<'a> Drawing<'a> {
 }
 
 impl MeshSink for Drawing<'_> {
+    fn on_grid(&mut self, grid: &Geometry) -> Result<()> {
+        self.to.on_grid(grid)
+    }
+
     fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
         self.to.vertex(position)?;
         self.file.as_mut().map_or(Ok(()), |file| file.vertex(position))

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Element, ElementType, Sample, SamplesMut};
 use crate::error::Result;
-use crate::grid::{Box3, TriangleMesh};
+use crate::grid::{Box3, Geometry, TriangleMesh};
 
 /// Something from which any box of a volume can be read, from any thread.
 pub trait BoxSource<T: Element>: Sync {
@@ -170,6 +170,14 @@ fn read_planes<T: Sample>(source: &impl PlaneSource, part: &Box3, out: &mut [T])
 
 /// Something that takes a triangle mesh as it is found: a file, a buffer in memory.
 pub trait MeshSink {
+    /// Hears on which grid the result is, before the first vertex, where that is found together with the surface.
+    ///
+    /// # Errors
+    /// When the mesh cannot be written on it.
+    fn on_grid(&mut self, _grid: &Geometry) -> Result<()> {
+        Ok(())
+    }
+
     /// Takes the next vertex, a world position `[x, y, z]`; vertices are numbered from 0 in the order they come.
     ///
     /// # Errors

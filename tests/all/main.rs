@@ -23,6 +23,7 @@ mod maximum_principle;
 mod memory;
 mod mesh_dialects;
 mod mesh_faults;
+mod mesh_files;
 mod mesh_ply;
 mod mesh_sources;
 mod middle;

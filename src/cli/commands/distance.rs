@@ -13,7 +13,7 @@ use crate::cli::inputs::settings;
 use crate::cli::inputs::sources::{Read, read_sets};
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::disk::Disk;
-use crate::cli::outputs::drawing::Drawing;
+use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
@@ -25,7 +25,6 @@ use crate::cli::terminal::text::{bytes, duration, grouped, place, triple};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{DataSets, Geometry};
-use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
 use crate::job::resources::Resources;
 use crate::kernel::distance::state::precision::Precision;
@@ -33,7 +32,7 @@ use crate::pipeline::distance::{
     DistanceSettings, Init, Needs, Schedule, Writes, check_iterations, distance, outside_note,
 };
 use crate::pipeline::middle::{MiddleSettings, middle};
-use crate::store::{MeshSink, Unfinished};
+use crate::store::MeshSink;
 
 /// A distance that is ready to be computed: all inputs are read and checked.
 struct Job {
@@ -137,22 +136,20 @@ impl Job {
     fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {
         let output = &self.args.job.output;
         let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
-        let passing = tempfile::tempdir_in(&self.resources.scratch)
-            .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
-        let _passes = Unfinished::new(passing.path());
         let store = output.begin_store()?;
+        let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
+        let to = mesh.map(|path| ToFile { path, scratch, is_tagged: true, is_copy });
         let has_surface = self.middle.is_some();
-        let drawing = Drawing::new(store.as_ref().filter(|_| has_surface), mesh, passing.path())?;
-        let mut ply = drawing.start(|path| PlyWriter::tagged_on_grid(path, &self.geometry))?;
-        let found = self.solve::<P>(engine, store.as_ref(), ply.sink())?;
-        ply.finish()?;
+        let mut drawing = Drawing::new(store.as_ref().filter(|_| has_surface), to, &self.geometry, true)?;
+        let found = self.solve::<P>(engine, store.as_ref(), &mut drawing)?;
+        let file = drawing.finish()?;
         note_anchor(mesh, &self.geometry, &self.console);
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;
             store.finish()?;
         }
-        drawing.export(output.store(), &self.geometry)?;
+        file.map_or(Ok(()), Finished::place)?;
         match &output.report {
             Some(path) => self.report(engine, &found).write(path)?,
             None => engine.check()?,

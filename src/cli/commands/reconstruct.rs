@@ -14,7 +14,7 @@ use crate::cli::inputs::noted::read_told;
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::disk::Disk;
-use crate::cli::outputs::drawing::Drawing;
+use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::print;
 use crate::cli::report::run_report::{Hausdorff, Hole, Moves, Ran, Report};
@@ -26,13 +26,11 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
 use crate::io::geometry::read::source::Source;
-use crate::io::geometry::write::ply::PlyWriter;
 use crate::job::resources::Resources;
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct, refuse_too_fine, spacing_memory,
     typical_spacing, without_isolated,
 };
-use crate::store::Unfinished;
 
 /// Points without three others within so many spacings stand alone, where nothing else is said.
 const ISOLATED_SPACINGS: f64 = 4.0;
@@ -208,15 +206,13 @@ impl Job {
 
     fn solve_and_write(&self, engine: &Engine) -> Result<Reconstruction> {
         let output = &self.args.output;
-        let passing = tempfile::tempdir_in(&self.resources.scratch)
-            .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
-        let _passes = Unfinished::new(passing.path());
         let store = output.begin_store()?;
-        let mesh = Drawing::new(store.as_ref(), self.args.mesh.as_deref(), passing.path())?;
-        let mut ply = mesh.start(|path| PlyWriter::on_grid(path, &self.grid))?;
-        let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, ply.sink())
+        let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
+        let to = self.args.mesh.as_deref().map(|path| ToFile { path, scratch, is_tagged: false, is_copy });
+        let mut drawing = Drawing::new(store.as_ref(), to, &self.grid, false)?;
+        let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, &mut drawing)
             .map_err(|error| error.at(&self.args.cloud))?;
-        ply.finish()?;
+        let mesh = drawing.finish()?;
         if let Some(store) = &store {
             found.write(engine, store)?;
         }
@@ -228,7 +224,7 @@ impl Job {
             store.finish()?;
         }
         engine.check()?;
-        mesh.export(output.store(), &found.geometry)?;
+        mesh.map_or(Ok(()), Finished::place)?;
         if let Some(path) = &output.report {
             self.report(engine, &found).write(path)?;
         }

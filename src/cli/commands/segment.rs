@@ -12,7 +12,8 @@ use crate::cli::inputs::image::{chosen_notes, crop_box, open_stack};
 use crate::cli::inputs::marks::{Marks, Objects, Reading, check_all_marks, read_marks};
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::{Outputs, numbered};
-use crate::cli::outputs::files::{export_mesh, mesh_format, note_anchor};
+use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
+use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::print;
 use crate::cli::report::run_report::{Found, Ran, Report, Settings, Solver, crop_xyz};
 use crate::cli::report::{picture, table};
@@ -26,7 +27,8 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::io::stack::volume::Stack;
 use crate::job::resources::Resources;
 use crate::pipeline::segment::{
-    Estimate, Grids, Guides, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing, segment,
+    Estimate, Grids, Guides, ObjectMeshes, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing,
+    segment,
 };
 use crate::store::Unfinished;
 use notes::refusal;
@@ -136,10 +138,9 @@ impl Job {
         Guides { geometry: &self.geometry, objects: &self.objects.fit, refused: &self.objects.refused }
     }
 
-    /// Fields are written out, or needed for what is drawn from them.
+    /// Fields are written out, or needed for a picture of them.
     fn needs_store(&self) -> bool {
-        let drawn = &self.args.drawn;
-        self.args.output.store().is_some() || drawn.mesh.is_some() || drawn.picture.is_some()
+        self.args.output.store().is_some() || self.args.drawn.picture.is_some()
     }
 
     /// Runs the segmentation and writes all that was asked for; returns what was found.
@@ -188,7 +189,10 @@ impl Job {
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
             store => store,
         };
-        let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, store.as_ref())
+        let meshes = self.mesh_files();
+        let taken = meshes.as_ref().map(|meshes| meshes as &dyn ObjectMeshes);
+        let out = (store.as_ref(), taken);
+        let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, out)
             .map_err(|error| self.marks.named_in(error))?;
         self.note_findings(&outcome);
         note_anchor(self.args.drawn.mesh.as_deref(), &self.geometry, &self.console);
@@ -211,20 +215,21 @@ impl Job {
             }
             (None, _) => PathBuf::new(),
         };
+        meshes.map_or(Ok(()), ObjectFiles::place)?;
         self.write_copies(engine, &outcome, &folder)?;
         Ok(outcome)
     }
 
-    /// The files beside the store.
+    /// The files that surfaces are drawn into, where they were asked for.
+    fn mesh_files(&self) -> Option<ObjectFiles<'_>> {
+        let path = self.args.drawn.mesh.as_deref()?;
+        let (scratch, is_copy) = (self.resources.scratch.as_path(), self.args.output.store().is_some());
+        let to = ToFile { path, scratch, is_tagged: false, is_copy };
+        Some(ObjectFiles::new(to, self.objects.numbers().len() > 1, &self.geometry))
+    }
+
+    /// The picture and the report beside the store.
     fn write_copies(&self, engine: &Engine, outcome: &Outcome, folder: &Path) -> Result<()> {
-        if let Some(path) = &self.args.drawn.mesh {
-            for object in &outcome.objects {
-                let several = outcome.objects.len() + outcome.refused.len() > 1;
-                let name = if several { format!("object-{}.ply", object.label) } else { "surface.ply".into() };
-                let target = if several { numbered(path, object.label) } else { path.clone() };
-                export_mesh(&folder.join("meshes").join(name), &self.geometry, &target)?;
-            }
-        }
         if let Some(path) = &self.args.drawn.picture {
             picture::draw(folder, self.centre(), path)?;
         }

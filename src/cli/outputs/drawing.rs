@@ -1,60 +1,216 @@
-//! Where a surface goes while it is drawn: into the store, or a passing file if only a mesh is asked for; from there in the
-//! format that its name asks for.
+//! Where a surface goes while it is drawn: into the store and into the file that its name was asked for, in the format of that.
+//! What goes wrong with a file beside a store is told when the store is complete: it costs a copy, not the result.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
-use super::files::export_mesh;
+use super::checks::numbered;
+use super::files::mesh_format;
 use crate::error::Result;
 use crate::grid::Geometry;
+use crate::io::geometry::write::formats::{MeshFile, WholeMesh};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
-use crate::store::{MeshSink, NoMesh};
-
-/// The files of a surface.
-pub(crate) struct Drawing<'a> {
-    ply: Option<PathBuf>,
-    asked: Option<&'a Path>,
-}
+use crate::pipeline::segment::{ObjectMesh, ObjectMeshes};
+use crate::store::MeshSink;
 
 /// A surface that is being drawn.
-pub(crate) struct Started(Option<PlyWriter>, NoMesh);
+#[derive(Default)]
+pub(crate) struct Drawing {
+    ply: Option<PlyWriter>,
+    asked: Option<Asked>,
+}
 
-impl<'a> Drawing<'a> {
-    /// The surface of a store, and in the file that was `asked` for; in the folder `passing` where there is no store.
-    pub(crate) fn new(store: Option<&StoreWriter>, asked: Option<&'a Path>, passing: &Path) -> Result<Self> {
-        let ply = match store {
-            Some(store) => Some(store.file("meshes/surface.ply")?),
-            None => asked.map(|_| passing.join("surface.ply")),
-        };
-        Ok(Self { ply, asked })
+/// A mesh file that was asked for.
+#[derive(Clone, Copy)]
+pub(crate) struct ToFile<'a> {
+    pub(crate) path: &'a Path,
+    /// The folder of temporary files.
+    pub(crate) scratch: &'a Path,
+    /// Whether triangles have labels.
+    pub(crate) is_tagged: bool,
+    /// Whether the surface is in a store too.
+    pub(crate) is_copy: bool,
+}
+
+/// The file while it is written; what went wrong with a copy.
+struct Asked {
+    file: Result<MeshFile>,
+    is_copy: bool,
+}
+
+/// A file that was asked for, without its name yet; or what went wrong with a copy.
+pub(crate) struct Finished(Result<WholeMesh>);
+
+impl Drawing {
+    /// The surface on a grid, into a store and a file as far as these are there.
+    pub(crate) fn new(
+        store: Option<&StoreWriter>,
+        to: Option<ToFile<'_>>,
+        geometry: &Geometry,
+        is_tagged: bool,
+    ) -> Result<Self> {
+        let create = if is_tagged { PlyWriter::tagged_on_grid } else { PlyWriter::on_grid };
+        let ply = store.map(|store| create(&store.file("meshes/surface.ply")?, geometry)).transpose()?;
+        Ok(Self { ply, asked: to.map(|to| Asked::new(to, geometry)).transpose()? })
     }
 
-    /// Begins the file that is drawn into, where one is needed.
-    pub(crate) fn start(&self, create: impl FnOnce(&Path) -> Result<PlyWriter>) -> Result<Started> {
-        Ok(Started(self.ply.as_deref().map(create).transpose()?, NoMesh))
-    }
-
-    /// Writes the file that was asked for. `store` is where the store lies by now.
-    pub(crate) fn export(&self, store: Option<&Path>, geometry: &Geometry) -> Result<()> {
-        let (Some(ply), Some(asked)) = (&self.ply, self.asked) else { return Ok(()) };
-        match store {
-            Some(store) => export_mesh(&store.join("meshes/surface.ply"), geometry, asked),
-            None => export_mesh(ply, geometry, asked),
-        }
+    /// Completes the files; that which was asked for gets its name later.
+    pub(crate) fn finish(self) -> Result<Option<Finished>> {
+        self.ply.map_or(Ok(()), PlyWriter::finish)?;
+        self.asked.map(Asked::finish).transpose()
     }
 }
 
-impl Started {
-    /// What takes the surface.
-    pub(crate) fn sink(&mut self) -> &mut dyn MeshSink {
-        match &mut self.0 {
-            Some(ply) => ply,
-            None => &mut self.1,
+impl Asked {
+    fn new(to: ToFile<'_>, geometry: &Geometry) -> Result<Self> {
+        let format = mesh_format(to.path)?;
+        let file = MeshFile::create(format, to.path, geometry, to.is_tagged, to.scratch)?;
+        Ok(Self { file: Ok(file), is_copy: to.is_copy })
+    }
+
+    fn take(&mut self, take: impl FnOnce(&mut MeshFile) -> Result<()>) -> Result<()> {
+        let Ok(file) = &mut self.file else { return Ok(()) };
+        match take(file) {
+            Err(error) if self.is_copy => {
+                self.file = Err(error);
+                Ok(())
+            }
+            taken => taken,
         }
     }
 
-    /// Completes the file.
-    pub(crate) fn finish(self) -> Result<()> {
-        self.0.map_or(Ok(()), PlyWriter::finish)
+    fn finish(self) -> Result<Finished> {
+        let whole = self.file.and_then(MeshFile::complete);
+        Ok(Finished(if self.is_copy { whole } else { Ok(whole?) }))
+    }
+}
+
+impl Finished {
+    /// Puts the file under its name.
+    pub(crate) fn place(self) -> Result<()> {
+        self.0?.place()
+    }
+}
+
+impl MeshSink for Asked {
+    fn on_grid(&mut self, grid: &Geometry) -> Result<()> {
+        self.take(|file| file.on_grid(grid))
+    }
+
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
+        self.take(|file| file.vertex(position))
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
+        self.take(|file| file.triangle(corners))
+    }
+
+    fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> Result<()> {
+        self.take(|file| file.facet(corners, labels))
+    }
+}
+
+impl MeshSink for Drawing {
+    fn on_grid(&mut self, grid: &Geometry) -> Result<()> {
+        self.asked.as_mut().map_or(Ok(()), |asked| asked.on_grid(grid))
+    }
+
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
+        self.ply.as_mut().map_or(Ok(()), |ply| ply.vertex(position))?;
+        self.asked.as_mut().map_or(Ok(()), |asked| asked.vertex(position))
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
+        self.ply.as_mut().map_or(Ok(()), |ply| ply.triangle(corners))?;
+        self.asked.as_mut().map_or(Ok(()), |asked| asked.triangle(corners))
+    }
+
+    fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> Result<()> {
+        self.ply.as_mut().map_or(Ok(()), |ply| ply.facet(corners, labels))?;
+        self.asked.as_mut().map_or(Ok(()), |asked| asked.facet(corners, labels))
+    }
+}
+
+/// The files of several objects, or that of one.
+pub(crate) struct ObjectFiles<'a> {
+    to: ToFile<'a>,
+    several: bool,
+    /// The grid of all objects.
+    geometry: &'a Geometry,
+    finished: Mutex<Vec<(u32, Finished)>>,
+}
+
+/// The file of one object.
+struct ObjectFile<'a> {
+    of: &'a ObjectFiles<'a>,
+    label: u32,
+    asked: Asked,
+}
+
+impl<'a> ObjectFiles<'a> {
+    /// Files by the name that was asked for, numbered where there are several objects.
+    pub(crate) fn new(to: ToFile<'a>, several: bool, geometry: &'a Geometry) -> Self {
+        Self { to, several, geometry, finished: Mutex::default() }
+    }
+
+    /// Puts all files under their names.
+    pub(crate) fn place(self) -> Result<()> {
+        let mut finished = self.finished.into_inner().unwrap_or_else(PoisonError::into_inner);
+        finished.sort_by_key(|(label, _)| *label);
+        finished.into_iter().try_for_each(|(_, file)| file.place())
+    }
+}
+
+impl ObjectMeshes for ObjectFiles<'_> {
+    fn begin(&self, label: u32, grid: &Geometry) -> Result<Box<dyn ObjectMesh + '_>> {
+        let numbered = numbered(self.to.path, label);
+        let path = if self.several { &numbered } else { self.to.path };
+        let mut asked = Asked::new(ToFile { path, ..self.to }, grid)?;
+        // All are seen from one place.
+        asked.on_grid(self.geometry)?;
+        Ok(Box::new(ObjectFile { of: self, label, asked }))
+    }
+}
+
+impl MeshSink for ObjectFile<'_> {
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
+        self.asked.vertex(position)
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
+        self.asked.triangle(corners)
+    }
+}
+
+impl ObjectMesh for ObjectFile<'_> {
+    fn keep(self: Box<Self>) -> Result<()> {
+        let finished = (self.label, self.asked.finish()?);
+        self.of.finished.lock().unwrap_or_else(PoisonError::into_inner).push(finished);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// STL cannot be written of a triangle whose vertices are not known.
+    #[test]
+    fn a_copy_that_fails_costs_no_result() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.stl");
+        let geometry = Geometry { shape: [9; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+        let to = |is_copy| ToFile { path: &path, scratch: folder.path(), is_tagged: false, is_copy };
+        let mut alone = Drawing::new(None, Some(to(false)), &geometry, false).unwrap();
+        assert!(alone.triangle([0, 1, 2]).is_err());
+        drop(alone);
+        let mut copy = Drawing::new(None, Some(to(true)), &geometry, false).unwrap();
+        copy.triangle([0, 1, 2]).unwrap();
+        copy.vertex([0.0; 3]).unwrap();
+        let finished = copy.finish().unwrap().unwrap();
+        let error = finished.place().unwrap_err().to_string();
+        assert!(error.contains("m.stl: the mesh cannot be written"), "{error}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing stays of either");
     }
 }

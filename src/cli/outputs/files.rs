@@ -9,7 +9,7 @@ use crate::cli::terminal::console::Console;
 use crate::error::{Error, Result};
 use crate::exec::Progress;
 use crate::grid::Geometry;
-use crate::io::geometry::write::export::{FORMATS, Format};
+use crate::io::geometry::write::formats::{FORMATS, Format};
 use crate::job::resources::folder_of;
 use crate::store::Unfinished;
 
@@ -29,13 +29,6 @@ pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<&File>)
     drop(sink);
     unfinished.finish(|| file.persist(path)).map_err(|error| error.error)?;
     Ok(())
-}
-
-/// Writes a finished PLY mesh on a grid in the format that the name of `to` asks for, whole or not at all.
-pub(crate) fn export_mesh(ply: &Path, geometry: &Geometry, to: &Path) -> Result<()> {
-    let format = mesh_format(to)?;
-    write_whole(to, |sink| format.export(ply, geometry.anchor(), sink))
-        .map_err(|error| Error::from_io("the mesh cannot be written", &error).at(to))
 }
 
 /// Says from where positions are seen in a mesh file that cannot hold them as they are.

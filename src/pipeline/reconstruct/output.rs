@@ -134,6 +134,8 @@ pub fn reconstruct(
     let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
     let (mut band, held_by_box) = enclosure.into_band(engine, "")?;
     let evolution = solve(engine, &geometry, cloud, settings, &mut band, &mut sheet)?;
+    let told = if settings.keeps_grid { grid.clone() } else { geometry.clone() };
+    mesh.on_grid(&told)?;
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
     let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh)?;
@@ -142,7 +144,7 @@ pub fn reconstruct(
         return Err(vanished(settings, grid, larger_beta));
     }
     Ok(Reconstruction {
-        geometry: if settings.keeps_grid { grid.clone() } else { geometry },
+        geometry: told,
         beta,
         hole,
         spaces,

@@ -1,6 +1,7 @@
 //! All objects: looked at together, solved each for itself, small ones side by side; their surfaces drawn and checked.
 
 use super::begun::Solution;
+use super::meshes::{ObjectMeshes, Surface};
 use super::object::solve;
 use super::object_report::ObjectReport;
 use super::object_report::Refused;
@@ -20,7 +21,7 @@ use crate::pipeline::enclosure::region::voxel_bounds;
 use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
-use crate::store::{Element, ElementType, NoMesh};
+use crate::store::{Element, ElementType};
 
 /// What was solved, in order of the labels, and what was not.
 pub(super) struct Objects {
@@ -38,7 +39,7 @@ pub(super) fn solve_all<T: Element>(
     picture: &Picture<'_, T>,
     guides: &Guides<'_>,
     settings: &SegmentSettings,
-    store: Option<&StoreWriter>,
+    (store, meshes): (Option<&StoreWriter>, Option<&dyn ObjectMeshes>),
 ) -> Result<Objects> {
     let (objects, mut refused) = (guides.objects, guides.refused.to_vec());
     let several = objects.len() + refused.len() > 1;
@@ -53,7 +54,7 @@ pub(super) fn solve_all<T: Element>(
         let outlined = outlined[n].as_ref();
         let solved = solve(engine, &picture, &local[n], outlined.zip(trusts[n]), settings).and_then(|solution| {
             let solution = solution.moved(origin);
-            let mut report = draw(engine, &solution, &objects[n], settings, store, several)?;
+            let mut report = draw(engine, &solution, &objects[n], settings, (store, meshes), several)?;
             if let Some(outlined) = outlined.filter(|_| settings.cross_validate) {
                 report.cross_validation = cross_validate(engine, outlined, &grid)?;
             }
@@ -137,31 +138,23 @@ fn draw(
     solution: &Solution,
     marks: &ObjectMarks,
     settings: &SegmentSettings,
-    store: Option<&StoreWriter>,
+    (store, meshes): (Option<&StoreWriter>, Option<&dyn ObjectMeshes>),
     several: bool,
 ) -> Result<ObjectReport> {
     let (u, geometry, label) = (&solution.u, &solution.geometry, marks.object);
     let stage = engine.stage(&format!("surface {label}"), 0);
     let name = if several { format!("meshes/object-{label}.ply") } else { "meshes/surface.ply".into() };
-    let mesh = store.map(|store| store.file(&name)).transpose()?;
-    let points = marks.contours.concat();
-    let Drawn { measures, hausdorff, lost_points } = match &mesh {
-        Some(path) => {
-            let mut ply = PlyWriter::on_grid(path, geometry)?;
-            let drawn = surface::draw(&stage, u, geometry, &points, &mut ply)?;
-            ply.finish()?;
-            drawn
-        }
-        None => surface::draw(&stage, u, geometry, &points, &mut NoMesh)?,
+    let mut mesh = Surface {
+        file: store.map(|store| PlyWriter::on_grid(&store.file(&name)?, geometry)).transpose()?,
+        taken: meshes.map(|meshes| meshes.begin(label, geometry)).transpose()?,
     };
+    let points = marks.contours.concat();
+    let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, u, geometry, &points, &mut mesh)?;
     stage.voxels(solution.band_voxels);
     stage.finish();
-    let left = check_left(marks, solution, measures.triangles, settings);
-    if let Err(error) = left.and_then(|()| check_surface(marks, geometry, hausdorff)) {
-        // Nothing stays of what is refused; a file that cannot be removed goes with its store.
-        let _ = mesh.map(std::fs::remove_file);
-        return Err(error);
-    }
+    check_left(marks, solution, measures.triangles, settings)?;
+    check_surface(marks, geometry, hausdorff)?;
+    mesh.keep()?;
     if let Some(store) = store {
         write_fields(engine, solution, label, store, several)?;
     }

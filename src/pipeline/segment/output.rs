@@ -6,6 +6,7 @@ use super::begun::Solution;
 use super::estimate::estimate;
 use super::kept::{Kept, labels_of, objects_of};
 use super::labels::Placed;
+use super::meshes::ObjectMeshes;
 use super::neighbours::{Found, Joined};
 use super::object_report::ObjectReport;
 use super::object_report::Refused;
@@ -48,7 +49,8 @@ pub struct Outcome {
 /// Of whole numbers up to that, 2^53, each is held exactly in f64, the type that 64-bit ones are read in.
 pub const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// Segments the part `crop` of a stack; `store` gets the results, none of them when it is absent.
+/// Segments the part `crop` of a stack; `store` gets the results, `meshes` the surfaces, as
+/// far as these are there.
 ///
 /// # Errors
 /// When the memory is too little, the stack or the marks cannot be used, the output cannot be written, scratch runs out, or the run is
@@ -59,9 +61,9 @@ pub fn segment(
     crop: &Box3,
     guides: &Guides<'_>,
     settings: &SegmentSettings,
-    store: Option<&StoreWriter>,
+    (store, meshes): (Option<&StoreWriter>, Option<&dyn ObjectMeshes>),
 ) -> Result<Outcome> {
-    let job = Job { engine, stack, crop, guides, settings, store, keeps: false };
+    let job = Job { engine, stack, crop, guides, settings, store, meshes, keeps: false };
     stack.element().with_samples(job).map(|(outcome, _)| outcome)
 }
 
@@ -77,7 +79,7 @@ pub fn segment_kept(
     store: Option<&StoreWriter>,
 ) -> Result<(Outcome, Option<Kept>)> {
     let crop = &guides.geometry.domain();
-    stack.element().with_samples(Job { engine, stack, crop, guides, settings, store, keeps: true })
+    stack.element().with_samples(Job { engine, stack, crop, guides, settings, store, meshes: None, keeps: true })
 }
 
 /// What there is to segment, and where it goes.
@@ -88,6 +90,7 @@ struct Job<'a> {
     guides: &'a Guides<'a>,
     settings: &'a SegmentSettings,
     store: Option<&'a StoreWriter>,
+    meshes: Option<&'a dyn ObjectMeshes>,
     /// Fields stay in memory or scratch.
     keeps: bool,
 }
@@ -101,7 +104,7 @@ impl SampleWork for Job<'_> {
 }
 
 fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
-    let Job { engine, stack, crop, guides, settings, store, keeps } = *job;
+    let Job { engine, stack, crop, guides, settings, store, meshes, keeps } = *job;
     let needs = estimate(stack, crop, guides, settings, engine.threads() as u64, store.is_some());
     let _held = engine.reserve(needs.footprint)?;
     let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
@@ -127,7 +130,7 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let whole = Geometry { shape: stack.shape(), origin, ..guides.geometry.clone() };
     let world = World { whole: &whole, origin: guides.geometry.origin };
     let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry, world };
-    let Objects { solved, refused } = solve_all(engine, &picture, guides, settings, store)?;
+    let Objects { solved, refused } = solve_all(engine, &picture, guides, settings, (store, meshes))?;
     let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
     let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, store)?;
     let contacts = match solved.len() {

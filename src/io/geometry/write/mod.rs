@@ -1,4 +1,10 @@
-//! Meshes as they are written.
+//! Meshes as they are written, while they are found.
 
-pub mod export;
+mod body;
+pub mod formats;
+mod obj;
+mod places;
 pub mod ply;
+mod spool;
+mod stl;
+mod vtp;

@@ -11,30 +11,28 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
+use super::body::{BUFFER, Body, Form};
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
 use crate::store::MeshSink;
-
-const BUFFER: usize = 1 << 18;
 
 /// A PLY file in the making: a [`MeshSink`] that [`PlyWriter::finish`] completes.
 #[derive(Debug)]
 pub struct PlyWriter {
     path: PathBuf,
+    named: NamedTempFile,
+    body: Ply,
+}
+
+/// What is in it.
+#[derive(Debug)]
+struct Ply {
     form: Form,
     /// The header, or at first the room for it, and the vertices.
-    file: BufWriter<NamedTempFile>,
+    file: BufWriter<File>,
     triangles: BufWriter<File>,
     vertex_count: u64,
     triangle_count: u64,
-}
-
-/// What a file says of itself beside its counts.
-#[derive(Clone, Debug)]
-struct Form {
-    unit: Option<String>,
-    is_tagged: bool,
-    is_double: bool,
 }
 
 impl PlyWriter {
@@ -45,7 +43,7 @@ impl PlyWriter {
     /// # Errors
     /// When no file can be made in that folder.
     pub fn create(path: &Path, unit: Option<&str>) -> Result<Self> {
-        Self::start(path, Form { unit: unit.map(ToOwned::to_owned), is_tagged: false, is_double: false })
+        Self::start(path, Form { unit: unit.map(ToOwned::to_owned), ..Form::default() })
     }
 
     /// As `create`, for a mesh on a grid: its unit, and positions in double precision where single does not hold them.
@@ -65,14 +63,12 @@ impl PlyWriter {
     }
 
     fn start(path: &Path, form: Form) -> Result<Self> {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
         let start = || -> io::Result<_> {
-            let mut file = BufWriter::with_capacity(BUFFER, scratch_file(folder)?);
-            file.write_all(&header(&form, u64::MAX, u64::MAX))?;
-            Ok((file, BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?)))
+            let named = hidden_file(path, ".ply.part")?;
+            let body = Ply::start(named.reopen()?, folder_of(path), form)?;
+            Ok(Self { path: path.to_path_buf(), named, body })
         };
-        let (file, triangles) = start().map_err(|e| unwritable(&e, path))?;
-        Ok(Self { path: path.to_path_buf(), form, file, triangles, vertex_count: 0, triangle_count: 0 })
+        start().map_err(|e| unwritable(&e, path))
     }
 
     /// Completes the file and puts it under its name, in place of any file that was there.
@@ -80,56 +76,74 @@ impl PlyWriter {
     /// # Errors
     /// When the file cannot be written or renamed.
     pub fn finish(self) -> Result<()> {
-        let path = self.path.clone();
-        self.complete().map_err(|e| unwritable(&e, &path))
-    }
-
-    fn complete(self) -> io::Result<()> {
-        let mut triangles = self.triangles.into_inner().map_err(io::IntoInnerError::into_error)?;
-        let mut file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
-        triangles.seek(SeekFrom::Start(0))?;
-        io::copy(&mut triangles, file.as_file_mut())?;
-        file.seek(SeekFrom::Start(0))?;
-        file.write_all(&header(&self.form, self.vertex_count, self.triangle_count))?;
-        file.as_file().sync_all()?;
-        file.persist(&self.path).map_err(|e| e.error)?;
-        Ok(())
-    }
-}
-
-impl Form {
-    fn of(geometry: &Geometry, is_tagged: bool) -> Self {
-        Self { unit: geometry.unit.clone(), is_tagged, is_double: !geometry.fits_single() }
+        let Self { path, named, body } = self;
+        let finish = || -> io::Result<()> {
+            body.end()?;
+            named.as_file().sync_all()?;
+            named.persist(&path).map_err(|e| e.error)?;
+            Ok(())
+        };
+        finish().map_err(|e| unwritable(&e, &path))
     }
 }
 
 impl MeshSink for PlyWriter {
     fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
-        self.vertex_count += 1;
-        let written = if self.form.is_double {
-            self.file.write_all(position.map(f64::to_le_bytes).as_flattened())
-        } else {
-            self.file.write_all(position.map(|v| (v as f32).to_le_bytes()).as_flattened())
-        };
-        written.map_err(|e| unwritable(&e, &self.path))
+        self.body.vertex(position).map_err(|e| unwritable(&e, &self.path))
     }
 
     fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
-        let mut bytes = [3; 13];
-        for (place, value) in bytes[1..].chunks_exact_mut(4).zip(corners) {
-            place.copy_from_slice(&value.to_le_bytes());
-        }
-        self.triangle_count += 1;
-        self.triangles.write_all(&bytes).map_err(|e| unwritable(&e, &self.path))
+        self.facet(corners, [0; 2])
     }
 
     fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> Result<()> {
-        self.triangle(corners)?;
-        if !self.form.is_tagged {
-            return Ok(());
+        self.body.facet(corners, labels).map_err(|e| unwritable(&e, &self.path))
+    }
+}
+
+pub(super) fn start(file: File, folder: &Path, form: &Form) -> io::Result<Box<dyn Body>> {
+    Ok(Box::new(Ply::start(file, folder, form.clone())?))
+}
+
+impl Ply {
+    fn start(file: File, folder: &Path, form: Form) -> io::Result<Self> {
+        let mut file = BufWriter::with_capacity(BUFFER, file);
+        file.write_all(&header(&form, u64::MAX, u64::MAX))?;
+        let triangles = BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?);
+        Ok(Self { form, file, triangles, vertex_count: 0, triangle_count: 0 })
+    }
+
+    fn end(self) -> io::Result<()> {
+        let mut triangles = self.triangles.into_inner().map_err(io::IntoInnerError::into_error)?;
+        let mut file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
+        triangles.seek(SeekFrom::Start(0))?;
+        io::copy(&mut triangles, &mut file)?;
+        file.seek(SeekFrom::Start(0))?;
+        file.write_all(&header(&self.form, self.vertex_count, self.triangle_count))
+    }
+}
+
+impl Body for Ply {
+    fn vertex(&mut self, position: [f64; 3]) -> io::Result<()> {
+        self.vertex_count += 1;
+        if self.form.is_double {
+            self.file.write_all(position.map(f64::to_le_bytes).as_flattened())
+        } else {
+            self.file.write_all(position.map(|v| (v as f32).to_le_bytes()).as_flattened())
         }
-        let bytes = labels.map(u32::to_le_bytes).concat();
-        self.triangles.write_all(&bytes).map_err(|e| unwritable(&e, &self.path))
+    }
+
+    fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> io::Result<()> {
+        let mut bytes = [3; 21];
+        for (place, value) in bytes[1..].chunks_exact_mut(4).zip(corners.into_iter().chain(labels)) {
+            place.copy_from_slice(&value.to_le_bytes());
+        }
+        self.triangle_count += 1;
+        self.triangles.write_all(if self.form.is_tagged { &bytes } else { &bytes[..13] })
+    }
+
+    fn complete(self: Box<Self>) -> io::Result<()> {
+        self.end()
     }
 }
 
@@ -155,16 +169,21 @@ fn header_text(form: &Form, vertices: u64, triangles: u64, padding: usize) -> St
     )
 }
 
-/// A hidden file that gets the permissions of any new file when it is renamed, not those of a private scratch file.
-fn scratch_file(folder: &Path) -> io::Result<NamedTempFile> {
+/// A hidden file beside the one that it is to be, which gets the permissions of any new file when it is renamed, not those of a
+/// private scratch file.
+pub(super) fn hidden_file(path: &Path, ending: &str) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".strandline-").suffix(".ply.part");
+    builder.prefix(".strandline-").suffix(ending);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder)
+    builder.tempfile_in(folder_of(path))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
 }
 
 fn unwritable(error: &io::Error, path: &Path) -> Error {
@@ -178,7 +197,7 @@ mod tests {
     use super::*;
 
     fn form(unit: Option<&str>, is_tagged: bool) -> Form {
-        Form { unit: unit.map(ToOwned::to_owned), is_tagged, is_double: is_tagged }
+        Form { unit: unit.map(ToOwned::to_owned), is_tagged, is_double: is_tagged, anchor: [0.0; 3] }
     }
 
     #[test]

@@ -1,0 +1,127 @@
+//! Surfaces in files of any format, written while they are found: [`MeshFile`] takes what a surface is drawn into, vertices and
+//! triangles, and nothing stands under the file's name before all of it is there.
+//!
+//! [`FORMATS`] is the one table of what is written.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempPath;
+
+use super::body::{Body, Form, Start};
+use super::{obj, ply, stl, vtp};
+use crate::error::{Error, Result};
+use crate::grid::Geometry;
+use crate::store::{MeshSink, Unfinished};
+
+/// A file format of surfaces.
+#[derive(Debug)]
+pub struct Format {
+    /// Its usual name.
+    pub name: &'static str,
+    /// How names of such files end, without the dot; it decides.
+    pub extension: &'static str,
+    /// Whether it holds f32 alone: positions far from zero are then written as seen from an anchor.
+    pub is_single: bool,
+    start: Start,
+}
+
+/// The formats.
+pub const FORMATS: &[Format] = &[
+    Format { name: "PLY", extension: "ply", is_single: false, start: ply::start },
+    Format { name: "OBJ", extension: "obj", is_single: false, start: obj::start },
+    Format { name: "STL", extension: "stl", is_single: true, start: stl::start },
+    Format { name: "VTP", extension: "vtp", is_single: false, start: vtp::start },
+];
+
+impl Format {
+    /// The format that a file's name asks for.
+    #[must_use]
+    pub fn of(path: &Path) -> Option<&'static Self> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        FORMATS.iter().find(|format| format.extension == extension)
+    }
+}
+
+/// A file of any format in the making; dropped unfinished it is gone.
+pub struct MeshFile {
+    body: Box<dyn Body>,
+    named: Named,
+}
+
+/// A file that is whole and has no name yet; dropped without one it is gone.
+pub struct WholeMesh(Named);
+
+/// A hidden file beside the one that it is to be.
+struct Named {
+    path: PathBuf,
+    hidden: TempPath,
+    unfinished: Unfinished,
+}
+
+impl MeshFile {
+    /// Begins the file that will stand at `path`, for a surface on a grid; each triangle is written with its labels if it
+    /// `is_tagged` and the format holds them. What has to wait for the end lies in the folder `temporary`.
+    ///
+    /// # Errors
+    /// When no file can be made beside `path` or in that folder.
+    pub fn create(
+        format: &Format,
+        path: &Path,
+        geometry: &Geometry,
+        is_tagged: bool,
+        temporary: &Path,
+    ) -> Result<Self> {
+        let begin = || -> io::Result<_> {
+            let (file, hidden) = ply::hidden_file(path, &format!(".{}.part", format.extension))?.into_parts();
+            let unfinished = Unfinished::new(&hidden);
+            let body = (format.start)(file, temporary, &Form::of(geometry, is_tagged))?;
+            Ok(Self { body, named: Named { path: path.to_path_buf(), hidden, unfinished } })
+        };
+        begin().map_err(|error| unwritable(&error, path))
+    }
+
+    /// Completes the file; it still has no name.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn complete(self) -> Result<WholeMesh> {
+        let Self { body, named } = self;
+        body.complete().map_err(|error| unwritable(&error, &named.path))?;
+        Ok(WholeMesh(named))
+    }
+}
+
+impl WholeMesh {
+    /// Puts the file under its name, in place of any that was there.
+    ///
+    /// # Errors
+    /// When it cannot be renamed.
+    pub fn place(self) -> Result<()> {
+        let Named { path, hidden, unfinished } = self.0;
+        unfinished.finish(|| hidden.persist(&path)).map_err(|error| unwritable(&error.error, &path))
+    }
+}
+
+impl MeshSink for MeshFile {
+    fn on_grid(&mut self, grid: &Geometry) -> Result<()> {
+        self.body.anchor(grid.anchor());
+        Ok(())
+    }
+
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
+        self.body.vertex(position).map_err(|error| unwritable(&error, &self.named.path))
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
+        self.facet(corners, [0; 2])
+    }
+
+    fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> Result<()> {
+        self.body.facet(corners, labels).map_err(|error| unwritable(&error, &self.named.path))
+    }
+}
+
+fn unwritable(error: &io::Error, path: &Path) -> Error {
+    Error::from_io("the mesh cannot be written", error).at(path)
+}

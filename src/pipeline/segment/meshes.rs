@@ -1,0 +1,50 @@
+//! Where the surfaces of objects go beside a store: to whoever takes them as they are drawn.
+
+use crate::error::Result;
+use crate::grid::Geometry;
+use crate::io::geometry::write::ply::PlyWriter;
+use crate::store::MeshSink;
+
+/// Takes the surfaces of objects. Several may be drawn at the same time.
+pub trait ObjectMeshes: Sync {
+    /// Begins the surface of the object with a label, on the grid of the box around it.
+    ///
+    /// # Errors
+    /// When it is not taken.
+    fn begin(&self, label: u32, grid: &Geometry) -> Result<Box<dyn ObjectMesh + '_>>;
+}
+
+/// A surface that is drawn. Dropped before it is kept it is that of an object that could not be solved: nothing stays of it.
+pub trait ObjectMesh: MeshSink {
+    /// The surface is whole, and that of its object.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    fn keep(self: Box<Self>) -> Result<()>;
+}
+
+/// The surface of an object on its way into a store and to who takes it, as far as these are there.
+pub(super) struct Surface<'a> {
+    pub(super) file: Option<PlyWriter>,
+    pub(super) taken: Option<Box<dyn ObjectMesh + 'a>>,
+}
+
+impl Surface<'_> {
+    /// Gives it to all that take it.
+    pub(super) fn keep(self) -> Result<()> {
+        self.file.map_or(Ok(()), PlyWriter::finish)?;
+        self.taken.map_or(Ok(()), ObjectMesh::keep)
+    }
+}
+
+impl MeshSink for Surface<'_> {
+    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
+        self.file.as_mut().map_or(Ok(()), |file| file.vertex(position))?;
+        self.taken.as_mut().map_or(Ok(()), |taken| taken.vertex(position))
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
+        self.file.as_mut().map_or(Ok(()), |file| file.triangle(corners))?;
+        self.taken.as_mut().map_or(Ok(()), |taken| taken.triangle(corners))
+    }
+}
