@@ -78,11 +78,13 @@ impl<'a> DistanceField<'a> {
     }
 
     fn solved<P: Precision>(&self) -> Result<SolvedDistance<P>> {
-        let ready = self.task.ready::<P>()?;
-        let Ready { sets, geometry, settings, .. } = &ready;
+        let mut ready = self.task.ready::<P>()?;
+        let Ready { sets, geometry, settings, resources, notes } = &mut ready;
         let writes = if self.task.run.store.is_some() { Writes::Fields } else { Writes::Nothing };
-        let needs = settings.needs::<P>(geometry, sets, [ready.resources.threads, 1], writes);
-        let engine = self.task.run.engine(&ready.resources, needs.held)?;
+        let needs = settings.needs::<P>(geometry, sets, [resources.threads, 1], writes);
+        let needs = needs.keeping::<P>(geometry, settings.keeps_sources());
+        let engine = self.task.run.engine(resources, needs.held)?;
+        self.task.run.check_disk(&self.task.disk::<P>((resources, geometry, settings), &needs, false)?, notes)?;
         let store = self.task.run.begin_store()?;
         let kept = Kept::new(&engine, geometry, settings.keeps_sources())?;
         let found = distance_kept(&engine, geometry, sets, settings, store.as_ref(), Some(&kept))?;

@@ -91,10 +91,11 @@ impl<'a> MiddleSurface<'a> {
         let mut ready = self.task.ready::<P>()?;
         ready.settings.labels = true;
         let settings = MiddleSettings { distance: ready.settings, surface: self.surface, labels: self.mode };
-        let Ready { sets, geometry, .. } = &ready;
+        let Ready { sets, geometry, resources, notes, settings: distance } = &mut ready;
         let writes = self.task.run.store.is_some();
-        let needs = settings.needs::<P>(geometry, sets, ready.resources.threads, 1, writes);
-        let engine = self.task.run.engine(&ready.resources, needs.held)?;
+        let needs = settings.needs::<P>(geometry, sets, resources.threads, 1, writes).keeping::<P>(geometry, true);
+        let engine = self.task.run.engine(resources, needs.held)?;
+        self.task.run.check_disk(&self.task.disk::<P>((resources, geometry, distance), &needs, true)?, notes)?;
         let store = self.task.run.begin_store()?;
         let mut drawing = Drawing::new(mesh, mesh_file(store.as_ref())?.as_deref(), geometry, true)?;
         let kept = Kept::new(&engine, geometry, true)?;

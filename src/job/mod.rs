@@ -5,6 +5,7 @@
 //! points, meshes, volumes -> builder -> checks -> pipeline -> fields that are read by boxes, labels, meshes, measures
 //! ```
 
+pub(crate) mod disk;
 mod distance_field;
 mod field;
 mod given;

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::disk::Disk;
 use super::field::Field;
 use super::given::check_points;
 use super::mesh::Drawing;
@@ -160,6 +161,7 @@ impl<'a> Reconstruction<'a> {
         let threads = resources.threads as u64;
         let needs = estimate(&geometry, &cloud, &self.settings, threads, self.run.store.is_some());
         let engine = self.run.engine(&resources, needs.held)?;
+        self.run.check_disk(&Disk::of_cloud(&resources, self.run.store.as_deref(), &needs)?, &mut notes)?;
         Ok(Ready { cloud, geometry, engine, notes })
     }
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::disk::Disk;
 use super::resources::Resources;
 use super::words::of_builders;
 use crate::error::{Error, Result};
@@ -56,6 +57,11 @@ impl Run {
             )));
         }
         resources.engine(&self.cancel, self.progress.clone())
+    }
+
+    /// Refuses a run that the disks cannot hold, and notes one that they may not.
+    pub(super) fn check_disk(&self, disk: &Disk<'_>, notes: &mut Vec<String>) -> Result<()> {
+        disk.check(|text| self.note(notes, text))
     }
 
     /// Begins the store, where one was asked for.

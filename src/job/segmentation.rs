@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use super::disk::Disk;
 use super::field::Field;
 use super::given::check_points;
 use super::motion::motion_setters;
@@ -214,8 +215,11 @@ impl<'a> Segmentation<'a> {
         let guides = Guides { geometry: &self.geometry, objects: &fit, refused: &refused };
         let (image, resources) = (self.image.as_ref(), self.run.resources()?);
         let (whole, threads) = (self.geometry.domain(), resources.threads as u64);
-        let needs = estimate(image, &whole, &guides, &settings, threads, self.run.store.is_some());
+        let needs = estimate(image, &whole, &guides, &settings, threads, self.run.store.is_some()).keeping();
         let engine = self.run.engine(&resources, needs.held)?;
+        let coarser = "a part of the image, or a coarser one";
+        let disk = Disk::of_image(&resources, self.run.store.as_deref(), &needs, coarser)?;
+        self.run.check_disk(&disk, &mut notes)?;
         let store = self.run.begin_store()?;
         let (outcome, kept) = segment_kept(&engine, image, &guides, &settings, store.as_ref())?;
         finish_store(&engine, store)?;

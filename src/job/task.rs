@@ -1,5 +1,6 @@
 //! What `DistanceField` and `MiddleSurface` have in common: sources, the grid, the method, and how it is run.
 
+use super::disk::Disk;
 use super::given::{Gathered, Given};
 use super::resources::Resources;
 use super::run::Run;
@@ -7,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
-use crate::pipeline::distance::{DistanceSettings, Init, Method, Schedule, outside_note};
+use crate::pipeline::distance::{DistanceSettings, Init, Method, Needs, Schedule, outside_note};
 use crate::pipeline::laying::{around, check_grid, check_spacing};
 
 /// What was said so far.
@@ -75,6 +76,18 @@ impl Task<'_> {
         }
         settings.check_on::<P>(&geometry, &sets)?;
         Ok(Ready { sets, geometry, settings, resources, notes })
+    }
+
+    /// What a run puts on disks.
+    pub(super) fn disk<'d, P: Precision>(
+        &'d self,
+        (resources, geometry, settings): (&'d Resources, &Geometry, &DistanceSettings),
+        needs: &Needs,
+        is_middle: bool,
+    ) -> Result<Disk<'d>> {
+        let store = self.run.store.as_deref();
+        let written = if store.is_some() { settings.written::<P>(geometry, is_middle) } else { 0 };
+        Disk::of_grid(resources, store, geometry, needs, written)
     }
 
     fn check_grid(&self) -> Result<()> {

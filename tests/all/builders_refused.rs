@@ -210,3 +210,26 @@ fn errors_keep_their_source() {
     assert_eq!(source.kind(), std::io::ErrorKind::NotFound);
     assert!(missing.to_string().ends_with(&source.to_string()), "{missing}");
 }
+
+/// More temporary fields than any disk has free, though memory would do: of the solved field and of what stays readable.
+#[test]
+fn runs_that_no_disk_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let wide = Geometry::new([16_000; 3], [1.0; 3], [0.0; 3]);
+    let job = || DistanceField::new().points(&POINTS).grid(wide.clone()).brick(128).threads(1).memory(2 << 30);
+    let job = |labels: bool| if labels { job().labels() } else { job() };
+    let told = |labels| {
+        let error = job(labels).scratch(folder.path()).store(folder.path().join("out.zarr")).solve().err().unwrap();
+        assert_eq!(error.kind(), ErrorKind::Failed, "{error}");
+        error.to_string()
+    };
+    for told in [told(false), told(true)] {
+        assert!(told.contains("a grid of 4 096 000 000 000 voxels needs "), "{told}");
+        assert!(told.contains("`scratch`") && told.contains("`spacing`") && !told.contains("--"), "{told}");
+    }
+    // Numbers of sources stay readable too: 4 bytes a voxel in bricks of 64^3.
+    let tib = |told: String| told.split("needs ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let more = 4.0 * 16_000_f64.powi(3) / 1024_f64.powi(4);
+    assert!((tib(told(true)) - tib(told(false)) - more).abs() < 0.2, "{} {}", told(true), told(false));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was begun");
+}

@@ -10,6 +10,7 @@ use serde_json::Value as Json;
 use strandline::grid::TriangleMesh;
 
 use crate::common::ball::{Ball, Bench};
+use crate::common::clouds::sphere;
 use crate::common::meshes::{self, Form};
 use crate::common::stores::volume;
 use crate::common::tiff_bytes::{Value, gray_page, tiff_file};
@@ -157,4 +158,26 @@ fn off_without_its_first_word_and_points_are_told_apart_in_words() {
     bench.write("points.xyz", "5 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n");
     let said = told(&bench, "distance points.xyz --spacing 0.5 --padding 1 -o none");
     assert!(!said.contains("OFF"), "{said}");
+}
+
+/// Settings are told whether they were given or not.
+#[test]
+fn reports_tell_how_the_store_was_packed() {
+    let bench = Bench::new(&Ball::small());
+    let line = |p: [f64; 3]| format!("{} {} {}\n", p[0], p[1], p[2]);
+    bench.write("ball.xyz", &sphere([0.0; 3], 1.0, 300, |_| true).into_iter().map(line).collect::<String>());
+    bench.write("other.xyz", "3 0 0\n");
+    for run in [
+        "distance ball.xyz --spacing 0.25",
+        "middle ball.xyz other.xyz --spacing 0.25",
+        "reconstruct ball.xyz --spacing 0.25 --max-steps 2",
+        "segment image.tif --points marks.csv --max-steps 2",
+    ] {
+        for (flags, told) in [("", "fast"), ("--compress small", "small"), ("--compress none", "none")] {
+            bench.succeed(&format!("{run} {flags} -q -o none --report out/r.json --overwrite"));
+            assert_eq!(bench.json("out/r.json")["settings"]["compress"], told, "{run}");
+        }
+        bench.succeed(&format!("{run} --compress small -q -o out/x.zarr --overwrite"));
+        assert_eq!(bench.json("out/x.zarr/report.json")["settings"]["compress"], "small", "{run}");
+    }
 }

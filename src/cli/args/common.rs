@@ -348,6 +348,17 @@ pub(crate) enum CompressArg {
     Small,
 }
 
+impl CompressArg {
+    /// As it is typed.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Fast => "fast",
+            Self::Small => "small",
+        }
+    }
+}
+
 impl From<CompressArg> for Compression {
     fn from(arg: CompressArg) -> Self {
         match arg {

@@ -12,7 +12,6 @@ use crate::cli::inputs::grid;
 use crate::cli::inputs::settings;
 use crate::cli::inputs::sources::{Read, read_sets};
 use crate::cli::outputs::checks::Outputs;
-use crate::cli::outputs::disk::Disk;
 use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::print;
@@ -26,6 +25,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::{DataSets, Geometry};
 use crate::io::ome_zarr::StoreWriter;
+use crate::job::disk::Disk;
 use crate::job::resources::Resources;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::{
@@ -188,7 +188,7 @@ impl Job {
 
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, needs: &Needs) -> Result<()> {
-        let window = Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
+        Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
             let name = self.settings.method.name();
             let textbook = if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {
                 String::new()
@@ -205,28 +205,18 @@ impl Job {
         })?;
         let output = self.args.job.output.store();
         let written = if output.is_some() { self.written() } else { 0 };
-        Disk {
-            what: format!("a grid of {} voxels", grouped(self.geometry.domain().volume())),
-            scratch: &self.resources.scratch,
-            needed: needs.scratch.saturating_sub(window / 2),
-            output: output.unwrap_or(&self.resources.scratch),
-            written,
-            coarser: "a larger --spacing",
-        }
-        .check(&self.console)
+        let disk = Disk::of_grid(&self.resources, output, &self.geometry, needs, written)?;
+        disk.check(|text| self.console.note(text))
     }
 
     /// Bytes of the output, if nothing of it could be compressed.
     fn written(&self) -> u64 {
-        let element = match self.args.job.field.precision {
-            PrecisionArg::F16 => 2,
-            PrecisionArg::F32 => 4,
-            PrecisionArg::F64 => 8,
-        };
-        let labels = if self.middle.is_some() { 5 } else { 4 * u64::from(self.settings.labels) };
-        let places = 3 * element * u64::from(self.settings.closest_point);
-        // Coarser levels are an eighth each of the one before.
-        self.geometry.domain().volume().saturating_mul(element + labels + places).saturating_mul(8) / 7
+        let is_middle = self.middle.is_some();
+        match self.args.job.field.precision {
+            PrecisionArg::F16 => self.settings.written::<f16>(&self.geometry, is_middle),
+            PrecisionArg::F32 => self.settings.written::<f32>(&self.geometry, is_middle),
+            PrecisionArg::F64 => self.settings.written::<f64>(&self.geometry, is_middle),
+        }
     }
 
     /// What the run will take, in a few lines.

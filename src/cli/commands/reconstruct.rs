@@ -13,7 +13,6 @@ use crate::cli::inputs::grid::asked_grid;
 use crate::cli::inputs::noted::read_told;
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::Outputs;
-use crate::cli::outputs::disk::Disk;
 use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::print;
@@ -26,6 +25,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
 use crate::grid::Geometry;
 use crate::io::geometry::read::source::Source;
+use crate::job::disk::Disk;
 use crate::job::resources::Resources;
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct, refuse_too_fine, spacing_memory,
@@ -160,19 +160,8 @@ impl Job {
 
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, estimate: &Estimate) -> Result<()> {
-        let window = Budget { total: self.resources.memory }.window(estimate.held)?;
-        // Two fields of the whole box, their coarser levels an eighth each of the one before; far from the points they are
-        // constant and take nothing.
-        let written = if self.writes_fields() { 8 * estimate.near_voxels.saturating_mul(8) / 7 } else { 0 };
-        Disk {
-            what: format!("a grid with {} voxels near the points", grouped(estimate.near_voxels)),
-            scratch: &self.resources.scratch,
-            needed: estimate.scratch.saturating_sub(window / 2),
-            output: self.args.output.store().unwrap_or(&self.resources.scratch),
-            written,
-            coarser: "a larger --spacing",
-        }
-        .check(&self.console)
+        let disk = Disk::of_cloud(&self.resources, self.args.output.store(), estimate)?;
+        disk.check(|text| self.console.note(text))
     }
 
     /// What the run will take, in a few lines.
@@ -312,6 +301,7 @@ fn describe_found(found: &Reconstruction) -> String {
 struct Settings {
     cloud: String,
     output: Option<String>,
+    compress: &'static str,
     method: &'static str,
     #[serde(flatten)]
     motion: Moves,
@@ -325,6 +315,7 @@ impl Settings {
         Self {
             cloud: job.args.cloud.display().to_string(),
             output: job.args.output.store().map(|path| path.display().to_string()),
+            compress: job.args.output.compress.name(),
             method: job.settings.method.name(),
             motion: Moves::new(&job.settings.motion, &found.geometry),
             beta: job.settings.beta,

@@ -1,6 +1,5 @@
 //! Where results go: names that are checked, room on the disk, files that appear when they are whole.
 
 pub(crate) mod checks;
-pub(crate) mod disk;
 pub(crate) mod drawing;
 pub(crate) mod files;

@@ -60,6 +60,7 @@ fn describe_middle(middle: &Middle, pairs_in: &str) -> Vec<String> {
 pub(crate) struct Settings {
     sources: Vec<String>,
     output: Option<String>,
+    compress: &'static str,
     method: &'static str,
     schedule: &'static str,
     neighbours: u32,
@@ -92,6 +93,7 @@ impl Settings {
         Self {
             sources: args.sources.iter().map(|path| path.display().to_string()).collect(),
             output: args.job.output.store().map(|path| path.display().to_string()),
+            compress: args.job.output.compress.name(),
             method: settings.method.name(),
             schedule,
             neighbours: match settings.neighbours {

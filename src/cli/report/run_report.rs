@@ -44,6 +44,8 @@ pub(crate) struct Settings {
     /// Balls that objects without points start as: x, y, z, radius.
     pub(crate) seeds: Vec<[f64; 4]>,
     pub(crate) output: Option<String>,
+    /// How the store's chunks are packed.
+    pub(crate) compress: &'static str,
     pub(crate) channel: u32,
     pub(crate) time: u32,
     pub(crate) level: u32,

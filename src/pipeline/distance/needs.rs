@@ -1,6 +1,6 @@
 //! What a distance will take: memory that must be held, temporary fields, time. The job reserves what is told here.
 
-use super::{DistanceSettings, Schedule, Textbook, Wanted};
+use super::{DistanceSettings, Kept, Schedule, Textbook, Wanted};
 use crate::exec::Footprint;
 use crate::grid::{BrickGrid, DataSets, Geometry};
 use crate::kernel::distance::repair::descent::remembered_bytes;
@@ -20,6 +20,14 @@ pub struct Needs {
     pub scratch: u64,
     /// Time, very roughly.
     pub seconds: f64,
+}
+
+impl Needs {
+    /// The same where fields stay with who asked for them, the numbers of `sources` too where these are wanted.
+    #[must_use]
+    pub fn keeping<P: Precision>(self, geometry: &Geometry, sources: bool) -> Self {
+        Self { scratch: self.scratch.saturating_add(Kept::<P>::bytes(geometry, sources)), ..self }
+    }
 }
 
 /// What of a distance goes into a store.
@@ -84,6 +92,17 @@ impl DistanceSettings {
         let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
         let held = footprint.bytes(threads as u64);
         Needs { footprint, held, scratch: self.scratch::<P>(&grid, ranks), seconds }
+    }
+
+    /// Bytes of a store, if nothing of it could be compressed: the distance, what was asked for beside it, and where it is that
+    /// of middle surfaces, all labels and their borders.
+    #[must_use]
+    pub fn written<P: Precision>(&self, geometry: &Geometry, is_middle: bool) -> u64 {
+        let element = size_of::<P>() as u64;
+        let labels = if is_middle { 5 } else { 4 * u64::from(self.labels) };
+        let places = 3 * element * u64::from(self.closest_point);
+        // Coarser levels are an eighth each of the one before.
+        geometry.domain().volume().saturating_mul(element + labels + places).saturating_mul(8) / 7
     }
 
     /// What is in memory at one time beside bricks.

@@ -20,6 +20,8 @@ pub struct Estimate {
     pub scratch: u64,
     /// Bytes of scratch without which the run cannot even start to solve.
     pub least_scratch: u64,
+    /// Bytes of the output, if nothing of it could be compressed.
+    pub output: u64,
     /// Voxels near the cloud.
     pub near_voxels: u64,
     /// A rough guess of the seconds it takes.
@@ -95,6 +97,9 @@ pub fn estimate(
         held: boxes(&region, cloud).and(working).bytes(threads),
         scratch: SIDES_BYTES * near_voxels,
         least_scratch: DISTANCE_BYTES * near_voxels,
+        // Two fields of the whole box, their coarser levels an eighth each of the one before; far from the points they are
+        // constant and take nothing.
+        output: if writes { 8 * near_voxels.saturating_mul(8) / 7 } else { 0 },
         near_voxels,
         seconds: near_voxels as f64 * SECONDS_PER_NEAR_VOXEL / threads as f64,
     }

@@ -4,6 +4,7 @@
 //! alive at one time. Everything is an upper bound but for what is called probable, and for objects whose search has to
 //! reach farther than its start: how far, only the flood can tell, and it is what the estimate is to be given before.
 
+use super::kept::label_bytes;
 use super::neighbours::needs;
 use super::outlined::shape_start::BAND;
 use super::reach::first_reach;
@@ -36,6 +37,8 @@ pub struct Estimate {
     pub scratch: u64,
     /// Bytes of scratch without which the run cannot even start to solve.
     pub least_scratch: u64,
+    /// Bytes of scratch for the labels where these stay with who asked for them.
+    pub labels: u64,
     /// Bytes of the output, if nothing of it could be compressed.
     pub output: u64,
     /// Voxels near the marks, of all objects.
@@ -45,6 +48,12 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// The same where fields stay with who asked for them; those of objects stay until these are joined in any case.
+    #[must_use]
+    pub fn keeping(self) -> Self {
+        Self { scratch: self.scratch.saturating_add(self.labels), ..self }
+    }
+
     /// Bytes of memory that are probably in use at one time where fields have a window of so many.
     #[must_use]
     pub fn resident(&self, window: u64) -> u64 {
@@ -87,6 +96,8 @@ struct Counts {
     near: u64,
     /// Cells of bands, probably: the most of one object, and those of all.
     bands: [u64; 2],
+    /// Bytes of the bricks of labels that objects can lie in.
+    labels: u64,
     /// Bytes of all outlines at the most, and probably.
     outlines: [u64; 2],
 }
@@ -100,6 +111,7 @@ impl Counts {
                 // Without marks the surface may go anywhere.
                 let all = BrickGrid::new(guides.geometry.shape, CELL as i64).len();
                 counts.add(all, [all; 2]);
+                counts.labels = label_bytes(guides.geometry, &guides.geometry.domain());
                 continue;
             }
             let cloud = cloud_of(marks, guides.geometry, settings.caps);
@@ -107,10 +119,12 @@ impl Counts {
             let first = region.cells.len() as u64;
             counts.add(region.cells.grid().len(), [first, likely_band(&region, marks).min(first)]);
             counts.points = counts.points.max(cloud.len() as u64);
+            counts.labels += label_bytes(guides.geometry, &region.window);
             let most = marks.contours.len() as u64 * OUTLINE_BYTES + OUTLINED_BYTES;
             counts.outlines[0] += most;
             counts.outlines[1] += most.min(cloud.len() as u64 * OUTLINED_POINT_BYTES);
         }
+        counts.labels = counts.labels.min(label_bytes(guides.geometry, &guides.geometry.domain()));
         counts
     }
 
@@ -167,6 +181,7 @@ pub fn estimate(
         working: PROGRAM_BYTES + outlines[1] + cells + decoders.and(buffers).bytes(threads),
         fields: image + (SOLVE_BYTES * bands[0] + KEPT_BYTES * bands[1]) * CELL_LEN as u64,
         scratch: image + (SOLVE_BYTES * largest_voxels).max(coarse).max(joined) + KEPT_BYTES * near_voxels,
+        labels: counts.labels,
         least_scratch: image + DISTANCE_BYTES * largest_voxels,
         output: if writes { voxels * (size + 1) * 3 / 2 + 5 * near_voxels } else { 0 },
         near_voxels,

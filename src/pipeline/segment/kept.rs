@@ -7,7 +7,7 @@ use super::neighbours::Joined;
 use super::object_report::ObjectReport;
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
-use crate::grid::{BrickGrid, BrickSet, Geometry, Slot};
+use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, Slot};
 use crate::store::{BoxSource, BrickArray};
 
 /// Edge of the bricks of the label volume.
@@ -29,6 +29,17 @@ pub struct KeptObject {
     pub geometry: Geometry,
     /// Its segmentation function there: 1 inside, 0 outside, the surface at 1/2.
     pub u: BrickArray<f32>,
+}
+
+/// Bytes of the label volume's bricks that a box of the grid meets.
+pub(super) fn label_bytes(geometry: &Geometry, part: &Box3) -> u64 {
+    let grid = BrickGrid::new(geometry.shape, EDGE);
+    let inside = part.intersect(&geometry.domain());
+    if inside.is_empty() {
+        return 0;
+    }
+    let met = |a: usize| ((inside.hi[a] - 1) / EDGE - inside.lo[a] / EDGE + 1).unsigned_abs();
+    (met(0) * met(1) * met(2)).saturating_mul((grid.brick_len() * size_of::<u32>()) as u64)
 }
 
 /// The label volume in bricks of its own.
@@ -56,4 +67,22 @@ pub(super) fn objects_of(solved: Vec<(Solution, ObjectReport)>) -> (Vec<KeptObje
         (KeptObject { label: report.label, geometry, u }, report)
     };
     solved.into_iter().map(kept).unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bricks_that_a_box_meets_are_counted() {
+        let geometry = Geometry { shape: [130, 64, 200], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+        let grid = BrickGrid::new(geometry.shape, EDGE);
+        for (lo, hi) in
+            [([0; 3], [130, 64, 200]), ([63, 0, 64], [65, 1, 128]), ([-20, -5, 190], [10, 80, 300]), ([-9; 3], [0; 3])]
+        {
+            let part = Box3::new(lo, hi);
+            let met = (0..grid.len()).filter(|&id| !grid.brick_box(id).intersect(&part).is_empty()).count() as u64;
+            assert_eq!(label_bytes(&geometry, &part), met * 64 * 64 * 64 * 4, "{part:?}");
+        }
+    }
 }

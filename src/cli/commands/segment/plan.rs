@@ -1,12 +1,12 @@
 //! What a segmentation will take: told with `--dry-run`, and refused where memory or disk do not hold it.
 
 use super::Job;
-use crate::cli::outputs::disk::Disk;
 use crate::cli::print;
 use crate::cli::report::table;
 use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
 use crate::error::Result;
-use crate::exec::Budget;
+use crate::exec::{Budget, Progress};
+use crate::job::disk::Disk;
 use crate::pipeline::marks::split;
 use crate::pipeline::segment::{Estimate, estimate};
 
@@ -20,16 +20,10 @@ impl Job {
 
     /// Refuses a run that cannot fit memory or disk.
     pub(crate) fn fits(&self, estimate: &Estimate) -> Result<()> {
-        let window = Budget { total: self.resources.memory }.window(estimate.held)?;
-        Disk {
-            what: format!("an image with {} voxels near the marks", grouped(estimate.near_voxels)),
-            scratch: &self.resources.scratch,
-            needed: estimate.scratch.saturating_sub(window / 2),
-            output: self.args.output.store().unwrap_or(&self.resources.scratch),
-            written: estimate.output,
-            coarser: "a part of the image with --crop; a spacing of the image that is wrong is put right with --image-spacing",
-        }
-        .check(&self.console)
+        let coarser =
+            "a part of the image with --crop; a spacing of the image that is wrong is put right with --image-spacing";
+        let disk = Disk::of_image(&self.resources, self.args.output.store(), estimate, coarser)?;
+        disk.check(|text| self.console.note(text))
     }
 
     /// The image and its settings in a few lines.

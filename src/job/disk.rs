@@ -3,44 +3,106 @@
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-use crate::cli::terminal::console::Console;
-use crate::cli::terminal::text::bytes;
+use super::resources::{Resources, folder_of};
 use crate::error::{Error, Result};
-use crate::exec::Progress;
-use crate::job::resources::folder_of;
+use crate::exec::Budget;
+use crate::grid::Geometry;
+use crate::grid::digits::{bytes, grouped};
+use crate::pipeline::distance::Needs;
+use crate::pipeline::{reconstruct, segment};
 use crate::store::free_space;
 
 /// What a run puts on disks.
 pub(crate) struct Disk<'a> {
     /// What needs it: a grid of so many voxels.
-    pub(crate) what: String,
+    what: String,
     /// The folder of temporary fields.
-    pub(crate) scratch: &'a Path,
+    scratch: &'a Path,
     /// Bytes of temporary fields that memory does not hold.
-    pub(crate) needed: u64,
+    needed: u64,
     /// Where the output is made: the store that is to be, or the folder of temporary fields.
-    pub(crate) output: &'a Path,
+    output: &'a Path,
     /// Bytes of the output, if nothing of it could be compressed.
-    pub(crate) written: u64,
+    written: u64,
     /// What makes a run smaller, to be given.
-    pub(crate) coarser: &'static str,
+    coarser: &'static str,
 }
 
 /// Fields are seldom compressed to less than this part.
 const LEAST_WRITTEN: u64 = 10;
 
-impl Disk<'_> {
+impl<'a> Disk<'a> {
+    /// A distance on a grid, with a store of so many bytes where there is one.
+    ///
+    /// # Errors
+    /// When it does not fit the memory.
+    pub(crate) fn of_grid(
+        resources: &'a Resources,
+        store: Option<&'a Path>,
+        geometry: &Geometry,
+        needs: &Needs,
+        written: u64,
+    ) -> Result<Self> {
+        let what = format!("a grid of {} voxels", grouped(geometry.domain().volume()));
+        Self::new(resources, store, what, [needs.held, needs.scratch, written], "a larger --spacing")
+    }
+
+    /// The surface of a cloud.
+    ///
+    /// # Errors
+    /// When it does not fit the memory.
+    pub(crate) fn of_cloud(
+        resources: &'a Resources,
+        store: Option<&'a Path>,
+        needs: &reconstruct::Estimate,
+    ) -> Result<Self> {
+        let what = format!("a grid with {} voxels near the points", grouped(needs.near_voxels));
+        Self::new(resources, store, what, [needs.held, needs.scratch, needs.output], "a larger --spacing")
+    }
+
+    /// Objects in an image; `coarser` says what makes it smaller.
+    ///
+    /// # Errors
+    /// When it does not fit the memory.
+    pub(crate) fn of_image(
+        resources: &'a Resources,
+        store: Option<&'a Path>,
+        needs: &segment::Estimate,
+        coarser: &'static str,
+    ) -> Result<Self> {
+        let what = format!("an image with {} voxels near the marks", grouped(needs.near_voxels));
+        Self::new(resources, store, what, [needs.held, needs.scratch, needs.output], coarser)
+    }
+
+    fn new(
+        resources: &'a Resources,
+        store: Option<&'a Path>,
+        what: String,
+        [held, fields, written]: [u64; 3],
+        coarser: &'static str,
+    ) -> Result<Self> {
+        let window = Budget { total: resources.memory }.window(held)?;
+        let (scratch, needed) = (resources.scratch.as_path(), fields.saturating_sub(window / 2));
+        Ok(Self { what, scratch, needed, output: store.unwrap_or(scratch), written, coarser })
+    }
+
     /// Refuses a run that cannot fit, and says so of one that may not.
     ///
     /// # Errors
     /// `Failed`, with what is needed, what is free, and what to do.
-    pub(crate) fn check(&self, console: &Console) -> Result<()> {
+    pub(crate) fn check(&self, note: impl FnMut(&str)) -> Result<()> {
         let output = if self.output == self.scratch { self.scratch } else { folder_of(self.output) };
         let (Some(room), Some(room_for_output)) = (free_space(self.scratch), free_space(output)) else { return Ok(()) };
-        self.check_room(output, same_disk(self.scratch, output), [room, room_for_output], console)
+        self.check_room(output, same_disk(self.scratch, output), [room, room_for_output], note)
     }
 
-    fn check_room(&self, output: &Path, shared: bool, [free, out_free]: [u64; 2], console: &Console) -> Result<()> {
+    fn check_room(
+        &self,
+        output: &Path,
+        shared: bool,
+        [free, out_free]: [u64; 2],
+        mut note: impl FnMut(&str),
+    ) -> Result<()> {
         let (least, most) = (self.written / LEAST_WRITTEN, self.written);
         let on_scratch = self.needed.saturating_add(if shared { least } else { 0 });
         // Where all of it is for the output, another disk for temporary fields is no help.
@@ -73,7 +135,7 @@ impl Disk<'_> {
         }
         let taken = if shared { self.needed } else { 0 };
         if most.saturating_add(taken) > out_free {
-            console.note(&format!(
+            note(&format!(
                 "{}: {} are free there, but temporary fields and output may take up to {}, if little can be compressed",
                 output.display(),
                 bytes(out_free),
@@ -91,15 +153,15 @@ fn same_disk(a: &Path, b: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::terminal::console::Voice;
 
     #[test]
     fn what_cannot_fit_is_refused_and_what_may_not_is_told() {
-        let console = Console::new(Voice::Quiet);
+        let notes = std::cell::RefCell::new(Vec::new());
         let check = |needed: u64, written: u64, shared: bool, free: [u64; 2]| {
             let (scratch, output) = (Path::new("scratch"), Path::new("out"));
             let disk = Disk { what: "a grid".into(), scratch, needed, output, written, coarser: "a larger --spacing" };
-            disk.check_room(output, shared, free, &console).map_err(|error| (error.exit_code(), error.to_string()))
+            let note = |text: &str| notes.borrow_mut().push(text.to_owned());
+            disk.check_room(output, shared, free, note).map_err(|error| (error.exit_code(), error.to_string()))
         };
         let (code, text) = check(182 << 30, 0, true, [68 << 30; 2]).unwrap_err();
         assert_eq!(code, 1);
@@ -112,10 +174,10 @@ mod tests {
         assert!(text.contains("name an output on another disk") && !text.contains("--scratch"), "{text}");
         let (_, text) = check(60 << 30, 1000 << 30, false, [68 << 30; 2]).unwrap_err();
         assert!(text.starts_with("out: ") && text.contains("another disk"), "{text}");
-        assert!(console.notes().is_empty());
+        assert!(notes.borrow().is_empty());
         check(60 << 30, 100 << 30, false, [68 << 30; 2]).unwrap();
-        assert_eq!(console.notes().len(), 1, "{:?}", console.notes());
+        assert_eq!(notes.borrow().len(), 1, "{notes:?}");
         check(60 << 30, 7 << 30, true, [68 << 30; 2]).unwrap();
-        assert_eq!(console.notes().len(), 1, "what fits is not worth a word");
+        assert_eq!(notes.borrow().len(), 1, "what fits is not worth a word");
     }
 }
