@@ -56,7 +56,7 @@ pub fn extract(
     let centre = std::array::from_fn(|a| 0.5 * (lo[a] + hi[a]));
     let mut welder = Welder::new(geometry);
     let mut measure = SurfaceMeasure::new(centre);
-    let workers = Workers::new(|| (MarchingCubes::of_front(), Vec::new()));
+    let workers = Workers::new(|| (MarchingCubes::new(0.5), Vec::new()));
     // A surface may pass between a brick that is not stored and the one above it, so the bricks below stored ones
     // count.
     let bricks: Vec<BrickId> = (0..grid.len()).filter(|&id| holds_surface(u, id)).collect();
@@ -143,7 +143,7 @@ struct Shells {
 
 impl Shells {
     fn new() -> Self {
-        Self { cubes: MarchingCubes::of_front(), values: Vec::new(), patch: Patch::default() }
+        Self { cubes: MarchingCubes::new(0.5), values: Vec::new(), patch: Patch::default() }
     }
 
     fn nearest(

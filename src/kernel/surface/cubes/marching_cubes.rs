@@ -28,23 +28,10 @@ pub fn cells_of_brick(brick: &Box3, shape: [i64; 3], closed_at_border: bool) -> 
     }
 }
 
-/// How values run from one voxel to the next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Profile {
-    /// Evenly.
-    Linear,
-    /// As `1 / (1 + exp(-d))` over the distance d: across a front of a level set that went from 0 to 1.
-    Logistic,
-}
-
-/// Values of a front nearer to 0 or 1 than this are so near: there single precision and boundary values say how far they are.
-const FRONT_ENDS: f64 = 1e-4;
-
 /// Finds the surface brick by brick; keeps its working memory between bricks.
 #[derive(Clone, Debug)]
 pub struct MarchingCubes {
     level: f32,
-    profile: Profile,
     /// The vertex on each edge of the tile, by `3 * (place of the lower voxel) + axis`.
     vertex_on: Vec<u32>,
 }
@@ -53,14 +40,7 @@ impl MarchingCubes {
     /// For the surface `u = level`.
     #[must_use]
     pub fn new(level: f32) -> Self {
-        Self { level, profile: Profile::Linear, vertex_on: Vec::new() }
-    }
-
-    /// For the surface `u = 1/2` of a level set that evolved from 0 outside to 1 inside. Its front is a few voxels wide and
-    /// as steep as a logistic function: read evenly from voxel to voxel the surface would have steps.
-    #[must_use]
-    pub fn of_front() -> Self {
-        Self { profile: Profile::Logistic, ..Self::new(0.5) }
+        Self { level, vertex_on: Vec::new() }
     }
 
     /// Bytes of memory that stay between bricks.
@@ -122,33 +102,18 @@ impl MarchingCubes {
         let (corner, axis) = (lower_corner(edge), axis_of(edge));
         let lower: [i64; 3] = std::array::from_fn(|a| cell[a] + i64::from(corner >> a & 1));
         let place = tile.part.offset_of(lower);
-        if self.vertex_on[3 * place + axis] == NO_VERTEX {
+        let vertex = &mut self.vertex_on[3 * place + axis];
+        if *vertex == NO_VERTEX {
             let mut upper = lower;
             upper[axis] += 1;
             let mut position = lower.map(|v| v as f64);
-            let ends = [tile.values[place], tile.values[tile.part.offset_of(upper)]];
-            position[axis] += self.fraction(ends);
-            self.vertex_on[3 * place + axis] = patch.keys.len() as u32;
+            position[axis] += fraction(tile.values[place], tile.values[tile.part.offset_of(upper)], self.level);
+            *vertex = patch.keys.len() as u32;
             patch.keys.push(VertexKey::on_edge(lower, axis));
             patch.positions.push(position);
         }
-        self.vertex_on[3 * place + axis]
+        *vertex
     }
-
-    /// Where the level is crossed on the way from the lower to the upper voxel.
-    fn fraction(&self, [lower, upper]: [f32; 2]) -> f64 {
-        let [lower, upper, level] = [lower, upper, self.level].map(f64::from);
-        match self.profile {
-            Profile::Linear => fraction(lower, upper, level),
-            Profile::Logistic => fraction(logit(lower), logit(upper), logit(level)),
-        }
-    }
-}
-
-/// How far a value of a front lies inside, in widths of the front.
-fn logit(value: f64) -> f64 {
-    let value = value.clamp(FRONT_ENDS, 1.0 - FRONT_ENDS);
-    libm::log(value / (1.0 - value))
 }
 
 struct Tile<'a> {
@@ -159,7 +124,8 @@ struct Tile<'a> {
 /// Where the level is crossed on the way from the lower to the upper voxel, at least [`MARGIN`] off both.
 ///
 /// Both values and their order are the same for every brick that shares the edge, and so are the bits.
-fn fraction(lower: f64, upper: f64, level: f64) -> f64 {
+fn fraction(lower: f32, upper: f32, level: f32) -> f64 {
+    let [lower, upper, level] = [lower, upper, level].map(f64::from);
     let at = (level - lower) / (upper - lower);
     if at.is_nan() { 0.5 } else { at.clamp(MARGIN, 1.0 - MARGIN) }
 }
@@ -174,25 +140,7 @@ mod tests {
         assert_eq!(fraction(2.0, 1.0, 1.25), 0.75);
         assert_eq!(fraction(0.5, 0.0, 0.5), MARGIN);
         assert_eq!(fraction(0.0, 0.5, 0.5), 1.0 - MARGIN);
-        assert_eq!(fraction(f64::NEG_INFINITY, f64::INFINITY, 0.0), 0.5);
-    }
-
-    /// A ball whose front is a third of a voxel wide, as a level set leaves it.
-    #[test]
-    fn a_front_is_found_where_it_lies_and_read_evenly_it_has_steps() {
-        const RADIUS: f64 = 5.3;
-        let part = Box3::new([-8; 3], [9; 3]);
-        let away = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt() - RADIUS;
-        let voxels = part.rows().flat_map(|(y, z)| (-8..9).map(move |x| [x, y, z].map(|v| v as f64)));
-        let u: Vec<f32> = voxels.map(|p| (1.0 / (1.0 + (3.0 * away(p)).exp())) as f32).collect();
-        let cells = Box3::new([-8; 3], [8; 3]);
-        let worst = |mut cubes: MarchingCubes| {
-            let mut patch = Patch::default();
-            cubes.extract(&u, &part, &cells, &mut patch);
-            patch.positions.iter().map(|&p| away(p).abs()).fold(0.0, f64::max)
-        };
-        let [front, even] = [MarchingCubes::of_front(), MarchingCubes::new(0.5)].map(worst);
-        assert!(front < 0.025 && even > 0.05, "{front} {even}");
+        assert_eq!(fraction(f32::NEG_INFINITY, f32::INFINITY, 0.0), 0.5);
     }
 
     #[test]
