@@ -175,7 +175,7 @@ fn one_object_in_two_files_is_told() {
     // Every second slice of one ball, each made whole again: the balls differ by what slices in between would have told.
     let share =
         told.split("objects 1 (a.csv) and 2 (b.csv) overlap by ").nth(1).and_then(|rest| rest.split(' ').next());
-    assert!(share.is_some_and(|share| share.parse::<f64>().unwrap() >= 90.0), "{told}");
+    assert!(share.is_some_and(|share| share.parse::<f64>().unwrap() >= 80.0), "{told}");
     let one = bench.path("one.csv");
     let rows = ball.marks(1).lines().fold(String::new(), |text, row| {
         let fields: Vec<&str> = row.split(',').collect();
