@@ -8,6 +8,7 @@ mod distance;
 mod distance_cli;
 mod distance_front;
 mod distance_hostile;
+mod distance_limited;
 mod distance_meshes;
 mod distance_outside;
 mod distance_outside_dense;

@@ -61,7 +61,7 @@ pub(crate) struct FieldArgs {
     /// Type of the distances
     #[arg(long, value_enum, default_value_t = PrecisionArg::F32)]
     pub(crate) precision: PrecisionArg,
-    /// As far as this length; voxels farther away hold it [default: everywhere]
+    /// As far as this length; voxels farther away hold it and have no label [default: everywhere]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(crate) max_distance: Option<f64>,
 }

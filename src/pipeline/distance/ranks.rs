@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::readout::repair::with_repair;
+use super::readout::within::within;
 use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;
@@ -27,11 +28,12 @@ pub fn solve<'a, P: Precision>(
     options: Options,
 ) -> Result<Solved<'a, P>> {
     let solved = solve_once(stage, sources, set, method, schedule, options)?;
-    Ok(if method.solver::<P>().tracks_sources() {
+    let solved = if method.solver::<P>().tracks_sources() {
         with_repair(solved, sources, options, schedule == Schedule::Front)
     } else {
         solved
-    })
+    };
+    Ok(within(solved, options.farthest))
 }
 
 /// The same without a second look at voxels whose nearest source the front may have lost (they are few, away from the

@@ -78,6 +78,12 @@ pub fn middle_kept<P: Precision>(
         let labelled = Labelled { geometry, shapes: &shapes, trees: &trees, sources: &*solved.sources, first_labels };
         let (measures, pairs) = draw(&stage, &labelled, settings.surface, mesh)?;
         stage.finish();
+        if measures.triangles == 0 {
+            return Err(Error::vanished(
+                "no surface lies between the data sets in this grid: one of them is the nearest everywhere, or --max-distance is \
+                 less than half of what lies between them; give a grid that reaches others, or a larger distance",
+            ));
+        }
         let wanted = Wanted { labels: true, borders: store.is_some(), closest_point: distance.closest_point };
         let read_out = ReadOut { geometry, sets, solved: &solved, is_signed: distance.signed, wanted, kept };
         let found = read_out.run(engine, store)?;

@@ -7,3 +7,4 @@ pub(crate) mod kept;
 pub(crate) mod repair;
 pub(crate) mod tile;
 pub(crate) mod visit;
+pub(crate) mod within;
