@@ -25,7 +25,7 @@ pub enum ErrorKind {
     Vanished,
     /// Some of several parts of a run failed, and the others are done (exit code 3).
     Partly,
-    /// SIGINT or SIGTERM asked the run to end (exit code 130 or 143).
+    /// SIGINT, SIGTERM or SIGHUP asked the run to end (exit code 130, 143 or 129).
     Interrupted {
         /// The signal's number: 2 or 15.
         signal: i32,

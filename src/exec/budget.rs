@@ -23,7 +23,7 @@ impl Budget {
     /// # Errors
     /// When that is too little: names the smallest budget that would do.
     pub fn window(&self, held: u64) -> Result<u64> {
-        self.window_of(held, SMALLEST_WINDOW)
+        self.window_of(held, SMALLEST_WINDOW, "")
     }
 
     /// The same for a run that is under way, where what was to be held turns out to be more.
@@ -31,22 +31,22 @@ impl Budget {
     /// # Errors
     /// When that is too little: names the smallest budget that would have done.
     pub(super) fn window_under_way(self, held: u64) -> Result<u64> {
-        self.window_of(held, SMALLEST_UNDER_WAY)
+        self.window_of(held, SMALLEST_UNDER_WAY, "")
     }
 
     /// Lets inputs be read or looked at that take so many bytes, while no field is there yet.
     ///
     /// # Errors
-    /// When they alone are too many: names the smallest budget that a run with them could have.
+    /// When they alone are too many: names what they take, and that a run takes more, which they have to be read to know.
     pub fn admit(self, held: u64) -> Result<()> {
-        self.window_of(held, 0).map(drop)
+        self.window_of(held, 0, " to read its input, and more to work on it").map(drop)
     }
 
-    fn window_of(self, held: u64, smallest: u64) -> Result<u64> {
+    fn window_of(self, held: u64, smallest: u64, what_for: &str) -> Result<u64> {
         let least = Self::least(held);
         if self.total < least - SMALLEST_WINDOW + smallest {
             return Err(Error::usage(format!(
-                "a memory budget of {} is too small for this run: give at least --memory {}MiB",
+                "a memory budget of {} is too small for this run: give at least --memory {}MiB{what_for}",
                 if self.total < 1 << 20 {
                     format!("{} bytes", self.total)
                 } else {

@@ -117,6 +117,7 @@ fn a_run_that_cannot_look_up_ends_all_the_same() {
     for (command, signal, code) in [
         ("reconstruct points.xyz -o out/x.zarr", "INT", 130),
         ("distance points.xyz -o out/x.zarr --spacing 1", "TERM", 143),
+        ("distance points.xyz -o out/x.zarr --spacing 1", "HUP", 129),
     ] {
         let mut command = bench.command(command);
         let child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();

@@ -15,6 +15,9 @@ use crate::pipeline::marks::{ObjectMarks, Seed, split_and_seed};
 use crate::pipeline::segment;
 use crate::pipeline::segment::{CheckedMarks, Extent, Grids, Refused, shared};
 
+/// Objects, and pairs of them, that notes name, at most.
+const MOST_NAMED: usize = 10;
+
 /// What decides how the numbers of a file are read.
 pub(crate) struct Reading<'a> {
     /// The grid of the whole image.
@@ -59,11 +62,21 @@ pub(crate) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Con
             ))
             .at(path));
         }
-        for (from, to) in marks.add(cloud, path, is_sure) {
-            console.note(&format!("object {from} of {} is numbered {to}", path.display()));
-        }
+        note_numbers(&marks.add(cloud, path, is_sure), path, console);
     }
     Ok(marks)
+}
+
+/// Says which numbers the objects of a file have, where others had theirs: all of many in one note.
+fn note_numbers(numbers: &[(u32, u32)], path: &Path, console: &Console) {
+    let path = path.display();
+    match numbers {
+        [(first, first_to), .., (last, last_to)] if numbers.len() > MOST_NAMED => console.note(&format!(
+            "the {} objects of {path} are numbered on: {first} is {first_to}, {last} is {last_to}",
+            numbers.len()
+        )),
+        few => few.iter().for_each(|(from, to)| console.note(&format!("object {from} of {path} is numbered {to}"))),
+    }
 }
 
 /// Whether two paths name one file, by whatever spelling.
@@ -209,9 +222,6 @@ pub(crate) fn check_all_marks(marks: &Marks, grids: &Grids<'_>, seeds: &[Seed], 
 
 /// Pairs of objects that are compared, at most: it is looked at for people's files, not for thousands of cells.
 const MOST_PAIRS: usize = 1 << 20;
-
-/// Pairs that are named, at most.
-const MOST_NAMED: usize = 10;
 
 /// Says which objects of two files lie where one object would.
 fn note_twice_marked(objects: &[ObjectMarks], marks: &Marks, image: &Geometry, console: &Console) {

@@ -29,6 +29,10 @@ impl Outputs<'_> {
     /// With the output that cannot be, and why.
     pub(crate) fn check(&self) -> Result<()> {
         let mut seen: Vec<PathBuf> = Vec::new();
+        let is_folder = |path: &&&Path| path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/");
+        if let Some(path) = self.files.iter().find(is_folder) {
+            return Err(Error::usage("is a folder; give the name of a file").at(path));
+        }
         for &path in self.store.iter().chain(&self.files) {
             let folder = folder_of(path);
             if !folder.is_dir() {
@@ -76,7 +80,8 @@ fn may_write(path: &Path, overwrite: bool) -> Result<()> {
     if path.exists() && !path.is_file() {
         return Err(Error::usage("is no regular file; give another name").at(path));
     }
-    if path.exists() && !overwrite {
+    // A link that leads nowhere is there, too.
+    if path.symlink_metadata().is_ok() && !overwrite {
         let what = "exists already; choose another name, or give --overwrite to replace it";
         return Err(Error::usage(what).at(path));
     }

@@ -1,4 +1,4 @@
-//! SIGINT and SIGTERM: the first asks the run to end in order. A run that has not ended a while after it, since it reads a
+//! SIGINT, SIGTERM, and SIGHUP, which a terminal sends that is closed: the first asks the run to end in order. A run that has not ended a while after it, since it reads a
 //! slow disk or is in a long computation, or is sent a second one, is ended from here, and what it had begun to write is
 //! removed. A signal in the midst of that ends the process at once.
 
@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 
 use crate::cli::complain;
@@ -31,7 +31,8 @@ static ASKED: AtomicUsize = AtomicUsize::new(0);
 pub(crate) fn cancel_on_signals() -> Result<Cancel> {
     let cancel = Cancel::default();
     let (again, removing) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
-    for signal in [SIGINT, SIGTERM] {
+    let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+    for signal in [SIGINT, SIGTERM].into_iter().chain(hang_up) {
         flag::register_conditional_shutdown(signal, 128 + signal, removing.clone())
             .and_then(|_| flag::register(signal, again.clone()))
             .and_then(|_| flag::register_usize(signal, cancel.flag(), signal as usize))
@@ -59,6 +60,13 @@ pub(crate) fn cancel_on_signals() -> Result<Cancel> {
     };
     thread::Builder::new().spawn(watch).map_err(|error| Error::from_io("cannot listen to signals", &error))?;
     Ok(cancel)
+}
+
+/// Whether whoever started the process asked that a signal be passed over, as `nohup` does.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 /// Whether the caller is the one who says how the process ends: the first who asks.
