@@ -100,7 +100,8 @@
 //!
 //! # Features
 //!
-//! `cli`, on by default: the program `strandline`, with clap, indicatif and signal-hook. A library does without:
+//! `cli`, on by default: the program `strandline`, with clap, indicatif and signal-hook; `viewer`, too: its `strandline view`, with a
+//! server and the page that it serves. A library does without:
 //! `strandline = { version = "0.1", default-features = false }`.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
@@ -127,6 +128,9 @@ pub mod pipeline;
 pub mod store;
 #[doc(hidden)]
 pub mod tile;
+#[cfg(feature = "viewer")]
+#[doc(hidden)]
+pub mod view;
 
 pub use error::{Error, ErrorKind, Result};
 pub use exec::{Cancel, Progress, Silent};

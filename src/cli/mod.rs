@@ -62,6 +62,10 @@ fn execute(cli: Cli, typed: &[String]) -> Result<()> {
         Command::Demo(args) => commands::demo::run(&args, typed),
         Command::Measure(args) => commands::measure::run(&args),
         Command::Info(args) => commands::info::run(&args),
+        #[cfg(feature = "viewer")]
+        Command::View(args) => commands::view::run(&args),
+        Command::Completions { shell } => commands::shell::completions(shell),
+        Command::Man { folder } => commands::shell::manual(&folder),
     }
 }
 

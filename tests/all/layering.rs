@@ -22,6 +22,7 @@ const ROOMS: &[(&str, u8)] = &[
     ("io", 3),
     ("pipeline", 4),
     ("job", 5),
+    ("view", 5),
     ("cli", 6),
 ];
 

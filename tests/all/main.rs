@@ -50,6 +50,7 @@ mod outlines;
 mod room_circles;
 #[cfg(target_os = "linux")]
 mod segment_notes;
+mod shell;
 mod signals;
 mod slice_folders;
 mod terminal;
@@ -60,6 +61,7 @@ mod tiff_handmade;
 mod tiff_hostile;
 mod tiff_levels;
 mod told;
+mod view;
 mod zarr_input;
 mod zarr_odd;
 mod zarr_readers;

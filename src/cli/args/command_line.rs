@@ -6,6 +6,8 @@ use super::common::{DemoArgs, InfoArgs, MeasureArgs, SegmentArgs};
 use super::distance::DistanceJobArgs;
 use super::middle::MiddleArgs;
 use super::reconstruct::ReconstructArgs;
+#[cfg(feature = "viewer")]
+use super::view::ViewArgs;
 
 /// Finds surfaces in 3-D volumes larger than memory.
 #[derive(Debug, Parser)]
@@ -35,6 +37,20 @@ pub(crate) enum Command {
     Measure(MeasureArgs),
     /// Tell what an input or output is: shape, axes, spacing, unit, type
     Info(InfoArgs),
+    /// Look at results in the browser: stores, OME-Zarr of other programs, meshes
+    #[cfg(feature = "viewer")]
+    View(ViewArgs),
+    /// Print what a shell needs to complete commands and flags
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write manual pages, one a command
+    Man {
+        /// Folder for the pages; it is made where there is none
+        #[arg(value_name = "FOLDER")]
+        folder: std::path::PathBuf,
+    },
 }
 
 pub(crate) const HELP_ON_SEGMENT: &str = "\

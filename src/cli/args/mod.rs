@@ -8,3 +8,5 @@ pub(crate) mod middle;
 pub(crate) mod pages;
 pub(crate) mod reconstruct;
 pub(crate) mod values;
+#[cfg(feature = "viewer")]
+pub(crate) mod view;

@@ -8,4 +8,7 @@ pub(crate) mod measure;
 pub(crate) mod middle;
 pub(crate) mod reconstruct;
 pub(crate) mod segment;
+pub(crate) mod shell;
 pub(crate) mod store_contents;
+#[cfg(feature = "viewer")]
+pub(crate) mod view;

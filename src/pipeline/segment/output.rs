@@ -6,6 +6,7 @@ use super::begun::Solution;
 use super::estimate::estimate;
 use super::kept::{Kept, labels_of, objects_of};
 use super::labels::Placed;
+use super::marks_table::write_marks;
 use super::meshes::ObjectMeshes;
 use super::neighbours::{Found, Joined};
 use super::object_report::ObjectReport;
@@ -142,6 +143,7 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     drop(joined);
     if let Some(store) = store {
         write_image(engine, guides.geometry, &image, store)?;
+        write_marks(store, guides.objects)?;
     }
     let (objects, reports) = objects_of(solved);
     let kept = labels.map(|labels| Kept { objects, labels });

@@ -1,0 +1,184 @@
+//! What each path of the server answers: the page at `/`, the files of stores at `/data/NAME/...`, meshes at `/mesh`, the page's
+//! state at `/state.json`, and how far a store that is still written is at `/live.json`.
+
+use std::io::{Read, Seek, SeekFrom};
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::{Path, Request, State};
+use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
+use axum::http::{Method, StatusCode};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use flate2::read::GzDecoder;
+use serde_json::{Value, json};
+use tokio::io::AsyncReadExt;
+use tokio_util::io::ReaderStream;
+
+use super::folder::{Folder, Opened};
+use super::ranges::{Asked, Part, part};
+use super::shown::Shown;
+use super::{mesh, page, state};
+
+/// Bytes of a file that are in memory at a time, of each request.
+const PIECE: usize = 64 << 10;
+/// The root attributes of a store are shorter than this.
+const MOST_ATTRIBUTES: u64 = 4 << 20;
+/// Metres where nobody says what a unit of length is: the page takes the numbers as they are.
+const NO_UNIT: f64 = 1.0;
+
+/// What all answers are made of.
+struct Site {
+    shown: Shown,
+    state: String,
+}
+
+/// The answers for what is shown.
+pub(super) fn router(shown: Shown) -> Router {
+    let site = Arc::new(Site { state: state::state(&shown).to_string(), shown });
+    Router::new()
+        .route("/", get(|headers: HeaderMap| async move { page_file("", &headers) }))
+        .route(
+            "/state.json",
+            get(|State(site): State<Arc<Site>>| async move { of_type("application/json", site.state.clone()) }),
+        )
+        .route("/live.json", get(live))
+        .route("/mesh/{name}", get(mesh_part))
+        .route("/data/{*path}", get(data))
+        .route("/{name}", get(|Path(name): Path<String>, headers: HeaderMap| async move { page_file(&name, &headers) }))
+        .layer(middleware::from_fn(open_to_all))
+        .with_state(site)
+}
+
+/// Pages of other origins may read what is shown, as a neuroglancer elsewhere does; nothing can be changed here.
+async fn open_to_all(request: Request, next: Next) -> Response {
+    let mut answer = match *request.method() {
+        Method::OPTIONS => StatusCode::NO_CONTENT.into_response(),
+        _ => next.run(request).await,
+    };
+    let headers = answer.headers_mut();
+    for (name, value) in [
+        (header::ACCESS_CONTROL_ALLOW_ORIGIN, "*"),
+        (header::ACCESS_CONTROL_ALLOW_HEADERS, "range, if-none-match, if-range"),
+        (header::ACCESS_CONTROL_ALLOW_METHODS, "GET, HEAD, OPTIONS"),
+        (header::ACCESS_CONTROL_EXPOSE_HEADERS, "content-range, content-length, etag, accept-ranges"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    answer
+}
+
+fn of_type(media_type: &'static str, body: impl Into<Body>) -> Response {
+    ([(header::CONTENT_TYPE, media_type), (header::CACHE_CONTROL, "no-cache")], body.into()).into_response()
+}
+
+fn page_file(name: &str, headers: &HeaderMap) -> Response {
+    let Some(file) = page::file(name) else { return StatusCode::NOT_FOUND.into_response() };
+    if text(headers, &header::ACCEPT_ENCODING).is_some_and(|accepted| accepted.contains("gzip")) {
+        let mut answer = of_type(file.media_type, file.packed);
+        answer.headers_mut().insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+        return answer;
+    }
+    let mut unpacked = Vec::new();
+    match GzDecoder::new(file.packed).read_to_end(&mut unpacked) {
+        Ok(_) => of_type(file.media_type, unpacked),
+        Err(_) => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
+    }
+}
+
+fn text<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
+    headers.get(name).and_then(|value| value.to_str().ok())
+}
+
+/// How far the stores are that are still written, and a number that grows with what is written.
+async fn live(State(site): State<Arc<Site>>) -> Response {
+    let states: Vec<Value> = site.shown.roots.iter().filter_map(|(_, folder)| written_state(folder)).collect();
+    let running = states.iter().filter(|state| state["state"] == "running");
+    let share = running.clone().filter_map(|state| state["done"].as_f64()).fold(f64::INFINITY, f64::min);
+    let words = match running.count() {
+        0 => String::new(),
+        1 => format!("running, {:.0} % done", 100.0 * share.clamp(0.0, 1.0)),
+        several => format!("{several} stores are written, {:.0} % done", 100.0 * share.clamp(0.0, 1.0)),
+    };
+    let written: u64 = states.iter().filter_map(|state| state["written"].as_u64()).sum();
+    of_type("application/json", json!({ "running": !words.is_empty(), "text": words, "written": written }).to_string())
+}
+
+fn written_state(folder: &Folder) -> Option<Value> {
+    let root: Value = serde_json::from_slice(&folder.read("zarr.json", MOST_ATTRIBUTES).ok()?).ok()?;
+    root["attributes"]["strandline"].is_object().then(|| root["attributes"]["strandline"].clone())
+}
+
+async fn mesh_part(State(site): State<Arc<Site>>, Path(name): Path<String>) -> Response {
+    if name == "info" {
+        return of_type("application/json", json!({ "@type": "neuroglancer_legacy_mesh" }).to_string());
+    }
+    let numbered = |digits: &str| {
+        let segment: u64 = digits.parse().ok()?;
+        site.shown.meshes.iter().find(|mesh| mesh.segment == segment)
+    };
+    if let Some(mesh) = name.strip_suffix(":0").and_then(numbered) {
+        return of_type("application/json", json!({ "fragments": [mesh.segment.to_string()] }).to_string());
+    }
+    let Some(mesh_file) = numbered(&name) else { return StatusCode::NOT_FOUND.into_response() };
+    let metres = site.shown.images.iter().flat_map(|image| &image.axes).find_map(|axis| axis.metres).unwrap_or(NO_UNIT);
+    let file = mesh_file.file.clone();
+    match tokio::task::spawn_blocking(move || mesh::fragment(&file, metres)).await {
+        Ok(Ok(bytes)) => of_type("application/octet-stream", bytes),
+        _ => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+/// A file of a store, or a part of it.
+async fn data(State(site): State<Arc<Site>>, request: Request) -> Response {
+    // The path as it was sent: it is decoded once, where it is checked.
+    let path = request.uri().path().strip_prefix("/data/").unwrap_or_default().to_owned();
+    let headers = request.headers().clone();
+    let opened = tokio::task::spawn_blocking(move || {
+        let (name, inside) = path.split_once('/')?;
+        let name = percent_encoding::percent_decode_str(name).decode_utf8().ok()?;
+        site.shown.roots.iter().find(|(root, _)| *root == name)?.1.open(inside)
+    });
+    match opened.await {
+        Ok(Some(opened)) => part_of(opened, &headers),
+        _ => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+fn part_of(opened: Opened, headers: &HeaderMap) -> Response {
+    let Opened { mut file, length, tag, media_type } = opened;
+    let asked = Asked {
+        range: text(headers, &header::RANGE),
+        if_range: text(headers, &header::IF_RANGE),
+        if_none_match: text(headers, &header::IF_NONE_MATCH),
+    };
+    let (status, from, to) = match part(asked, length, &tag) {
+        Part::Whole => (StatusCode::OK, 0, length),
+        Part::Bytes(from, to) => (StatusCode::PARTIAL_CONTENT, from, to),
+        Part::Unchanged => return (StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response(),
+        Part::Outside => {
+            return (StatusCode::RANGE_NOT_SATISFIABLE, [(header::CONTENT_RANGE, format!("bytes */{length}"))])
+                .into_response();
+        }
+    };
+    if from > 0 && file.seek(SeekFrom::Start(from)).is_err() {
+        return StatusCode::NOT_FOUND.into_response();
+    }
+    let stream = ReaderStream::with_capacity(tokio::fs::File::from_std(file).take(to - from), PIECE);
+    let mut answer = (status, of_type(media_type, Body::from_stream(stream))).into_response();
+    let own = answer.headers_mut();
+    own.insert(header::CONTENT_LENGTH, HeaderValue::from(to - from));
+    own.insert(header::ACCEPT_RANGES, HeaderValue::from_static("bytes"));
+    if let Ok(tag) = HeaderValue::from_str(&tag) {
+        own.insert(header::ETAG, tag);
+    }
+    if status == StatusCode::PARTIAL_CONTENT
+        && let Ok(range) = HeaderValue::from_str(&format!("bytes {from}-{}/{length}", to - 1))
+    {
+        own.insert(header::CONTENT_RANGE, range);
+    }
+    answer
+}

@@ -1,0 +1,23 @@
+//! Where and how other programs open what is shown.
+
+use super::shown::{Image, Shown};
+
+/// Links and commands for the server at `origin`, such as `http://127.0.0.1:8000`, a line each.
+#[must_use]
+pub fn links(shown: &Shown, origin: &str) -> String {
+    let source = |image: &Image| {
+        let version = if image.is_version_2 { "zarr2" } else { "zarr3" };
+        format!("neuroglancer source  {origin}/data/{}/|{version}:\n", image.path)
+    };
+    let images: String = shown.images.iter().map(source).collect();
+    let segments = shown.meshes.iter().map(|mesh| {
+        format!("neuroglancer mesh    precomputed://{origin}/mesh  (segment {}: {})\n", mesh.segment, mesh.path)
+    });
+    let stores = shown.roots.iter().map(|(_, folder)| {
+        let store = folder.root().display();
+        format!("napari               napari --plugin napari-ome-zarr {store}\nFiji (MoBIE, N5)     {store}\n")
+    });
+    let meshes = shown.meshes.iter().map(|mesh| format!("ParaView             paraview {}\n", mesh.file.display()));
+    let rest: String = segments.chain(stores).chain(meshes).collect();
+    format!("page                 {origin}/\n{images}{rest}")
+}

@@ -1,0 +1,285 @@
+//! What lies in a store, in a folder of several, or in another program's OME-Zarr, that can be shown: images, label images and
+//! fields by their OME metadata (versions 0.4 and 0.5), and meshes.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::folder::Folder;
+use crate::error::{Error, Result};
+use crate::io::geometry::read::point_file::PointFile;
+use crate::io::geometry::read::points::{LengthUnit, read_points};
+use crate::pipeline::segment::MARKS;
+
+/// Folders below a store that are looked into.
+const DEEPEST: usize = 3;
+/// Images and meshes that are looked at, at most, and fields that are shown.
+const MOST: usize = 4096;
+const MOST_FIELDS: usize = 6;
+/// Marks that are shown of a store, at most.
+const MOST_MARKS: usize = 20_000;
+/// A file of metadata is shorter than this.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// Everything that is shown.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// The stores and files by the names that they have on the server.
+    pub(super) roots: Vec<(String, Folder)>,
+    pub(super) images: Vec<Image>,
+    pub(super) meshes: Vec<MeshFile>,
+    /// Marks of segmentations, physical coordinates.
+    pub(super) marks: Vec<[f64; 3]>,
+}
+
+/// What an image's values are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    /// Grey values.
+    Picture,
+    /// Numbers of objects.
+    Labels,
+    /// A field beside an image, such as a distance.
+    Field,
+}
+
+/// A multiscale image.
+#[derive(Clone, Debug)]
+pub(super) struct Image {
+    /// Its path on the server, without a slash at its ends.
+    pub(super) path: String,
+    pub(super) name: String,
+    pub(super) kind: Kind,
+    /// Whether it is a Zarr of version 2, as OME-Zarr 0.4 is.
+    pub(super) is_version_2: bool,
+    pub(super) axes: Vec<Axis>,
+    /// The values from black to white.
+    pub(super) window: Option<[f64; 2]>,
+    /// Colours of labels: number, red, green, blue.
+    pub(super) colors: Vec<(u64, [u8; 3])>,
+}
+
+/// An axis of an image.
+#[derive(Clone, Debug)]
+pub(super) struct Axis {
+    pub(super) name: String,
+    /// Metres of a unit; none where the axis has no length.
+    pub(super) metres: Option<f64>,
+    pub(super) voxels: u64,
+    /// In units of the axis.
+    pub(super) spacing: f64,
+    pub(super) origin: f64,
+}
+
+/// A mesh.
+#[derive(Clone, Debug)]
+pub(super) struct MeshFile {
+    /// Its path on the server.
+    pub(super) path: String,
+    /// Where it lies.
+    pub(super) file: PathBuf,
+    /// The number that the page knows it by: that of its object, where its name has one.
+    pub(super) segment: u64,
+}
+
+impl Shown {
+    /// Looks at a store, a folder of stores, or a mesh.
+    ///
+    /// # Errors
+    /// When there is nothing that can be shown.
+    pub fn of(path: &Path) -> Result<Self> {
+        let mut shown = Self { roots: Vec::new(), images: Vec::new(), meshes: Vec::new(), marks: Vec::new() };
+        let found = std::fs::metadata(path)
+            .map_err(|e| Error::input(format!("cannot be opened: {e}")).caused_by(e).at(path))?;
+        if found.is_file() {
+            shown.add_mesh(path)?;
+        } else if multiscale(path).is_some() {
+            shown.add_store(path)?;
+        } else {
+            for below in folders(path) {
+                if multiscale(&below).is_some() && shown.roots.len() < MOST {
+                    shown.add_store(&below)?;
+                }
+            }
+            // A store without an image of its own, such as that of a reconstruction.
+            if shown.roots.is_empty() {
+                shown.add_store(path)?;
+            }
+        }
+        shown.thin_fields();
+        if shown.images.is_empty() && shown.meshes.is_empty() {
+            let what = "holds nothing that can be shown; give an OME-Zarr store, a folder of some, or a PLY mesh";
+            return Err(Error::input(what).at(path));
+        }
+        Ok(shown)
+    }
+
+    fn add_store(&mut self, path: &Path) -> Result<()> {
+        let folder = Folder::new(path)?;
+        let name = self.free_name(folder.root());
+        self.add_group(&name, folder.root(), DEEPEST);
+        self.add_marks(&folder.root().join(MARKS));
+        self.roots.push((name, folder));
+        Ok(())
+    }
+
+    /// Adds the marks of a store, every n-th where there are more than a page can hold.
+    fn add_marks(&mut self, path: &Path) {
+        // A store without marks, or with a table of another program, is shown without.
+        let Ok(PointFile { cloud, .. }) = read_points(path) else { return };
+        let every = cloud.positions.len().div_ceil(MOST_MARKS).max(1);
+        self.marks.extend(cloud.positions.iter().step_by(every));
+    }
+
+    fn add_mesh(&mut self, path: &Path) -> Result<()> {
+        let true_path =
+            path.canonicalize().map_err(|e| Error::input(format!("cannot be opened: {e}")).caused_by(e).at(path))?;
+        let name = file_name(&true_path);
+        self.push_mesh(name, true_path);
+        Ok(())
+    }
+
+    fn push_mesh(&mut self, path: String, file: PathBuf) {
+        let is_free = |segment: &u64| *segment > 0 && self.meshes.iter().all(|mesh| mesh.segment != *segment);
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        let own = stem.rsplit_once('-').and_then(|(_, number)| number.parse().ok()).filter(is_free);
+        let segment = own.or_else(|| (1..=u64::MAX).find(is_free)).unwrap_or(1);
+        self.meshes.push(MeshFile { path, file, segment });
+    }
+
+    /// Leaves out fields where there are more than somebody would look through.
+    fn thin_fields(&mut self) {
+        let mut fields = 0;
+        self.images.retain(|image| {
+            fields += usize::from(image.kind == Kind::Field);
+            image.kind != Kind::Field || fields <= MOST_FIELDS
+        });
+        self.images.sort_by_key(|image| image.kind);
+    }
+
+    /// The name of a store on the server; another where a store of the same name is there already.
+    fn free_name(&self, path: &Path) -> String {
+        let name = file_name(path);
+        let is_taken = |name: &str| self.roots.iter().any(|(taken, _)| taken == name);
+        let others = (2..).map(|n| format!("{n}-{name}"));
+        std::iter::once(name.clone()).chain(others).find(|name| !is_taken(name)).unwrap_or(name)
+    }
+
+    /// Adds the image of a group, those of the groups below it, and their meshes.
+    fn add_group(&mut self, path: &str, folder: &Path, depth: usize) {
+        if self.images.len() >= MOST {
+            return;
+        }
+        if let Some(image) = multiscale(folder).and_then(|found| image(path, folder, &found)) {
+            self.images.push(image);
+        }
+        for file in files(folder) {
+            let is_mesh = file.extension().is_some_and(|e| ["ply", "obj", "stl", "off"].map(str::as_ref).contains(&e));
+            if is_mesh && self.meshes.len() < MOST {
+                self.push_mesh(format!("{path}/{}", file_name(&file)), file);
+            }
+        }
+        for below in folders(folder).into_iter().filter(|_| depth > 0) {
+            self.add_group(&format!("{path}/{}", file_name(&below)), &below, depth - 1);
+        }
+    }
+}
+
+/// Attributes of a multiscale image, and whether its Zarr is of version 2.
+struct Multiscale {
+    attributes: Value,
+    is_version_2: bool,
+}
+
+fn multiscale(folder: &Path) -> Option<Multiscale> {
+    let of = |attributes: Value, is_version_2: bool| {
+        attributes["multiscales"][0]["datasets"].is_array().then_some(Multiscale { attributes, is_version_2 })
+    };
+    match json(&folder.join("zarr.json")) {
+        Some(mut group) => of(group["attributes"]["ome"].take(), false),
+        None => of(json(&folder.join(".zattrs"))?, true),
+    }
+}
+
+fn json(path: &Path) -> Option<Value> {
+    let is_short = std::fs::metadata(path).ok()?.len() <= MOST_BYTES;
+    serde_json::from_slice(&std::fs::read(path).ok().filter(|_| is_short)?).ok()
+}
+
+fn image(path: &str, folder: &Path, found: &Multiscale) -> Option<Image> {
+    let described = &found.attributes["multiscales"][0];
+    let finest = &described["datasets"][0];
+    let array = folder.join(finest["path"].as_str()?);
+    let array = json(&array.join(if found.is_version_2 { ".zarray" } else { "zarr.json" }))?;
+    let transforms = [&finest["coordinateTransformations"], &described["coordinateTransformations"]];
+    let vector = |kind: &str, n: usize, neutral: f64, joined: fn(f64, f64) -> f64| {
+        let all = transforms.iter().flat_map(|list| list.as_array().into_iter().flatten());
+        all.filter_map(|t| t[kind][n].as_f64()).fold(neutral, joined)
+    };
+    let axis = |(n, axis): (usize, &Value)| {
+        // Version 0.3 named axes by words alone.
+        let name = axis["name"].as_str().or(axis.as_str())?;
+        let unit = axis["unit"].as_str().map(LengthUnit::named);
+        let is_space = axis["type"].as_str().map_or(["x", "y", "z"].contains(&name), |kind| kind == "space");
+        Some(Axis {
+            name: name.to_owned(),
+            metres: unit.flatten().map(|unit| unit.metres).filter(|_| is_space),
+            voxels: array["shape"][n].as_u64()?,
+            spacing: vector("scale", n, 1.0, |a, b| a * b),
+            origin: vector("translation", n, 0.0, |a, b| a + b),
+        })
+    };
+    let axes: Vec<Axis> = described["axes"].as_array()?.iter().enumerate().map(axis).collect::<Option<_>>()?;
+    let window = &found.attributes["omero"]["channels"][0]["window"];
+    let is_labels = found.attributes["image-label"].is_object() || path.contains("/labels/");
+    let is_field = path.contains('/');
+    Some(Image {
+        path: path.to_owned(),
+        name: described["name"].as_str().filter(|name| !name.is_empty()).unwrap_or(path).to_owned(),
+        kind: if is_labels {
+            Kind::Labels
+        } else if is_field {
+            Kind::Field
+        } else {
+            Kind::Picture
+        },
+        is_version_2: found.is_version_2,
+        axes,
+        window: window["start"].as_f64().zip(window["end"].as_f64()).map(|(low, high)| [low, high]),
+        colors: colors(&found.attributes["image-label"]["colors"]),
+    })
+}
+
+fn colors(list: &Value) -> Vec<(u64, [u8; 3])> {
+    let channel = |color: &Value, n: usize| color["rgba"][n].as_u64().and_then(|v| u8::try_from(v).ok());
+    let color = |color: &Value| {
+        Some((color["label-value"].as_u64()?, [channel(color, 0)?, channel(color, 1)?, channel(color, 2)?]))
+    };
+    list.as_array().into_iter().flatten().filter_map(color).collect()
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// What a folder holds, in order of names.
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let Ok(listed) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut entries: Vec<PathBuf> = listed.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    entries.sort();
+    entries
+}
+
+/// Folders in a folder that may be groups: those of chunks have numbers for names, and hidden ones are under way.
+fn folders(folder: &Path) -> Vec<PathBuf> {
+    let may_be_group = |path: &PathBuf| {
+        let name = file_name(path);
+        let is_chunks = name == "c" || name.bytes().all(|byte| byte.is_ascii_digit());
+        path.is_dir() && !path.is_symlink() && !is_chunks && !name.starts_with('.')
+    };
+    entries(folder).into_iter().filter(may_be_group).collect()
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    entries(folder).into_iter().filter(|path| path.is_file() && !path.is_symlink()).collect()
+}

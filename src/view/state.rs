@@ -1,0 +1,134 @@
+//! The state that the page opens with, as neuroglancer takes it: a layer for each image, label image, field and all meshes, in the
+//! world of the first image; what is large or only of use beside the rest waits unseen.
+
+use serde_json::{Map, Value, json};
+
+use super::shown::{Axis, Image, Kind, Shown};
+
+/// Colours of meshes without one, evenly around the circle of hues.
+const HUE_STEP: f64 = 0.618_033_988_75;
+
+/// The state; sources begin with a slash, for the server that the page came from.
+pub(super) fn state(shown: &Shown) -> Value {
+    let mut layers: Vec<Value> = shown.images.iter().map(|image| layer(image, shown)).collect();
+    if !shown.meshes.is_empty() {
+        layers.push(meshes(shown));
+    }
+    layers.extend(shown.images.first().filter(|_| !shown.marks.is_empty()).map(|image| marks(image, &shown.marks)));
+    let mut state = json!({
+        "layers": layers,
+        "layout": "4panel-alt",
+        "showScaleBar": true,
+        "showAxisLines": false,
+        // Sections would hide the surfaces behind them.
+        "showSlices": false,
+        "projectionBackgroundColor": "#1a1a1a",
+    });
+    if let (Value::Object(state), Some(image)) = (&mut state, shown.images.first()) {
+        place(image, state);
+    }
+    state
+}
+
+/// Looks at the middle of an image, so that it fills the page.
+fn place(image: &Image, state: &mut Map<String, Value>) {
+    let space: Vec<&Axis> =
+        image.axes.iter().rev().filter(|axis| ["x", "y", "z"].contains(&axis.name.as_str())).collect();
+    let dimensions: Map<String, Value> = space.iter().map(|axis| (axis.name.clone(), dimension(axis))).collect();
+    let middle = |axis: &&Axis| axis.origin / axis.spacing + 0.5 * axis.voxels as f64;
+    let longest = space.iter().map(|axis| axis.voxels as f64 * axis.spacing).fold(0.0, f64::max);
+    let unit = space.first().map_or(1.0, |axis| axis.spacing);
+    state.insert("dimensions".into(), Value::Object(dimensions));
+    state.insert("position".into(), space.iter().map(middle).collect());
+    // A panel is some 500 pixels wide.
+    state.insert("crossSectionScale".into(), json!(longest / unit / 450.0));
+    state.insert("projectionScale".into(), json!(1.6 * longest / unit));
+}
+
+fn dimension(axis: &Axis) -> Value {
+    match axis.metres {
+        Some(metres) => json!([axis.spacing * metres, "m"]),
+        None => json!([axis.spacing, ""]),
+    }
+}
+
+fn layer(image: &Image, shown: &Shown) -> Value {
+    let has_picture = shown.images.iter().any(|other| other.kind == Kind::Picture);
+    let version = if image.is_version_2 { "zarr2" } else { "zarr3" };
+    let source = json!({ "url": format!("/data/{}/|{version}:", image.path) });
+    match image.kind {
+        Kind::Labels => {
+            let colors: Map<String, Value> =
+                image.colors.iter().map(|(label, rgb)| (label.to_string(), hex(*rgb).into())).collect();
+            let segments: Vec<String> = image.colors.iter().map(|(label, _)| label.to_string()).collect();
+            json!({
+                "type": "segmentation", "name": image.name, "source": source, "visible": !image.path.ends_with("/border"),
+                "segmentColors": colors, "segments": segments,
+                "selectedAlpha": 0.35, "notSelectedAlpha": if segments.is_empty() { 0.35 } else { 0.0 },
+            })
+        }
+        kind => {
+            let visible = kind == Kind::Picture || !has_picture;
+            let controls = image.window.map(|window| json!({ "normalized": { "range": window } })).unwrap_or(json!({}));
+            json!({
+                "type": "image", "name": image.name, "source": source, "visible": visible, "shaderControls": controls,
+                "shader": "#uicontrol invlerp normalized\nvoid main() {\n  emitGrayscale(normalized());\n}\n",
+            })
+        }
+    }
+}
+
+/// Marks as points in units of the image.
+fn marks(image: &Image, marks: &[[f64; 3]]) -> Value {
+    let unit = |name: &str| {
+        let metres = image.axes.iter().find(|axis| axis.name == name).and_then(|axis| axis.metres);
+        metres.map_or(json!([1.0, ""]), |metres| json!([metres, "m"]))
+    };
+    let point = |(n, place): (usize, &[f64; 3])| json!({ "type": "point", "id": n.to_string(), "point": place });
+    json!({
+        "type": "annotation", "name": "marks", "annotationColor": "#ffe14d",
+        "source": {
+            "url": "local://annotations",
+            "transform": { "outputDimensions": { "x": unit("x"), "y": unit("y"), "z": unit("z") } },
+        },
+        "annotations": marks.iter().enumerate().map(point).collect::<Vec<_>>(),
+        "shader": "void main() {\n  setColor(defaultColor());\n  setPointMarkerSize(4.0);\n}\n",
+    })
+}
+
+/// All meshes as one layer, those of labels in the labels' colours.
+fn meshes(shown: &Shown) -> Value {
+    let labelled =
+        |segment: u64| shown.images.iter().flat_map(|image| &image.colors).find(|(label, _)| *label == segment);
+    let color = |segment: u64| labelled(segment).map_or_else(|| hue(segment as f64 * HUE_STEP), |(_, color)| *color);
+    let numbers = || shown.meshes.iter().map(|mesh| mesh.segment);
+    let colors: Map<String, Value> = numbers().map(|n| (n.to_string(), hex(color(n)).into())).collect();
+    let segments: Vec<String> = numbers().map(|n| n.to_string()).collect();
+    let mut source = json!({ "url": "precomputed:///mesh" });
+    if let Some(axes) =
+        shown.images.first().map(|image| &image.axes).filter(|axes| axes.iter().all(|axis| axis.metres.is_none()))
+    {
+        // Lengths without a unit: the numbers of the mesh are those of the image.
+        let names =
+            || axes.iter().rev().map(|axis| axis.name.clone()).filter(|name| ["x", "y", "z"].contains(&name.as_str()));
+        let of = |unit: &str| names().map(|name| (name, json!([1e-9, unit]))).collect::<Map<String, Value>>();
+        let of_image = names().map(|name| (name, json!([1.0, ""]))).collect::<Map<String, Value>>();
+        source["transform"] = json!({ "inputDimensions": of("m"), "outputDimensions": of_image });
+    }
+    json!({
+        "type": "segmentation", "name": "surfaces", "source": source, "segments": segments, "segmentColors": colors,
+        "objectAlpha": 0.8,
+    })
+}
+
+fn hex([red, green, blue]: [u8; 3]) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+/// A light colour of a hue, which counts turns.
+fn hue(turns: f64) -> [u8; 3] {
+    [0.0, 1.0 / 3.0, 2.0 / 3.0].map(|shift| {
+        let wave = 0.5 + 0.5 * libm::cos(std::f64::consts::TAU * (turns - shift));
+        (90.0 + 165.0 * wave) as u8
+    })
+}

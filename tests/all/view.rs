@@ -1,0 +1,227 @@
+//! `strandline view` as a client sees it: the files of a store byte for byte, in whole and in parts, none outside of it, and a
+//! state of the page whose sources are there.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Stdio};
+
+use crate::common::ball::{Ball, Bench};
+use crate::common::random::Random;
+
+/// A server of its own, ended when it is dropped.
+struct Served {
+    child: Child,
+    address: String,
+}
+
+impl Served {
+    fn new(bench: &Bench, what: &str) -> Self {
+        let mut child =
+            bench.command(&format!("view {what} --no-open --for 5min")).stdout(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+        let address = line.trim().trim_end_matches('/').strip_prefix("http://").unwrap().to_owned();
+        Self { child, address }
+    }
+
+    /// Sends what may be no request at all.
+    fn send(&self, bytes: &[u8]) -> Answer {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.write_all(bytes).unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        Answer::of(&answer)
+    }
+
+    fn ask(&self, method: &str, path: &str, headers: &str) -> Answer {
+        self.send(
+            format!("{method} {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{headers}\r\n", self.address)
+                .as_bytes(),
+        )
+    }
+
+    fn get(&self, path: &str) -> Answer {
+        self.ask("GET", path, "")
+    }
+
+    fn json(&self, path: &str) -> serde_json::Value {
+        serde_json::from_slice(&self.get(path).body).unwrap()
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[derive(Debug)]
+struct Answer {
+    code: u16,
+    head: String,
+    body: Vec<u8>,
+}
+
+impl Answer {
+    fn of(bytes: &[u8]) -> Self {
+        let end = bytes.windows(4).position(|four| four == b"\r\n\r\n").unwrap_or(bytes.len());
+        let head = String::from_utf8_lossy(&bytes[..end]).to_ascii_lowercase();
+        let code = head.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
+        Self { code, head, body: bytes.get(end + 4..).unwrap_or_default().to_vec() }
+    }
+
+    fn header(&self, name: &str) -> Option<&str> {
+        self.head.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "))
+    }
+}
+
+/// A store of all that `segment` writes.
+fn store() -> Bench {
+    let bench = Bench::new(&Ball::small());
+    bench.succeed("segment image.tif --points marks.csv -q -o out/ball.zarr");
+    bench
+}
+
+#[test]
+fn files_are_those_of_the_store_in_whole_and_in_parts() {
+    let bench = store();
+    let served = Served::new(&bench, "out/ball.zarr");
+    let path = "/data/ball.zarr/meshes/surface.ply";
+    let bytes = fs::read(bench.path("out/ball.zarr/meshes/surface.ply")).unwrap();
+    let whole = served.get(path);
+    assert_eq!((whole.code, whole.body == bytes), (200, true), "{}", whole.head);
+    let mut random = Random(11);
+    for _ in 0..200 {
+        let (from, to) = (random.below(bytes.len()), random.below(2 * bytes.len()));
+        let (text, expected) = match random.below(3) {
+            0 => (format!("bytes={from}-"), &bytes[from..]),
+            1 => (format!("bytes=-{}", from + 1), &bytes[bytes.len() - from - 1..]),
+            _ if to < from => continue,
+            _ => (format!("bytes={from}-{to}"), &bytes[from..bytes.len().min(to + 1)]),
+        };
+        let part = served.ask("GET", path, &format!("Range: {text}\r\n"));
+        assert_eq!((part.code, part.body == expected), (206, true), "{text}: {}", part.head);
+        let start = bytes.len() - expected.len();
+        if !text.ends_with(&to.to_string()) {
+            let range = format!("bytes {start}-{}/{}", bytes.len() - 1, bytes.len());
+            assert_eq!(part.header("content-range"), Some(range.as_str()));
+        }
+    }
+    assert_eq!(served.ask("GET", path, &format!("Range: bytes={}-\r\n", bytes.len())).code, 416);
+    let head = served.ask("HEAD", path, "");
+    assert_eq!(
+        (head.code, head.body.len(), head.header("content-length")),
+        (200, 0, Some(bytes.len().to_string().as_str()))
+    );
+    let tag = whole.header("etag").unwrap();
+    assert_eq!(served.ask("GET", path, &format!("If-None-Match: {tag}\r\n")).code, 304);
+    assert_eq!(served.ask("OPTIONS", path, "").header("access-control-allow-origin"), Some("*"));
+    assert_eq!(served.ask("DELETE", path, "").code, 405);
+    assert_eq!(served.get("/data/ball.zarr/0/c/9/9/9").code, 404);
+}
+
+#[test]
+fn nothing_outside_of_the_store_is_answered() {
+    let bench = store();
+    bench.write("secret", "secret");
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(bench.path("secret"), bench.path("out/ball.zarr/link")).unwrap();
+    let served = Served::new(&bench, "out/ball.zarr");
+    for path in [
+        "/data/ball.zarr/../../secret",
+        "/data/ball.zarr/%2e%2e/%2e%2e/secret",
+        "/data/ball.zarr/..%2f..%2fsecret",
+        "/data/ball.zarr/%252e%252e/secret",
+        "/data/ball.zarr//etc/passwd",
+        "/data//etc/passwd",
+        "/data/..",
+        "/data/ball.zarr/link",
+        "/data/ball.zarr/",
+        "/data/ball.zarr/meshes",
+        "/data/ball.zarr/%00",
+        "/data/ball.zarr/a\\..\\..\\secret",
+        "/../secret",
+        "/mesh/../secret",
+        "/mesh/99",
+    ] {
+        let answer = served.get(path);
+        assert!([400, 404].contains(&answer.code), "{path}: {}", answer.head);
+        assert!(!answer.body.windows(6).any(|six| six == b"secret"), "{path}");
+    }
+    for odd in [&b"GARBAGE\r\n\r\n"[..], b"GET / HTTP/9.9\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n"] {
+        assert!([0, 400, 505].contains(&served.send(odd).code));
+    }
+    let large = format!("GET / HTTP/1.1\r\nHost: a\r\nX: {}\r\n\r\n", "a".repeat(1 << 17));
+    let _ = TcpStream::connect(&served.address).unwrap().write_all(large.as_bytes());
+    assert_eq!(served.get("/").code, 200);
+}
+
+#[test]
+fn the_page_finds_all_that_its_state_names() {
+    let bench = store();
+    let served = Served::new(&bench, "out");
+    let page = served.get("/");
+    assert!(page.code == 200 && String::from_utf8_lossy(&page.body).contains("main.js"), "{}", page.head);
+    for name in ["main.js", "main.css", "chunk_worker.bundle.js", "async_computation.bundle.js"] {
+        let (plain, packed) =
+            (served.get(&format!("/{name}")), served.ask("GET", &format!("/{name}"), "Accept-Encoding: gzip\r\n"));
+        assert_eq!((plain.code, packed.header("content-encoding")), (200, Some("gzip")), "{name}");
+        let mut unpacked = Vec::new();
+        flate2::read::GzDecoder::new(&packed.body[..]).read_to_end(&mut unpacked).unwrap();
+        assert!(unpacked == plain.body, "{name}");
+    }
+    let state = served.json("/state.json");
+    let layers = state["layers"].as_array().unwrap();
+    let names: Vec<&str> = layers.iter().map(|layer| layer["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["image", "segmentation", "distance", "levelset", "surfaces", "marks"]);
+    let marks = layers[5]["annotations"].as_array().unwrap();
+    assert_eq!(marks.len(), fs::read_to_string(bench.path("marks.csv")).unwrap().lines().count() - 1);
+    assert_eq!(layers[5]["source"]["transform"]["outputDimensions"]["x"], serde_json::json!([1e-6, "m"]));
+    for layer in &layers[..5] {
+        let url = layer["source"]["url"].as_str().unwrap();
+        let metadata = match url.strip_suffix("|zarr3:") {
+            Some(folder) => format!("{folder}zarr.json"),
+            None => format!("{}/info", url.strip_prefix("precomputed://").unwrap()),
+        };
+        assert_eq!(served.get(&metadata).code, 200, "{metadata}");
+    }
+    // 40 x 36 x 20 voxels of 0.5, 0.5 and 1 micrometer.
+    assert_eq!(state["position"], serde_json::json!([20.0, 18.0, 10.0]));
+    assert_eq!(state["dimensions"]["z"], serde_json::json!([1e-6, "m"]));
+    assert_eq!(served.json("/live.json")["running"], false);
+}
+
+/// The mesh of the page against the file that it was made of.
+#[test]
+fn meshes_are_those_of_the_store_in_nanometres() {
+    let bench = store();
+    let served = Served::new(&bench, "out/ball.zarr");
+    assert_eq!(served.json("/mesh/1:0"), serde_json::json!({ "fragments": ["1"] }));
+    let fragment = served.get("/mesh/1").body;
+    let word = |n: usize| <[u8; 4]>::try_from(&fragment[4 * n..4 * n + 4]).unwrap();
+    let count = u32::from_le_bytes(word(0)) as usize;
+    let measured: serde_json::Value =
+        serde_json::from_str(&bench.succeed("measure out/ball.zarr/meshes/surface.ply --json")).unwrap();
+    assert_eq!(measured["vertices"], count);
+    assert_eq!(measured["triangles"], (fragment.len() / 4 - 1 - 3 * count) / 3);
+    let positions: Vec<f64> = (1..=3 * count).map(|n| f64::from(f32::from_le_bytes(word(n)))).collect();
+    // The ball's radius in nanometres.
+    let ball = Ball::small();
+    for p in positions.chunks_exact(3) {
+        let away = (0..3).map(|a| (p[a] - 1000.0 * ball.centre[a]).powi(2)).sum::<f64>().sqrt();
+        assert!((away - 1000.0 * ball.radius).abs() < 1000.0, "{p:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused_and_the_time_ends() {
+    let bench = Bench::bare();
+    assert!(bench.fail("view out --no-open", 2).contains("holds nothing that can be shown"));
+    assert!(bench.fail("view none.zarr --no-open", 2).contains("none.zarr"));
+    bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert!(bench.succeed("view a.obj --no-open --for 1s --print-links").contains("precomputed://http://127.0.0.1:"));
+}
