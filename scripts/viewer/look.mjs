@@ -1,0 +1,92 @@
+// Opens stores with `strandline view` in Chromium and looks at what is drawn.
+//
+//     STRANDLINE=PATH KEEP=FOLDER node look.mjs STORE WHAT,WHAT,... [STORE WHAT,...]...
+//
+// WHAT: image (grey values that vary), labels (a coloured tint over a section), surface (colour in the view of space), marks (points of
+// their own yellow). Pictures go to KEEP. Ends with 1 where something is missing, a request failed or the page had an error.
+
+import { spawn } from "node:child_process";
+import { join } from "node:path";
+import { createInterface } from "node:readline";
+import { PNG } from "pngjs";
+import puppeteer from "puppeteer-core";
+
+const WIDTH = 1280;
+const HEIGHT = 800;
+// Pixels of a picture that have to show what is looked for; the frame around data has some at its edges that are no pure yellow.
+const ENOUGH = 2000;
+// Seconds until a page on a busy machine has drawn everything.
+const PATIENCE = 120;
+
+// Section panels are the left half and the upper right quarter, below the bars; the lower right quarter is the view of space.
+const isSpace = (x, y) => x > WIDTH / 2 + 4 && y > HEIGHT / 2 + 30 && y < HEIGHT - 30;
+const isSection = (x, y) => y > 60 && (x < WIDTH / 2 - 4 || y < HEIGHT / 2 - 4);
+
+const saturation = ([r, g, b]) => Math.max(r, g, b) - Math.min(r, g, b);
+const isMark = ([r, g, b]) => Math.abs(r - 255) < 25 && Math.abs(g - 225) < 25 && Math.abs(b - 77) < 40;
+// The frame that is drawn around data is pure yellow.
+const isFrame = ([r, g, b]) => r > 200 && g > 200 && b < 40;
+
+const LOOKS = {
+  image: (pixels) => new Set(pixels.filter(([x, y, c]) => isSection(x, y) && saturation(c) < 12).map(([, , c]) => c[0])).size * 10,
+  labels: (pixels) => pixels.filter(([x, y, c]) => isSection(x, y) && saturation(c) > 25 && !isMark(c) && !isFrame(c)).length,
+  surface: (pixels) => pixels.filter(([x, y, c]) => isSpace(x, y) && saturation(c) > 25 && !isMark(c) && !isFrame(c)).length,
+  marks: (pixels) => pixels.filter(([, y, c]) => y > 60 && isMark(c)).length,
+};
+
+const pixelsOf = (picture) => {
+  const { width, data } = PNG.sync.read(Buffer.from(picture));
+  return Array.from({ length: data.length / 4 }, (_, n) => [n % width, Math.floor(n / width), data.subarray(4 * n, 4 * n + 3)]);
+};
+
+const serve = async (store) => {
+  const server = spawn(process.env.STRANDLINE, ["view", store, "--no-open", "--for", "10min"], { stdio: ["ignore", "pipe", "inherit"] });
+  const lines = createInterface({ input: server.stdout });
+  for await (const line of lines) return { server, url: line.trim() };
+  throw new Error(`strandline view ${store} said nothing`);
+};
+
+const look = async (browser, store, wanted) => {
+  const { server, url } = await serve(store);
+  const faults = [];
+  let bytes = 0;
+  try {
+    const page = await browser.newPage();
+    page.on("pageerror", (error) => faults.push(`page error: ${error.message}`));
+    page.on("response", (answer) => answer.status() >= 500 && faults.push(`${answer.status()} ${answer.url()}`));
+    page.on("request", (request) => !request.url().startsWith(url) && !/^(data|blob):/.test(request.url()) && faults.push(`leaves: ${request.url()}`));
+    const session = await page.createCDPSession();
+    await session.send("Network.enable");
+    session.on("Network.loadingFinished", (event) => (bytes += event.encodedDataLength));
+    await page.goto(url);
+    await page.waitForFunction(() => window.viewer?.layerManager.managedLayers.length > 0 && window.viewer.isReady(), {
+      timeout: 1000 * PATIENCE,
+      polling: 500,
+    });
+    await new Promise((after) => setTimeout(after, 1500));
+    const picture = await page.screenshot({ path: join(process.env.KEEP, `${store.replace(/\W/g, "-")}.png`) });
+    const pixels = pixelsOf(picture);
+    for (const what of wanted) {
+      const seen = LOOKS[what](pixels);
+      console.log(`${store}: ${what} ${seen} (${ENOUGH} asked)`);
+      if (seen < ENOUGH) faults.push(`${what} is not to be seen`);
+    }
+    console.log(`${store}: ${(bytes / 1e6).toFixed(2)} MB loaded by the page itself`);
+    await page.close();
+  } finally {
+    server.kill("SIGINT");
+  }
+  faults.forEach((fault) => console.error(`${store}: ${fault}`));
+  return faults.length === 0;
+};
+
+const browser = await puppeteer.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
+  defaultViewport: { width: WIDTH, height: HEIGHT },
+});
+let good = true;
+const given = process.argv.slice(2);
+for (let n = 0; n + 1 < given.length; n += 2) good = (await look(browser, given[n], given[n + 1].split(","))) && good;
+await browser.close();
+process.exit(good ? 0 : 1);
