@@ -29,10 +29,6 @@ impl Outputs<'_> {
     /// With the output that cannot be, and why.
     pub(crate) fn check(&self) -> Result<()> {
         let mut seen: Vec<PathBuf> = Vec::new();
-        let is_folder = |path: &&&Path| path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/");
-        if let Some(path) = self.files.iter().find(is_folder) {
-            return Err(Error::usage("is a folder; give the name of a file").at(path));
-        }
         for &path in self.store.iter().chain(&self.files) {
             let folder = folder_of(path);
             if !folder.is_dir() {
@@ -46,6 +42,10 @@ impl Outputs<'_> {
             if self.inputs.iter().any(|input| would_replace(path, input)) {
                 return Err(Error::usage("is an input of this run; give the output another name").at(path));
             }
+        }
+        let is_folder = |path: &&&Path| path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/");
+        if let Some(path) = self.files.iter().find(is_folder) {
+            return Err(Error::usage("is a folder; give the name of a file").at(path));
         }
         self.files.iter().try_for_each(|path| self.check_store_of(path))?;
         self.files.iter().try_for_each(|path| may_write(path, self.overwrite))
