@@ -12,7 +12,7 @@ use strandline::{
     Schedule, Segmentation, TriangleMesh, Volume,
 };
 
-use crate::common::ball::{Ball, Bench};
+use crate::common::ball::{Ball, Bench, HEADER};
 use crate::common::clouds::{sphere, sponge};
 use crate::common::meshes::{Form, cuboid};
 use crate::common::stores::{contents, same, volume};
@@ -185,6 +185,11 @@ fn outlines(ball: &Ball) -> BTreeMap<i64, Vec<[f64; 3]>> {
 fn a_segmentation_is_that_of_the_command_line() {
     let ball = Ball::small();
     let bench = Bench::new(&ball);
+    // The builder counts outlines, and a store keeps their numbers.
+    let row = |n: usize, [x, y, z]: &[f64; 3]| format!("1,{n},{x},{y},{z}\n");
+    let counted = (1..).zip(outlines(&ball).into_values());
+    let rows = counted.flat_map(|(n, outline)| outline.iter().map(|p| row(n, p)).collect::<Vec<_>>());
+    bench.write("marks.csv", &rows.fold(HEADER.to_owned(), |text, row| text + &row));
     bench.succeed("segment image.tif --points marks.csv -q -o out/cli.zarr");
     let image = Volume::new(ball.geometry.shape, ball.voxels()).unwrap();
     let mut job = Segmentation::of(&image, ball.geometry.clone()).store(bench.path("out/job.zarr"));
