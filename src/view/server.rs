@@ -83,6 +83,8 @@ impl Server {
                 tokio::spawn(async move {
                     let mut http = http1::Builder::new();
                     http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(HEADER_BYTES);
+                    // Who has nothing more to ask still waits for the answer.
+                    http.half_close(true);
                     // A client that goes away in the midst of an answer is no failure of the server.
                     let _ = http.serve_connection(TokioIo::new(stream), service).await;
                     drop(place);
