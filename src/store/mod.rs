@@ -1,6 +1,7 @@
 //! A field on disk: bricks in memory-mapped scratch files, and the traits by which boxes of voxels are read and
 //! written.
 
+mod both_sinks;
 mod brick_array;
 mod element;
 mod free_space;
@@ -9,6 +10,7 @@ mod stream;
 mod unfinished;
 mod window;
 
+pub use both_sinks::BothSinks;
 pub use brick_array::{BrickArray, Scratch};
 pub use element::{Element, ElementType, Sample, SampleWork, SamplesMut};
 pub use free_space::free_space;

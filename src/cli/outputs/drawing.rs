@@ -12,14 +12,10 @@ use crate::io::geometry::write::formats::{MeshFile, WholeMesh};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
 use crate::pipeline::segment::{ObjectMesh, ObjectMeshes};
-use crate::store::MeshSink;
+use crate::store::{BothSinks, MeshSink};
 
-/// A surface that is being drawn.
-#[derive(Default)]
-pub(crate) struct Drawing {
-    ply: Option<PlyWriter>,
-    asked: Option<Asked>,
-}
+/// A surface that is being drawn: into a store, and into the file that was asked for.
+pub(crate) type Drawing = BothSinks<PlyWriter, Asked>;
 
 /// A mesh file that was asked for.
 #[derive(Clone, Copy)]
@@ -34,7 +30,7 @@ pub(crate) struct ToFile<'a> {
 }
 
 /// The file while it is written; what went wrong with a copy.
-struct Asked {
+pub(crate) struct Asked {
     file: Result<MeshFile>,
     is_copy: bool,
 }
@@ -52,13 +48,13 @@ impl Drawing {
     ) -> Result<Self> {
         let create = if is_tagged { PlyWriter::tagged_on_grid } else { PlyWriter::on_grid };
         let ply = store.map(|store| create(&store.file("meshes/surface.ply")?, geometry)).transpose()?;
-        Ok(Self { ply, asked: to.map(|to| Asked::new(to, geometry)).transpose()? })
+        Ok(Self { first: ply, second: to.map(|to| Asked::new(to, geometry)).transpose()? })
     }
 
     /// Completes the files; that which was asked for gets its name later.
     pub(crate) fn finish(self) -> Result<Option<Finished>> {
-        self.ply.map_or(Ok(()), PlyWriter::finish)?;
-        self.asked.map(Asked::finish).transpose()
+        self.first.map_or(Ok(()), PlyWriter::finish)?;
+        self.second.map(Asked::finish).transpose()
     }
 }
 
@@ -108,27 +104,6 @@ impl MeshSink for Asked {
 
     fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> Result<()> {
         self.take(|file| file.facet(corners, labels))
-    }
-}
-
-impl MeshSink for Drawing {
-    fn on_grid(&mut self, grid: &Geometry) -> Result<()> {
-        self.asked.as_mut().map_or(Ok(()), |asked| asked.on_grid(grid))
-    }
-
-    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
-        self.ply.as_mut().map_or(Ok(()), |ply| ply.vertex(position))?;
-        self.asked.as_mut().map_or(Ok(()), |asked| asked.vertex(position))
-    }
-
-    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
-        self.ply.as_mut().map_or(Ok(()), |ply| ply.triangle(corners))?;
-        self.asked.as_mut().map_or(Ok(()), |asked| asked.triangle(corners))
-    }
-
-    fn facet(&mut self, corners: [u32; 3], labels: [u32; 2]) -> Result<()> {
-        self.ply.as_mut().map_or(Ok(()), |ply| ply.facet(corners, labels))?;
-        self.asked.as_mut().map_or(Ok(()), |asked| asked.facet(corners, labels))
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::grid::Geometry;
 use crate::io::geometry::write::ply::PlyWriter;
-use crate::store::MeshSink;
+use crate::store::{BothSinks, MeshSink};
 
 /// Takes the surfaces of objects. Several may be drawn at the same time.
 pub trait ObjectMeshes: Sync {
@@ -24,27 +24,12 @@ pub trait ObjectMesh: MeshSink {
 }
 
 /// The surface of an object on its way into a store and to who takes it, as far as these are there.
-pub(super) struct Surface<'a> {
-    pub(super) file: Option<PlyWriter>,
-    pub(super) taken: Option<Box<dyn ObjectMesh + 'a>>,
-}
+pub(super) type Surface<'a> = BothSinks<PlyWriter, Box<dyn ObjectMesh + 'a>>;
 
 impl Surface<'_> {
     /// Gives it to all that take it.
     pub(super) fn keep(self) -> Result<()> {
-        self.file.map_or(Ok(()), PlyWriter::finish)?;
-        self.taken.map_or(Ok(()), ObjectMesh::keep)
-    }
-}
-
-impl MeshSink for Surface<'_> {
-    fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
-        self.file.as_mut().map_or(Ok(()), |file| file.vertex(position))?;
-        self.taken.as_mut().map_or(Ok(()), |taken| taken.vertex(position))
-    }
-
-    fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
-        self.file.as_mut().map_or(Ok(()), |file| file.triangle(corners))?;
-        self.taken.as_mut().map_or(Ok(()), |taken| taken.triangle(corners))
+        self.first.map_or(Ok(()), PlyWriter::finish)?;
+        self.second.map_or(Ok(()), ObjectMesh::keep)
     }
 }

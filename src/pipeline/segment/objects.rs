@@ -145,8 +145,8 @@ fn draw(
     let stage = engine.stage(&format!("surface {label}"), 0);
     let name = if several { format!("meshes/object-{label}.ply") } else { "meshes/surface.ply".into() };
     let mut mesh = Surface {
-        file: store.map(|store| PlyWriter::on_grid(&store.file(&name)?, geometry)).transpose()?,
-        taken: meshes.map(|meshes| meshes.begin(label, geometry)).transpose()?,
+        first: store.map(|store| PlyWriter::on_grid(&store.file(&name)?, geometry)).transpose()?,
+        second: meshes.map(|meshes| meshes.begin(label, geometry)).transpose()?,
     };
     let points = marks.contours.concat();
     let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, u, geometry, &points, &mut mesh)?;
