@@ -9,6 +9,7 @@ use super::budget::{Budget, machine_memory, peak_resident};
 use super::cancel::Cancel;
 use super::comm::{Comm, SelfComm};
 use super::footprint::{Account, Footprint, Hold};
+use super::outlook::Outlook;
 use super::progress::{OfRank, Progress};
 use crate::error::{Error, Result};
 use crate::store::{Scratch, Traffic};
@@ -48,6 +49,7 @@ pub struct Engine {
     scratch: Scratch,
     budget: Budget,
     account: Arc<Account>,
+    outlook: Arc<Outlook>,
     reports: Mutex<Vec<StageReport>>,
 }
 
@@ -67,7 +69,8 @@ impl Engine {
         let pool = Arc::new(pool(threads)?);
         let comm = Arc::new(SelfComm);
         let account = Account::new(budget, scratch.clone());
-        Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, reports: Mutex::default() })
+        let (outlook, reports) = (Arc::default(), Mutex::default());
+        Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, outlook, reports })
     }
 
     /// The engine with so many ranks, 1 or more, for stages that can be shared out: see [`Stage::on_ranks`].
@@ -87,13 +90,14 @@ impl Engine {
             scratch: self.scratch.clone(),
             budget: self.budget,
             account: self.account.clone(),
+            outlook: self.outlook.clone(),
             reports: Mutex::default(),
         })
     }
 
     /// An engine that shares this one's threads and window, for one of several jobs side by side: it keeps reports of
     /// its own, and says nothing of its stages.
-    pub(super) fn beside(&self) -> Self {
+    pub(crate) fn beside(&self) -> Self {
         Self {
             pool: self.pool.clone(),
             cancel: self.cancel.clone(),
@@ -103,6 +107,7 @@ impl Engine {
             scratch: self.scratch.clone(),
             budget: self.budget,
             account: self.account.clone(),
+            outlook: self.outlook.clone(),
             reports: Mutex::default(),
         }
     }
@@ -162,6 +167,12 @@ impl Engine {
     /// When the budget is too small: names the smallest that would do.
     pub fn hold(&self, bytes: u64) -> Result<Hold> {
         self.account.hold(bytes)
+    }
+
+    /// How far the run is.
+    #[must_use]
+    pub fn outlook(&self) -> &Arc<Outlook> {
+        &self.outlook
     }
 
     /// Tells the user one line.

@@ -44,6 +44,14 @@ pub trait Relax: Sync {
     /// Takes what a brick tells, of this rank or a ghost: wakes those beside it.
     fn receive(&mut self, slot: Slot, note: &Self::Note);
 
+    /// A round begins; `nearest` is the priority of the brick that is due next, of all ranks.
+    ///
+    /// # Errors
+    /// When who looks on fails; the run ends.
+    fn before_round(&mut self, _nearest: f64) -> Result<()> {
+        Ok(())
+    }
+
     /// All of a wave, on this rank and beside it, was visited and told.
     ///
     /// # Errors
@@ -87,6 +95,7 @@ impl<W: Send> Waves<'_, '_, W> {
     pub fn relax<R: Relax<Work = W>>(&self, job: &mut R, until: Until) -> Result<u64> {
         let mut rounds = 0;
         while let Some(nearest) = self.nearest(job)?.filter(|nearest| *nearest <= until.farthest) {
+            job.before_round(nearest)?;
             self.round(job, nearest + until.width)?;
             rounds += 1;
         }

@@ -9,6 +9,7 @@ pub(crate) mod disk;
 mod distance_field;
 mod field;
 mod given;
+pub(crate) mod live;
 mod mesh;
 mod middle_surface;
 mod motion;

@@ -47,7 +47,14 @@ fn cube_error<P: Stored>(lab: &Lab, count: i64, method: Method, schedule: Schedu
     let stage = lab.engine.stage("distance", 0);
     let row = method.solver::<P>();
     let solved = (row.solve)(
-        &Solving { stage: &stage, engine: &lab.engine, sources: &sources, set: &set, options: everywhere(false) },
+        &Solving {
+            stage: &stage,
+            engine: &lab.engine,
+            sources: &sources,
+            set: &set,
+            options: everywhere(false),
+            early: None,
+        },
         schedule,
     )
     .expect("room for a field");

@@ -68,7 +68,7 @@ fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
     let inside = tagging.inside(&stage, &lab.engine, 0.25).expect("room in scratch");
     let reaches = Reaches { inner: 0.5, outer: 0.5 };
     let mut band = make_band(&stage, &lab.engine, &distance, &inside, reaches).expect("room in scratch");
-    let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta))
+    let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta), None)
         .expect("room in scratch");
     let (mesh, measures) = surface(&geometry, &whole(&band.u));
     assert!(measures.is_closed());
@@ -115,7 +115,7 @@ fn a_sphere_shrinks_by_its_curvature() {
         run.velocity.epsilon = 1e-3;
         let stage = lab.engine.stage("sphere", 0);
         for leg in 1..=4 {
-            evolve(&stage, &lab.engine, &mut band, None, spacing, &run).unwrap();
+            evolve(&stage, &lab.engine, &mut band, None, spacing, &run, None).unwrap();
             let time = f64::from(leg * run.max_steps) * f64::from(run.velocity.tau);
             let exact = (0.64 - 4.0 * 0.1 * time).sqrt();
             let radius = (0.75 / PI * surface(&geometry, &whole(&band.u)).1.volume).cbrt();
@@ -140,7 +140,7 @@ fn a_sphere_moves_at_its_speed() {
         let mut run = TimeLoop { stop: Stop::L2(0.0), max_steps: steps, ..settings(0.02, 0.0, 0.0) };
         run.velocity = Velocity { rho: 1.0, speed: true, epsilon: 1e-3, ..run.velocity };
         let stage = lab.engine.stage("sphere", 0);
-        evolve(&stage, &lab.engine, &mut band, Some(&field), geometry.spacing, &run).unwrap();
+        evolve(&stage, &lab.engine, &mut band, Some(&field), geometry.spacing, &run, None).unwrap();
         (0.75 / PI * surface(&geometry, &whole(&band.u)).1.volume).cbrt()
     };
     let time = 40.0 * 0.005;
@@ -165,7 +165,7 @@ fn the_front_rests_where_the_distance_is_zero() {
         let mut band = lab.band(geometry.shape, &u, &d, &vec![1; u.len()]);
         let stage = lab.engine.stage("sphere", 0);
         let run = TimeLoop { max_steps: 60, ..settings(0.05, 1.0, 0.0) };
-        evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &run).unwrap();
+        evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &run, None).unwrap();
         let radius = (0.75 / PI * surface(&geometry, &whole(&band.u)).1.volume).cbrt();
         assert!((radius - target).abs() < 0.005, "{radius} for {target}");
     }
@@ -188,7 +188,7 @@ fn threads_change_no_bit_of_the_level_set() {
         let mut run = TimeLoop { stop: Stop::Surface(0.0), max_steps, ..settings(0.05, 0.7, 0.05) };
         run.velocity.rho = 0.4;
         let stage = lab.engine.stage("threads", 0);
-        let done = evolve(&stage, &lab.engine, &mut band, Some(&edges), geometry.spacing, &run).unwrap();
+        let done = evolve(&stage, &lab.engine, &mut band, Some(&edges), geometry.spacing, &run, None).unwrap();
         (whole(&band.u), done, run)
     });
     let [(new, done, run), (second, other, _), (before, ..)] = &runs;

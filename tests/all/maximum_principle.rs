@@ -63,7 +63,8 @@ impl Problem {
         };
         let stage = lab.engine.stage("step", 0);
         let edges = (self.velocity.rho > 0.0).then_some(&edges);
-        let done = evolve(&stage, &lab.engine, &mut band, edges, self.spacing, &settings).expect("room in scratch");
+        let done =
+            evolve(&stage, &lab.engine, &mut band, edges, self.spacing, &settings, None).expect("room in scratch");
         (whole(&band.u), done)
     }
 

@@ -9,8 +9,7 @@ use super::values::{
     Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
     solvers_help,
 };
-use crate::error::Result;
-use crate::io::ome_zarr::{Compression, StoreWriter};
+use crate::io::ome_zarr::Compression;
 use crate::pipeline::distance::Method;
 use crate::pipeline::marks::Seed;
 use crate::pipeline::segment::FillGaps;
@@ -181,6 +180,10 @@ pub(crate) struct OutputArgs {
     /// Replace outputs that are there already
     #[arg(long)]
     pub(crate) overwrite: bool,
+    /// Let the store stand under its name from the start, readable while it fills; with --overwrite the one that is there
+    /// goes at once
+    #[arg(long)]
+    pub(crate) live: bool,
     /// How the store's chunks are packed: as fast as a disk takes them, small (about a tenth smaller, several times
     /// slower), or not at all
     #[arg(long, value_enum, default_value_t = CompressArg::Fast)]
@@ -203,15 +206,6 @@ impl OutputArgs {
     /// The store's path, where there is to be one.
     pub(crate) fn store(&self) -> Option<&Path> {
         self.output.path()
-    }
-
-    /// Begins the store, where there is to be one.
-    ///
-    /// # Errors
-    /// As [`StoreWriter::create`].
-    pub(crate) fn begin_store(&self) -> Result<Option<StoreWriter>> {
-        let begin = |path| Ok(StoreWriter::create(path, self.overwrite)?.packed(self.compress.into()));
-        self.store().map(begin).transpose()
     }
 }
 

@@ -14,6 +14,7 @@ use crate::cli::inputs::sources::{Read, read_sets};
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
+use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::run_report::{Ran, Report};
@@ -120,6 +121,7 @@ impl Job {
         self.console.say(&plan);
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
         let engine = engine.with_ranks(self.args.job.ranks);
+        engine.outlook().expect(needs.seconds);
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
         let found = result?;
@@ -136,7 +138,7 @@ impl Job {
     fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {
         let output = &self.args.job.output;
         let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
-        let store = output.begin_store()?;
+        let (store, telling) = begin_store(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
         let to = mesh.map(|path| ToFile { path, scratch, is_tagged: true, is_copy });
         let has_surface = self.middle.is_some();
@@ -147,6 +149,7 @@ impl Job {
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;
+            drop(telling);
             store.finish()?;
         }
         file.map_or(Ok(()), Finished::place)?;
@@ -182,7 +185,11 @@ impl Job {
         if let Some(middle) = self.middle_settings() {
             return middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes);
         }
-        let writes = if writes { Writes::Fields } else { Writes::Nothing };
+        let writes = match writes {
+            true if self.args.job.output.live => Writes::FieldsMeanwhile,
+            true => Writes::Fields,
+            false => Writes::Nothing,
+        };
         self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], writes)
     }
 

@@ -15,6 +15,7 @@ use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
+use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
 use crate::cli::report::run_report::{Hausdorff, Hole, Moves, Ran, Report};
 use crate::cli::report::table;
@@ -28,8 +29,8 @@ use crate::io::geometry::read::source::Source;
 use crate::job::disk::Disk;
 use crate::job::resources::Resources;
 use crate::pipeline::reconstruct::{
-    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct, refuse_too_fine, spacing_memory,
-    typical_spacing, without_isolated,
+    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct_shown, refuse_too_fine,
+    spacing_memory, typical_spacing, without_isolated,
 };
 
 /// Points without three others within so many spacings stand alone, where nothing else is said.
@@ -65,7 +66,7 @@ pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
         return Ok(());
     }
     job.console.say(&plan);
-    job.run()
+    job.run(estimate.seconds)
 }
 
 /// Leaves out points that stand alone, if that was asked for, and says how many.
@@ -182,8 +183,9 @@ impl Job {
         )
     }
 
-    fn run(&self) -> Result<()> {
+    fn run(&self, seconds: f64) -> Result<()> {
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
+        engine.outlook().expect(seconds);
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let found = result?;
@@ -195,11 +197,11 @@ impl Job {
 
     fn solve_and_write(&self, engine: &Engine) -> Result<Reconstruction> {
         let output = &self.args.output;
-        let store = output.begin_store()?;
+        let (store, telling) = begin_store(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
         let to = self.args.mesh.as_deref().map(|path| ToFile { path, scratch, is_tagged: false, is_copy });
         let mut drawing = Drawing::new(store.as_ref(), to, &self.grid, false)?;
-        let found = reconstruct(engine, &self.grid, &self.cloud, &self.settings, &mut drawing)
+        let found = reconstruct_shown(engine, &self.grid, &self.cloud, &self.settings, (&mut drawing, store.as_ref()))
             .map_err(|error| error.at(&self.args.cloud))?;
         let mesh = drawing.finish()?;
         if let Some(store) = &store {
@@ -210,6 +212,7 @@ impl Job {
         if let Some(store) = store {
             self.report(engine, &found).write(&store.file("report.json")?)?;
             engine.check()?;
+            drop(telling);
             store.finish()?;
         }
         engine.check()?;

@@ -14,6 +14,7 @@ use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::{Outputs, numbered};
 use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
+use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
 use crate::cli::report::run_report::{Found, Ran, Report, Settings, Solver, crop_xyz};
 use crate::cli::report::{picture, table};
@@ -162,6 +163,7 @@ impl Job {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
+        engine.outlook().expect(estimate.seconds);
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let outcome = result?;
@@ -185,7 +187,8 @@ impl Job {
         let passing = tempfile::tempdir_in(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
         let _passes = Unfinished::new(passing.path());
-        let store = match output.begin_store()? {
+        let (store, telling) = begin_store(output, engine)?;
+        let store = match store {
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
             store => store,
         };
@@ -203,6 +206,7 @@ impl Job {
             self.report(engine, &outcome).write(&store.file("report.json")?)?;
         }
         engine.check()?;
+        drop(telling);
         // A failure from here on costs a copy, not the result.
         let folder = match (store, output.store()) {
             (Some(store), Some(path)) => {

@@ -13,6 +13,12 @@ pub(super) fn claim(folder: &Path) -> Option<File> {
     folder.try_lock().ok().map(|()| folder)
 }
 
+/// Whether somebody works on a folder; yes where that cannot be found out.
+pub(super) fn is_claimed(folder: &Path) -> bool {
+    let unlocked = |folder: File| folder.try_lock_shared().is_ok();
+    File::open(folder).is_ok_and(|folder| !unlocked(folder))
+}
+
 /// The beginning of the hidden names under which the store `name` is made; a process's number, `-` and letters follow.
 pub(super) fn prefix(name: &str) -> String {
     format!(".{name}.partial-")

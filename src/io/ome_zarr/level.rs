@@ -3,7 +3,8 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::compression::{Compression, Content};
 use super::files::{write_json, write_whole};
@@ -24,6 +25,8 @@ pub struct LevelWriter {
     element: ElementType,
     layout: ShardLayout,
     codec: ChunkCodec,
+    /// Counts shards that are written.
+    written: Arc<AtomicU64>,
     /// Shards of which some chunks have come, by their places.
     pending: Mutex<HashMap<[i64; 3], Pending>>,
 }
@@ -43,8 +46,8 @@ impl LevelWriter {
         plan: LevelPlan,
         element: ElementType,
         packed: (Content, Compression),
+        layout: ShardLayout,
     ) -> Result<Self> {
-        let layout = ShardLayout::new(plan.geometry.shape, element);
         let codec = ChunkCodec::new(element, packed.0, packed.1)?;
         write_json(&folder.join("zarr.json"), &metadata::array(plan.geometry.shape, element, layout, &codec))?;
         Ok(Self {
@@ -54,8 +57,14 @@ impl LevelWriter {
             element,
             layout,
             codec,
+            written: Arc::default(),
             pending: Mutex::default(),
         })
+    }
+
+    /// The same level; its shards are counted there.
+    pub(super) fn counted_by(self, written: Arc<AtomicU64>) -> Self {
+        Self { written, ..self }
     }
 
     /// The level's grid.
@@ -106,7 +115,10 @@ impl LevelWriter {
         let encoded = encode_chunk(&self.codec, self.layout, chunk, data).map_err(|error| error.at(&self.store))?;
         let (shard, place) = self.layout.place_of(chunk.lo);
         let Some(chunks) = self.enter(shard, place, encoded) else { return Ok(0) };
-        write_whole(&self.shard_path(shard), |sink| write_shard(sink, &chunks)).map_err(|error| error.at(&self.store))
+        let bytes = write_whole(&self.shard_path(shard), |sink| write_shard(sink, &chunks))
+            .map_err(|error| error.at(&self.store))?;
+        self.written.fetch_add(u64::from(bytes > 0), Relaxed);
+        Ok(bytes)
     }
 
     /// Writes the voxels of one shard, dense `[z][y][x]`; returns the bytes that went to disk.
@@ -123,6 +135,11 @@ impl LevelWriter {
             shard.cut(data, &chunk, &mut values);
             Ok(bytes + self.write_chunk(&chunk, &values)?)
         })
+    }
+
+    /// Forgets the chunks of shards that are not whole: all will come again.
+    pub fn forget(&self) {
+        self.pending.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 
     /// Keeps a chunk; returns those of its shard when it was the last of them.
@@ -171,8 +188,8 @@ mod tests {
         packed: (Content, Compression),
     ) -> LevelWriter {
         let geometry = Geometry { shape, spacing: [1.0; 3], origin: [0.0; 3], unit: None };
-        LevelWriter::create(&folder.join("0"), folder, LevelPlan { geometry, factors: [1; 3] }, element, packed)
-            .unwrap()
+        let plan = LevelPlan { geometry, factors: [1; 3] };
+        LevelWriter::create(&folder.join("0"), folder, plan, element, packed, ShardLayout::new(shape, element)).unwrap()
     }
 
     /// The array as the `zarrs` crate reads it, which takes no part in laying out or writing shards.

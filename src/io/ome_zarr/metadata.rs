@@ -56,10 +56,16 @@ fn zyx<T: Copy>(triple: [T; 3]) -> [T; 3] {
 
 /// A group; with `ome` as its OME attributes, where it has some.
 pub(super) fn group(ome: Option<Map<String, Value>>) -> Value {
-    let attributes = ome.map_or(json!({}), |mut ome| {
+    group_with(ome, None)
+}
+
+/// A group with its OME attributes and another one, where it has them.
+pub(super) fn group_with(ome: Option<Map<String, Value>>, other: Option<(String, Value)>) -> Value {
+    let mut attributes: Map<String, Value> = other.into_iter().collect();
+    if let Some(mut ome) = ome {
         ome.insert("version".into(), VERSION.into());
-        json!({ "ome": ome })
-    });
+        attributes.insert("ome".into(), ome.into());
+    }
     json!({ "zarr_format": 3, "node_type": "group", "attributes": attributes })
 }
 

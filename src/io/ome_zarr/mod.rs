@@ -4,22 +4,26 @@
 //! `sharding_indexed` and `blosc` specifications. Arrays are `z, y, x`; lengths are physical.
 //!
 //! A [`StoreWriter`] builds the store under a hidden name beside its final one and moves it into place when all is
-//! written. Shards are the unit of writing: each is encoded whole, by one caller, and appears under its name complete.
+//! written; a live one stands there from the start. Shards are the unit of writing: each is encoded whole, by one caller, and appears under its name complete.
 
 mod abandoned;
 mod compression;
 mod files;
 mod level;
 mod metadata;
+mod place;
 mod pyramid;
 mod read;
+mod root;
 mod shard;
 mod store;
 
 pub use compression::{Compression, Content};
 pub use level::LevelWriter;
 pub use metadata::{ImageSpec, LabelColor, LabelSpec};
+pub use place::is_store;
 pub use pyramid::{LevelPlan, plan_levels};
 pub use read::{ImageReader, StoredLevel};
+pub use root::{Live, LiveState, Root, live};
 pub use shard::shard_bytes;
-pub use store::{ImageWriter, StoreWriter, is_store};
+pub use store::{ImageWriter, StoreWriter};

@@ -31,7 +31,14 @@ pub(super) struct ShardLayout {
 impl ShardLayout {
     /// Chunks of 64 voxels an edge (or the whole axis where it is shorter) in shards of 256, for wide types 128.
     pub(super) fn new(shape: [i64; 3], element: ElementType) -> Self {
+        Self::halved(shape, element, 0)
+    }
+
+    /// The same with shards whose edges are halved so many times, down to one chunk: those of a coarser level then cover as much
+    /// of the image as those of the finest, and appear as early.
+    pub(super) fn halved(shape: [i64; 3], element: ElementType, times: usize) -> Self {
         let longest = if element.size() <= 2 { 256 } else { 128 };
+        let longest = (longest >> times.min(8)).max(CHUNK_EDGE);
         let chunk = shape.map(|n| n.clamp(1, CHUNK_EDGE));
         let shard = std::array::from_fn(|a| {
             let whole_axis = (shape[a] + chunk[a] - 1) / chunk[a] * chunk[a];

@@ -1,21 +1,20 @@
-//! `StoreWriter`: one `OUT.zarr`, built under a hidden name beside its final one and moved into place when it is whole.
+//! `StoreWriter`: one `OUT.zarr`, built under a hidden name beside its final one and moved into place when it is whole, or live.
 
-use std::fs::{self, File};
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tempfile::TempDir;
+use serde_json::{Map, Value};
 
-use super::abandoned::{self, REPLACED};
 use super::compression::{Compression, Content};
-use super::files::{create_parent, io_error, sync_tree, write_json};
+use super::files::{create_parent, write_json};
 use super::level::LevelWriter;
 use super::metadata::{self, ImageSpec, LabelSpec};
+use super::place::{Place, check_target};
 use super::pyramid::{LevelPlan, plan_levels};
+use super::root::{METADATA, Root};
+use super::shard::ShardLayout;
 use crate::error::{Error, Result};
-use crate::store::{ElementType, Unfinished};
-
-const METADATA: &str = "zarr.json";
+use crate::store::ElementType;
 
 /// A store in the making. Dropped before [`StoreWriter::finish`], it leaves nothing behind.
 #[derive(Debug)]
@@ -23,11 +22,8 @@ pub struct StoreWriter {
     path: PathBuf,
     overwrite: bool,
     compression: Compression,
-    partial: TempDir,
-    /// Says so to whoever ends the process.
-    unfinished: Unfinished,
-    /// Says to other runs that somebody works on `partial`.
-    _claim: Option<File>,
+    root: Arc<Root>,
+    place: Place,
     /// Names of the label images; also the lock under which group documents are written.
     labels: Mutex<Vec<String>>,
 }
@@ -56,25 +52,28 @@ impl StoreWriter {
     pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
         let path = resolve(path)?;
         check_target(&path, overwrite)?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let folder = path.parent().unwrap_or(Path::new("."));
-        abandoned::remove(folder, &name, METADATA);
-        let partial = tempfile::Builder::new()
-            .prefix(&format!("{}{}-", abandoned::prefix(&name), std::process::id()))
-            .tempdir_in(folder)
-            .map_err(|error| io_error("the output cannot be created in its folder", &error).at(&path))?;
-        // Locked before anything is in it: see `abandoned`.
-        let claim = abandoned::claim(partial.path());
-        let unfinished = Unfinished::new(partial.path());
-        let store = Self {
-            path,
-            overwrite,
-            compression: Compression::default(),
-            partial,
-            unfinished,
-            _claim: claim,
-            labels: Mutex::default(),
-        };
+        let place = Place::hidden(&path)?;
+        let root = Arc::new(Root::new(place.folder()));
+        Self::begin(path, overwrite, root, place)
+    }
+
+    /// Begins a live store: it stands at `path` from now on, readable at every moment, and says of itself whether it is complete.
+    /// A store that is there is replaced now. Dropped before it is finished it stays as far as it is, and says so; one without
+    /// a shard goes, and what it replaced comes back.
+    ///
+    /// # Errors
+    /// As [`StoreWriter::create`].
+    pub fn create_live(path: &Path, overwrite: bool) -> Result<Self> {
+        let path = resolve(path)?;
+        check_target(&path, overwrite)?;
+        let root = Arc::new(Root::new(&path));
+        let place = Place::live(&path, root.clone())?;
+        Self::begin(path, overwrite, root, place)
+    }
+
+    fn begin(path: PathBuf, overwrite: bool, root: Arc<Root>, place: Place) -> Result<Self> {
+        let (compression, labels) = (Compression::default(), Mutex::default());
+        let store = Self { path, overwrite, compression, root, place, labels };
         store.ensure_groups(Path::new("")).map_err(|error| error.at(&store.path))?;
         Ok(store)
     }
@@ -88,7 +87,7 @@ impl StoreWriter {
     /// The folder that holds the store until it is finished.
     #[must_use]
     pub fn folder(&self) -> &Path {
-        self.partial.path()
+        self.place.folder()
     }
 
     /// Where to write a further file of the store (`meshes/surface.ply`, `report.json`); its folder exists.
@@ -114,8 +113,7 @@ impl StoreWriter {
     pub fn image(&self, group: &str, spec: &ImageSpec<'_>) -> Result<ImageWriter> {
         let levels = plan_levels(spec.geometry);
         let attributes = metadata::image(spec, &levels);
-        self.multiscale(group, &metadata::group(Some(attributes)), levels, (spec.element, spec.content))
-            .map_err(|error| error.at(&self.path))
+        self.multiscale(group, attributes, levels, (spec.element, spec.content)).map_err(|error| error.at(&self.path))
     }
 
     /// Describes an image anew, where its values are known only when they have been written: the window that viewers show.
@@ -127,8 +125,7 @@ impl StoreWriter {
     /// When `group` leads out of the store.
     pub fn describe(&self, group: &str, spec: &ImageSpec<'_>) -> Result<()> {
         let attributes = metadata::image(spec, &plan_levels(spec.geometry));
-        write_json(&self.inside(group).join(METADATA), &metadata::group(Some(attributes)))
-            .map_err(|error| error.at(&self.path))
+        self.write_group(group, attributes).map_err(|error| error.at(&self.path))
     }
 
     /// Begins a label image of the root's image, in the group `labels`.
@@ -142,36 +139,20 @@ impl StoreWriter {
         self.begin_labels(spec).map_err(|error| error.at(&self.path))
     }
 
-    /// Moves the store into place, replacing the one that is there if `overwrite` said so.
+    /// Says how far a live store is, from any thread; nothing where it is not live.
+    #[must_use]
+    pub fn live(&self) -> Option<Arc<Root>> {
+        matches!(self.place, Place::Live(_)).then(|| self.root.clone())
+    }
+
+    /// Moves the store into place, replacing the one that is there if `overwrite` said so; a live one is there, and says that it
+    /// is complete.
     ///
     /// # Errors
     /// When files cannot be written out to the disk or renamed, or something came to lie at the path meanwhile. The
     /// store that was there before stays then.
     pub fn finish(self) -> Result<()> {
-        sync_tree(self.partial.path()).map_err(|error| error.at(&self.path))?;
-        check_target(&self.path, self.overwrite)?;
-        let fault = |error: std::io::Error| io_error("the output cannot be put in its place", &error).at(&self.path);
-        if exists(&self.path) {
-            let mut old = self.partial.path().as_os_str().to_owned();
-            old.push(REPLACED);
-            let old = PathBuf::from(old);
-            self.unfinished.finish(|| {
-                fs::rename(&self.path, &old).map_err(fault)?;
-                if let Err(error) = fs::rename(self.partial.path(), &self.path) {
-                    fs::rename(&old, &self.path).map_err(fault)?;
-                    return Err(fault(error));
-                }
-                Ok(())
-            })?;
-            let _goes = Unfinished::new(&old);
-            let left = |error| io_error("the output is complete, but the one it replaces cannot be removed", &error);
-            fs::remove_dir_all(&old).map_err(|error| left(error).at(&old))?;
-        } else {
-            self.unfinished.finish(|| fs::rename(self.partial.path(), &self.path)).map_err(fault)?;
-        }
-        // The folder has its final name: nothing is left to clean up.
-        let _ = self.partial.keep();
-        Ok(())
+        self.place.finish(&self.path, self.overwrite)
     }
 
     fn begin_labels(&self, spec: &LabelSpec<'_>) -> Result<ImageWriter> {
@@ -182,12 +163,8 @@ impl StoreWriter {
         assert_eq!(Path::new(spec.name).components().count(), 1, "a label image lies directly in the group of labels");
         let levels = plan_levels(spec.geometry);
         let attributes = metadata::labels(spec, &levels);
-        let image = self.multiscale(
-            &format!("labels/{}", spec.name),
-            &metadata::group(Some(attributes)),
-            levels,
-            (spec.element, Content::Repeated),
-        )?;
+        let image =
+            self.multiscale(&format!("labels/{}", spec.name), attributes, levels, (spec.element, Content::Repeated))?;
         // Listed last, under the lock until it is on disk: the list names what is there, whichever thread comes first.
         let mut names = self.lock();
         names.push(spec.name.to_owned());
@@ -199,7 +176,7 @@ impl StoreWriter {
     fn multiscale(
         &self,
         group: &str,
-        document: &serde_json::Value,
+        attributes: Map<String, Value>,
         levels: Vec<LevelPlan>,
         (element, content): (ElementType, Content),
     ) -> Result<ImageWriter> {
@@ -208,18 +185,30 @@ impl StoreWriter {
         self.ensure_groups(Path::new(group))?;
         let packed = (content, self.compression);
         let create = |(level, plan): (usize, LevelPlan)| {
-            LevelWriter::create(&folder.join(level.to_string()), &self.path, plan, element, packed)
+            let halved = if self.live().is_some() { level } else { 0 };
+            let layout = ShardLayout::halved(plan.geometry.shape, element, halved);
+            let level =
+                LevelWriter::create(&folder.join(level.to_string()), &self.path, plan, element, packed, layout)?;
+            Ok(level.counted_by(self.root.counter()))
         };
         let levels = levels.into_iter().enumerate().map(create).collect::<Result<_>>()?;
-        write_json(&folder.join(METADATA), document)?;
+        self.write_group(group, attributes)?;
         Ok(ImageWriter { levels })
+    }
+
+    /// Says what the image in a group is, last: who reads that finds the levels that it names.
+    fn write_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
+        match group {
+            "" => self.root.describe(attributes),
+            _ => write_json(&self.inside(group).join(METADATA), &metadata::group(Some(attributes))),
+        }
     }
 
     /// Makes sure that `group` and all groups above it say that they are groups.
     fn ensure_groups(&self, group: &Path) -> Result<()> {
         let _alone = self.lock();
         for folder in group.ancestors() {
-            let document = self.partial.path().join(folder).join(METADATA);
+            let document = self.place.folder().join(folder).join(METADATA);
             if !document.exists() {
                 write_json(&document, &metadata::group(None))?;
             }
@@ -235,7 +224,7 @@ impl StoreWriter {
     fn inside(&self, relative: &str) -> PathBuf {
         let relative = Path::new(relative);
         assert!(relative.components().all(|part| matches!(part, Component::Normal(_))), "a path inside the store");
-        self.partial.path().join(relative)
+        self.place.folder().join(relative)
     }
 }
 
@@ -248,31 +237,6 @@ fn resolve(path: &Path) -> Result<PathBuf> {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let missing = |_| Error::usage("the folder for the output does not exist; create it first").at(parent);
     Ok(parent.canonicalize().map_err(missing)?.join(name))
-}
-
-fn exists(path: &Path) -> bool {
-    fs::symlink_metadata(path).is_ok()
-}
-
-/// Whether a folder is a Zarr store, of version 2 or 3.
-#[must_use]
-pub fn is_store(path: &Path) -> bool {
-    [METADATA, ".zgroup", ".zattrs", ".zarray"].iter().any(|name| path.join(name).is_file())
-}
-
-fn check_target(path: &Path, overwrite: bool) -> Result<()> {
-    if !exists(path) {
-        return Ok(());
-    }
-    if !overwrite {
-        let what = "the output exists already; choose another name, or give --overwrite to replace it";
-        return Err(Error::usage(what).at(path));
-    }
-    if is_store(path) {
-        return Ok(());
-    }
-    let what = "this is no Zarr store, so --overwrite does not replace it; remove it yourself or choose another name";
-    Err(Error::usage(what).at(path))
 }
 
 #[cfg(test)]

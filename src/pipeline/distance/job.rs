@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use super::ranks::solve_watched;
 use super::readout::found::DistanceFound;
 use super::readout::images::Wanted;
 use super::readout::kept::Kept;
+use super::readout::reading::Reading;
 use super::readout::visit::ReadOut;
 use super::seeding::contiguous::contiguous_margin;
-use super::{Method, Options, Schedule, Solved, Sources, Writes, solve};
+use super::solving::Early;
+use super::{Method, Options, Schedule, Solved, Sources, Writes};
 use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::{BrickGrid, BrickSet, DataSets, Geometry, PointBins, TriangleBins};
@@ -93,14 +96,29 @@ pub fn distance_kept<P: Precision>(
     store: Option<&StoreWriter>,
     kept: Option<&Kept<P>>,
 ) -> Result<DistanceFound> {
-    let writes = if store.is_some() { Writes::Fields } else { Writes::Nothing };
+    let writes = match store {
+        Some(_) if reads_early(settings, store) => Writes::FieldsMeanwhile,
+        Some(_) => Writes::Fields,
+        None => Writes::Nothing,
+    };
     let needs = settings.needs::<P>(geometry, sets, [engine.threads(), engine.ranks()], writes);
     let _held = engine.reserve(needs.footprint)?;
     let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));
-    solve_sets::<P, _>(engine, geometry, sets, trees.as_ref(), settings, |solved, _| {
-        let wanted = Wanted { labels: settings.labels, borders: false, closest_point: settings.closest_point };
-        ReadOut { geometry, sets, solved: &solved, is_signed: settings.signed, wanted, kept }.run(engine, store)
+    let wanted = Wanted { labels: settings.labels, borders: false, closest_point: settings.closest_point };
+    let read_out = ReadOut { geometry, sets, is_signed: settings.signed, wanted, kept };
+    let reading = Reading::new(read_out, engine, store)?;
+    // Only who watches a store gains by seeing its bricks one by one.
+    let early = reads_early(settings, store).then_some(&reading as &dyn Early<P>);
+    solve_sets_watched::<P, _>(engine, geometry, sets, trees.as_ref(), (settings, early), |solved, _| {
+        reading.finish(&solved)
     })
+}
+
+/// Whether bricks are read out while others are still solved.
+fn reads_early(settings: &DistanceSettings, store: Option<&StoreWriter>) -> bool {
+    store.is_some_and(|store| store.live().is_some())
+        && settings.schedule == Schedule::Front
+        && settings.init != Init::Contiguous
 }
 
 /// Computes the distance to `sets` on a grid, stored as `P`, and hands it on, with the bricks it was solved on. `trees`
@@ -115,6 +133,21 @@ pub fn solve_sets<P: Precision, R>(
     sets: &DataSets,
     trees: Option<&SourceTrees>,
     settings: &DistanceSettings,
+    then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
+) -> Result<R> {
+    solve_sets_watched(engine, geometry, sets, trees, (settings, None), then)
+}
+
+/// The same; a front is read out as far as it has passed.
+///
+/// # Errors
+/// As [`solve_sets`], and when the output cannot be written.
+pub(crate) fn solve_sets_watched<P: Precision, R>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    trees: Option<&SourceTrees>,
+    (settings, early): (&DistanceSettings, Option<&dyn Early<P>>),
     then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
 ) -> Result<R> {
     settings.check_order()?;
@@ -144,7 +177,8 @@ pub fn solve_sets<P: Precision, R>(
         sources: settings.keeps_sources(),
         labels: settings.labels,
     };
-    let solved = solve::<P>(&stage, &sources, &set, settings.method, settings.schedule, options)?;
+    let order = (settings.method, settings.schedule);
+    let solved = solve_watched::<P>(&stage, &sources, &set, order, options, early)?;
     stage.finish();
     then(solved, &set)
 }

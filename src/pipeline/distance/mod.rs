@@ -26,6 +26,7 @@ pub use readout::field::{DistanceWithSource, Solved};
 pub use readout::found::DistanceFound;
 pub(crate) use readout::images::Wanted;
 pub use readout::kept::Kept;
+pub(crate) use readout::reading::Reading;
 pub(crate) use readout::visit::ReadOut;
 pub use seeding::sources::Sources;
 pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};
@@ -84,7 +85,7 @@ pub fn cloud_distance(
     farthest: f32,
 ) -> Result<BrickArray<f32>> {
     let options = Options::up_to(f64::from(farthest));
-    let solved = ranks::solve_once::<f32>(stage, sources, set, method, Schedule::Front, options)?;
+    let solved = ranks::solve_once::<f32>(stage, sources, set, (method, Schedule::Front), options, None)?;
     let mut distance = BrickArray::with_faces(engine.scratch(), set)?;
     let (edge, len) = (set.grid().edge(), set.grid().brick_len());
     let workers = Workers::new(move || vec![0.0; len]);

@@ -37,6 +37,8 @@ pub enum Writes {
     Nothing,
     /// What the settings ask for.
     Fields,
+    /// The same, while other bricks are still solved.
+    FieldsMeanwhile,
     /// That, and the borders of labels.
     FieldsAndBorders,
 }
@@ -118,7 +120,9 @@ impl DistanceSettings {
         let more = solving.per_thread.saturating_mul(ranks.saturating_sub(threads) as u64);
         let solving = solving.and(Footprint::of_all(more));
         let reading = self.reading::<P>(geometry, sets, threads, writes);
-        self.tables::<P>(geometry, sets, ranks).and(solving.or(reading, threads as u64))
+        let at_once =
+            if writes == Writes::FieldsMeanwhile { solving.and(reading) } else { solving.or(reading, threads as u64) };
+        self.tables::<P>(geometry, sets, ranks).and(at_once)
     }
 
     /// What is kept from the start to the end.

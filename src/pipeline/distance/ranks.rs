@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::readout::repair::with_repair;
 use super::readout::within::within;
-use super::solving::Solving;
+use super::solving::{Early, Solving};
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;
 use crate::exec::{HaloPlan, Ownership, Reach, Stage};
@@ -27,13 +27,34 @@ pub fn solve<'a, P: Precision>(
     schedule: Schedule,
     options: Options,
 ) -> Result<Solved<'a, P>> {
-    let solved = solve_once(stage, sources, set, method, schedule, options)?;
-    let solved = if method.solver::<P>().tracks_sources() {
-        with_repair(solved, sources, options, schedule == Schedule::Front)
-    } else {
-        solved
-    };
-    Ok(within(solved, options.farthest))
+    solve_watched(stage, sources, set, (method, schedule), options, None)
+}
+
+/// The same; a front on one rank is read out as far as it has passed.
+///
+/// # Errors
+/// As [`solve`], and when the output cannot be written.
+pub(crate) fn solve_watched<'a, P: Precision>(
+    stage: &Stage<'_>,
+    sources: &Sources<'a>,
+    set: &BrickSet,
+    (method, schedule): (Method, Schedule),
+    options: Options,
+    early: Option<&dyn Early<P>>,
+) -> Result<Solved<'a, P>> {
+    let solved = solve_once(stage, sources, set, (method, schedule), options, early)?;
+    Ok(looked_over(solved, sources, options, (method.solver::<P>().tracks_sources(), schedule)))
+}
+
+/// A solved distance as it is read: where its sources are tracked, with a second look at them.
+pub(super) fn looked_over<'a, P: Precision>(
+    solved: Solved<'a, P>,
+    sources: &Sources<'a>,
+    options: Options,
+    (is_tracked, schedule): (bool, Schedule),
+) -> Solved<'a, P> {
+    let solved = if is_tracked { with_repair(solved, sources, options, schedule == Schedule::Front) } else { solved };
+    within(solved, options.farthest)
 }
 
 /// The same without a second look at voxels whose nearest source the front may have lost (they are few, away from the
@@ -42,10 +63,12 @@ pub(super) fn solve_once<'a, P: Precision>(
     stage: &Stage<'_>,
     sources: &Sources<'a>,
     set: &BrickSet,
-    method: Method,
-    schedule: Schedule,
+    (method, schedule): (Method, Schedule),
     options: Options,
+    early: Option<&dyn Early<P>>,
 ) -> Result<Solved<'a, P>> {
+    // Others' bricks are read when all ranks are done.
+    let early = early.filter(|_| stage.ranks() == 1);
     let solver = method.solver::<P>();
     let one_heap = schedule != Schedule::Front && solver.textbook != Textbook::Sweeps;
     let ownership =
@@ -54,7 +77,7 @@ pub(super) fn solve_once<'a, P: Precision>(
     let plan = HaloPlan::new(*set.grid(), Reach::All);
     let parts = stage.on_ranks(|stage, engine| {
         let own = Arc::new(ownership.part(set, engine.comm().rank(), &plan));
-        (solver.solve)(&Solving { stage, engine, sources, set: &own, options }, schedule)
+        (solver.solve)(&Solving { stage, engine, sources, set: &own, options, early }, schedule)
     })?;
     let joined = Cut { grid: *set.grid(), ownership };
     let sum = |of: fn(&Solved<'a, P>) -> u64| parts.iter().map(of).sum();

@@ -12,7 +12,7 @@ use crate::kernel::distance::whole_volume::{dijkstra_heap, marching_heap};
 use crate::tile::TileCost;
 
 /// Solves on the bricks of a set, by a schedule.
-pub(super) type Solve<P> = for<'a> fn(&Solving<'_, 'a>, Schedule) -> Result<Solved<'a, P>>;
+pub(super) type Solve<P> = for<'a> fn(&Solving<'_, 'a, P>, Schedule) -> Result<Solved<'a, P>>;
 
 /// The order of `--schedule sweep`: that of the textbook.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use super::ranks::looked_over;
 use super::readout::field::{Solved, Values};
 use super::schedule::front::advance_front;
+use super::schedule::passing::{Passed, Watch};
 use super::schedule::sweep::{NoCompanion, sweep_all};
 use super::schedule::sweep_sources::TrackedSweeps;
 use super::schedule::textbook::{Wanted, heap_dijkstra, heap_marching};
@@ -29,7 +31,7 @@ use crate::kernel::distance::tracking::parents::{Parents, ShortestWay, UpwindSum
 use crate::store::BrickArray;
 
 /// What a method is given: sources, and the bricks of one rank.
-pub struct Solving<'j, 'a> {
+pub struct Solving<'j, 'a, P> {
     /// Counts, and tells of an interruption.
     pub stage: &'j Stage<'j>,
     /// The rank's engine.
@@ -40,19 +42,49 @@ pub struct Solving<'j, 'a> {
     pub set: &'j Arc<BrickSet>,
     /// What is wanted beside or instead of the usual.
     pub options: Options,
+    /// Who reads bricks out while others are still solved.
+    pub early: Option<&'j dyn Early<P>>,
+}
+
+/// Reads a distance out as far as a front has passed it.
+pub trait Early<P>: Sync {
+    /// The front has come farther; `solved` is what can be read where it has passed.
+    ///
+    /// # Errors
+    /// When the output cannot be written or the run is interrupted.
+    fn passed(&self, passed: &Passed<'_>, solved: &Solved<'_, P>) -> Result<()>;
+
+    /// Something has changed that was read.
+    fn reopened(&self);
+}
+
+/// Who reads out early, and what from.
+struct Reading<'r, 'a, P> {
+    early: &'r dyn Early<P>,
+    solved: Solved<'a, P>,
+}
+
+impl<P: Precision> Watch for Reading<'_, '_, P> {
+    fn passed(&self, passed: &Passed<'_>) -> Result<()> {
+        self.early.passed(passed, &self.solved)
+    }
+
+    fn reopened(&self) {
+        self.early.reopened();
+    }
 }
 
 /// Fast sweeping.
-pub(super) fn fast_sweeping<'a, P: Precision>(job: &Solving<'_, 'a>, schedule: Schedule) -> Result<Solved<'a, P>> {
+pub(super) fn fast_sweeping<'a, P: Precision>(job: &Solving<'_, 'a, P>, schedule: Schedule) -> Result<Solved<'a, P>> {
     let spacing = job.sources.geometry.spacing;
     match schedule {
-        Schedule::Front => job.front_then_sources::<P, _, UpwindSum>(FastSweeping::<P, P::Fast>::new(spacing)),
+        Schedule::Front => job.front_then_sources::<_, UpwindSum>(FastSweeping::<P, P::Fast>::new(spacing)),
         Schedule::Sweep { iterations } => job.sweeps_with_sources(FastSweeping::<P, f64>::new(spacing), iterations),
     }
 }
 
 /// The vector distance transform.
-pub(super) fn vector_distance<'a, P: Precision>(job: &Solving<'_, 'a>, schedule: Schedule) -> Result<Solved<'a, P>> {
+pub(super) fn vector_distance<'a, P: Precision>(job: &Solving<'_, 'a, P>, schedule: Schedule) -> Result<Solved<'a, P>> {
     let (geometry, positions) = (job.sources.geometry, job.sources.positions);
     if let Some(sets) = job.sources.shapes() {
         let method = ShapeDistance::new(geometry, sets);
@@ -68,11 +100,11 @@ pub(super) fn vector_distance<'a, P: Precision>(job: &Solving<'_, 'a>, schedule:
 }
 
 /// Fast marching.
-pub(super) fn fast_marching<'a, P: Precision>(job: &Solving<'_, 'a>, schedule: Schedule) -> Result<Solved<'a, P>> {
+pub(super) fn fast_marching<'a, P: Precision>(job: &Solving<'_, 'a, P>, schedule: Schedule) -> Result<Solved<'a, P>> {
     let (geometry, positions) = (job.sources.geometry, job.sources.positions);
     let method = FastMarching::<P, P::Fast>::new(geometry.spacing);
     match (schedule, job.sources.shapes()) {
-        (Schedule::Front, _) => job.front_then_sources::<P, _, ShortestWay>(method),
+        (Schedule::Front, _) => job.front_then_sources::<_, ShortestWay>(method),
         (_, Some(sets)) => job.heap_marching(method, &ShapeDistance::new(geometry, sets)),
         (_, None) => job.heap_marching(method, &VectorDistance::<f64>::new(geometry, positions)),
     }
@@ -80,7 +112,7 @@ pub(super) fn fast_marching<'a, P: Precision>(job: &Solving<'_, 'a>, schedule: S
 
 /// Dijkstra-Pythagoras.
 pub(super) fn dijkstra_pythagoras<'a, P: Precision>(
-    job: &Solving<'_, 'a>,
+    job: &Solving<'_, 'a, P>,
     schedule: Schedule,
 ) -> Result<Solved<'a, P>> {
     let (geometry, positions) = (job.sources.geometry, job.sources.positions);
@@ -92,7 +124,7 @@ pub(super) fn dijkstra_pythagoras<'a, P: Precision>(
     }
 }
 
-impl<'a> Solving<'_, 'a> {
+impl<'a, P: Precision> Solving<'_, 'a, P> {
     /// A method's start: its state with the voxels that sources fix.
     fn start<M: DistanceState>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
@@ -109,18 +141,30 @@ impl<'a> Solving<'_, 'a> {
         Ok((state, sources, seeded))
     }
 
-    fn front<P: Precision, M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
+    fn front<M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<M>(Start::Provisional)?;
         let geometry = self.sources.geometry;
         // Where sources are looked at again, those beyond the last voxel that counts are asked too.
         let beyond = if M::trial(0).is_some() { geometry.length([REACH; 3]) } else { 0.0 };
         let farthest = self.options.farthest + beyond;
-        advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, farthest)?;
-        search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
-        Ok(self.solved(method, state, &seeded))
+        let bounds = (geometry.spacing, farthest);
+        let values = self.values(method, state);
+        let (method, state) = (&values.method, &values.state);
+        match self.early.filter(|_| self.sources.outside.is_none()) {
+            Some(early) => {
+                let solved = values.read::<P>(seeded.fixed_voxels, seeded.triangle_distances);
+                let tracks = M::trial(0).is_some();
+                let solved = looked_over(solved, self.sources, self.options, (tracks, Schedule::Front));
+                let reading = Reading { early, solved };
+                advance_front(self.stage, method, state, &seeded.bricks, bounds, Some(&reading))?;
+            }
+            None => advance_front(self.stage, method, state, &seeded.bricks, bounds, None)?,
+        }
+        search_outside(self.stage, self.sources, method, state, self.options.farthest)?;
+        Ok(values.read(seeded.fixed_voxels, seeded.triangle_distances))
     }
 
-    fn sweeps<P: Precision, M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
+    fn sweeps<M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<M>(Start::Fixed)?;
         sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations)?;
         search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
@@ -128,11 +172,7 @@ impl<'a> Solving<'_, 'a> {
     }
 
     /// Distances, and along with them their sources, where these are asked for.
-    fn sweeps_with_sources<P: Precision>(
-        &self,
-        method: FastSweeping<P, f64>,
-        iterations: u32,
-    ) -> Result<Solved<'a, P>> {
+    fn sweeps_with_sources(&self, method: FastSweeping<P, f64>, iterations: u32) -> Result<Solved<'a, P>> {
         if !self.options.sources {
             return self.sweeps(method, iterations);
         }
@@ -140,7 +180,7 @@ impl<'a> Solving<'_, 'a> {
         if self.labelled().is_some() {
             // An update that lowers nothing is none, so sweeps do not see that another label is as near.
             sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations)?;
-            self.trace::<P, UpwindSum>(&state, &sources, &seeded)?;
+            self.trace::<UpwindSum>(&state, &sources, &seeded)?;
             return Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) });
         }
         let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &seeded.bricks)?;
@@ -150,17 +190,15 @@ impl<'a> Solving<'_, 'a> {
     }
 
     /// Distances, and then their sources, where these are asked for.
-    fn front_then_sources<P: Precision, M: DistanceMethod<State = P> + 'a, R: Parents>(
-        &self,
-        method: M,
-    ) -> Result<Solved<'a, P>> {
+    fn front_then_sources<M: DistanceMethod<State = P> + 'a, R: Parents>(&self, method: M) -> Result<Solved<'a, P>> {
         if !self.options.sources {
             return self.front(method);
         }
         let (state, sources, seeded) = self.start_apart::<M>()?;
         let geometry = self.sources.geometry;
-        advance_front(self.stage, &method, &state, &seeded.bricks, geometry.spacing, self.options.farthest)?;
-        self.trace::<P, R>(&state, &sources, &seeded)?;
+        let bounds = (geometry.spacing, self.options.farthest);
+        advance_front(self.stage, &method, &state, &seeded.bricks, bounds, None)?;
+        self.trace::<R>(&state, &sources, &seeded)?;
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 
@@ -169,7 +207,7 @@ impl<'a> Solving<'_, 'a> {
         self.sources.labelled().filter(|_| self.options.labels)
     }
 
-    fn trace<P: Precision, R: Parents>(
+    fn trace<R: Parents>(
         &self,
         state: &BrickArray<P>,
         sources: &BrickArray<SourceState>,
@@ -179,25 +217,25 @@ impl<'a> Solving<'_, 'a> {
         trace_sources::<P, R>(self.stage, geometry, labelled, state, sources, &seeded.bricks)
     }
 
-    fn front_vector<P: Precision, S: DistanceMethod + TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+    fn front_vector<S: DistanceMethod + TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
         match self.options.neighbours {
             Neighbours::Faces => self.front(sources),
             Neighbours::All => self.front(AllNeighbours::new(sources)),
         }
     }
 
-    fn front_dijkstra<P: Precision, S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
+    fn front_dijkstra<S: TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
         self.front(DijkstraPythagoras::new(self.sources.geometry, self.options.neighbours, sources))
     }
 
-    fn heap_dijkstra<P: Precision, S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
+    fn heap_dijkstra<S: TrackedSource<Number = f64> + 'a>(&self, method: S) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<S>(Start::Fixed)?;
         heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
         search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
         Ok(self.solved(method, state, &seeded))
     }
 
-    fn heap_marching<P: Precision, M: DistanceState<State = P> + 'a, S: TrackedSource>(
+    fn heap_marching<M: DistanceState<State = P> + 'a, S: TrackedSource>(
         &self,
         method: M,
         start: &S,
@@ -209,13 +247,11 @@ impl<'a> Solving<'_, 'a> {
         Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
     }
 
-    fn solved<P: Precision, M: DistanceState + 'a>(
-        &self,
-        method: M,
-        state: BrickArray<M::State>,
-        seeded: &Seeded,
-    ) -> Solved<'a, P> {
-        let values = Values { method, state, farthest: self.options.farthest, buffers: Workers::new(Vec::new) };
-        values.solved(seeded.fixed_voxels, seeded.triangle_distances)
+    fn solved<M: DistanceState + 'a>(&self, method: M, state: BrickArray<M::State>, seeded: &Seeded) -> Solved<'a, P> {
+        self.values(method, state).read(seeded.fixed_voxels, seeded.triangle_distances)
+    }
+
+    fn values<M: DistanceState + 'a>(&self, method: M, state: BrickArray<M::State>) -> Arc<Values<M>> {
+        Arc::new(Values { method, state, farthest: self.options.farthest, buffers: Workers::new(Vec::new) })
     }
 }

@@ -6,6 +6,7 @@
 //! and writing it to memory and reading it back would cost as much.
 
 use super::band::{Band, read_mask};
+use super::growing::Growing;
 use super::time_loop::{Evolution, Stop, TimeLoop};
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Waves, Workers, checkerboard, one_wave};
@@ -122,7 +123,7 @@ struct Solver<'a> {
     visited: u64,
 }
 
-/// Moves the surface until it rests. The result is in `band.u`.
+/// Moves the surface until it rests. The result is in `band.u`; `growing` shows what it is on the way.
 ///
 /// # Errors
 /// When the run is interrupted.
@@ -133,7 +134,9 @@ pub fn evolve(
     edges: Option<&BrickArray<f32>>,
     spacing: [f64; 3],
     settings: &TimeLoop,
+    growing: Option<&mut Growing<'_>>,
 ) -> Result<Evolution> {
+    let mut growing = growing;
     let grid = *band.solved.set().grid();
     let mut done = Evolution { steps: 0, sor_iterations: 0, stopped_by: "max-steps", residual: f64::INFINITY };
     let [all, faces] = &[HaloPlan::new(grid, Reach::All), HaloPlan::new(grid, Reach::Faces)];
@@ -170,6 +173,9 @@ pub fn evolve(
         let (step, visits) = solver.step(&waves)?;
         std::mem::swap(&mut band.u, &mut next);
         done.steps += 1;
+        if let Some(growing) = &mut growing {
+            growing.show(engine, &band.u)?;
+        }
         cell_iterations += visits * LOCAL_ITERATIONS as u64;
         let (residual, limit, name) = step.judged_by(settings.stop);
         done.residual = residual;

@@ -2,6 +2,7 @@
 
 pub mod band;
 pub mod evolve;
+pub mod growing;
 pub mod motion;
 pub(crate) mod ranks;
 pub mod time_loop;

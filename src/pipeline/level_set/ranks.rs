@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use super::band::Band;
 use super::evolve::evolve;
+use super::growing::Growing;
 use super::time_loop::{Evolution, TimeLoop};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, HaloPlan, Ownership, Reach, Stage};
 
-/// Moves the surface until it rests, on all ranks of the stage's engine, each with its own cells; no image pulls at it.
+/// Moves the surface until it rests, on all ranks of the stage's engine, each with its own cells; no image pulls at it. One rank
+/// alone shows it as it grows.
 /// The result is in `band.u`.
 ///
 /// # Errors
@@ -19,9 +21,10 @@ pub(crate) fn evolve_on_ranks(
     band: &mut Band,
     spacing: [f64; 3],
     settings: &TimeLoop,
+    growing: Option<&mut Growing<'_>>,
 ) -> Result<Evolution> {
     if stage.ranks() == 1 {
-        return evolve(stage, engine, band, None, spacing, settings);
+        return evolve(stage, engine, band, None, spacing, settings, growing);
     }
     let set = band.solved.set().clone();
     let ownership = Ownership::balanced(&set, stage.ranks());
@@ -30,7 +33,7 @@ pub(crate) fn evolve_on_ranks(
     let parts = stage.on_ranks(|stage, engine| {
         let own = Arc::new(ownership.part(&set, engine.comm().rank(), &plan));
         let mut part = whole.part(engine, &own)?;
-        let done = evolve(stage, engine, &mut part, None, spacing, settings)?;
+        let done = evolve(stage, engine, &mut part, None, spacing, settings, None)?;
         Ok((part.u, done))
     })?;
     let mut last = None;

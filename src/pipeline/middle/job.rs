@@ -15,7 +15,7 @@ use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::surface::{Measures, Pair};
-use crate::pipeline::distance::{DistanceFound, DistanceSettings, Kept, ReadOut, Wanted, solve_sets};
+use crate::pipeline::distance::{DistanceFound, DistanceSettings, Kept, ReadOut, Reading, Wanted, solve_sets};
 use crate::store::MeshSink;
 
 /// What a job found.
@@ -85,8 +85,8 @@ pub fn middle_kept<P: Precision>(
             ));
         }
         let wanted = Wanted { labels: true, borders: store.is_some(), closest_point: distance.closest_point };
-        let read_out = ReadOut { geometry, sets, solved: &solved, is_signed: distance.signed, wanted, kept };
-        let found = read_out.run(engine, store)?;
+        let read_out = ReadOut { geometry, sets, is_signed: distance.signed, wanted, kept };
+        let found = Reading::new(read_out, engine, store)?.finish(&solved)?;
         if let Some(store) = store {
             let path = store.file("meshes/pairs.csv")?;
             std::fs::write(&path, csv(&pairs)).map_err(|e| Error::from_io("cannot write the table", &e).at(&path))?;

@@ -1,13 +1,15 @@
 //! Fields on their way into multiscale images. A field is visited once, chunk by chunk of its finest level: what is put
-//! into a `Pyramid` goes to the disk and, reduced, to the next coarser level, which waits in bricks until the visit is
-//! over and is then visited likewise.
+//! into a `Pyramid` goes to the disk and, reduced, to the next coarser level, which waits in bricks until all is there of
+//! one of its shards; that is then written, and goes on to the next level likewise.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering::{AcqRel, Relaxed, Release};
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry};
-use crate::io::ome_zarr::{ImageWriter, LevelWriter, shard_bytes};
+use crate::io::ome_zarr::{ImageWriter, LevelWriter, StoreWriter, plan_levels, shard_bytes};
 use crate::kernel::image::filter::downsample;
 use crate::kernel::image::filter::downsample::coarse_box;
 use crate::store::{BoxSource, BrickArray, Element, ElementType};
@@ -37,8 +39,47 @@ const COARSE_EDGE: i64 = 32;
 pub(crate) struct Pyramid<T: Element> {
     image: ImageWriter,
     reduce: Reduce,
-    /// What is known of the second level.
-    coarser: Option<BrickArray<T>>,
+    /// The coarser levels, finest of them first.
+    coarser: Vec<Coarser<T>>,
+    /// Chunks come a second time: zeros replace what was there.
+    again: AtomicBool,
+}
+
+/// A coarser level: what is known of it.
+struct Coarser<T: Element> {
+    waiting: BrickArray<T>,
+    /// Voxels of the level below that are still to come, of each of its shards.
+    missing: Vec<AtomicU64>,
+    shards: Shards,
+}
+
+/// The shards of a level by number.
+struct Shards {
+    boxes: Vec<Box3>,
+    counts: [i64; 3],
+    shape: [i64; 3],
+}
+
+impl Shards {
+    fn new(level: &LevelWriter) -> Self {
+        let (shape, whole) = (level.shard_shape(), level.geometry().shape);
+        let counts = std::array::from_fn(|a| (whole[a] + shape[a] - 1) / shape[a]);
+        Self { boxes: level.shards().collect(), counts, shape }
+    }
+
+    /// The one that holds a voxel.
+    fn of(&self, voxel: [i64; 3]) -> usize {
+        Box3::from_shape(self.counts).offset_of(std::array::from_fn(|a| voxel[a] / self.shape[a]))
+    }
+}
+
+impl<T: Element> Coarser<T> {
+    fn new(engine: &Engine, levels: &[LevelWriter], n: usize) -> Result<Self> {
+        let set = Arc::new(BrickSet::dense(BrickGrid::new(levels[n].geometry().shape, COARSE_EDGE)));
+        let shards = Shards::new(&levels[n]);
+        let missing = shards.boxes.iter().map(|shard| AtomicU64::new(voxels_below(levels, n, shard))).collect();
+        Ok(Self { waiting: BrickArray::new(engine.scratch(), &set)?, missing, shards })
+    }
 }
 
 impl<T: Element> Pyramid<T> {
@@ -47,8 +88,9 @@ impl<T: Element> Pyramid<T> {
     /// # Errors
     /// When scratch runs out.
     pub(crate) fn new(engine: &Engine, image: ImageWriter, reduce: Reduce) -> Result<Self> {
-        let coarser = image.levels().get(1).map(|level| waiting(engine, level)).transpose()?;
-        Ok(Self { image, reduce, coarser })
+        let levels = image.levels();
+        let coarser = (1..levels.len()).map(|n| Coarser::new(engine, levels, n)).collect::<Result<_>>()?;
+        Ok(Self { image, reduce, coarser, again: AtomicBool::new(false) })
     }
 
     /// The finest level.
@@ -56,62 +98,70 @@ impl<T: Element> Pyramid<T> {
         &self.image.levels()[0]
     }
 
-    /// Takes a chunk of the finest level; `buffer` is scratch.
+    /// Takes a chunk of the finest level; `buffer` is scratch. The last one below a shard of a coarser level writes that.
     ///
     /// # Errors
-    /// When its shard cannot be written.
+    /// When a shard cannot be written.
     pub(crate) fn put(&self, chunk: &Box3, values: &[T], buffer: &mut Vec<T>) -> Result<()> {
-        put(self.image.levels(), self.reduce, self.coarser.as_ref(), chunk, values, buffer)
+        self.put_finest(chunk, values)?;
+        self.put_coarser(chunk, values, buffer)
     }
 
-    /// Writes the coarser levels, when all chunks of the finest were put.
-    ///
-    /// # Errors
-    /// When a shard cannot be written, scratch runs out or the run is interrupted.
-    pub(crate) fn finish(self, stage: &Stage<'_>, engine: &Engine) -> Result<()> {
-        let Self { image, reduce, mut coarser } = self;
-        for n in 1..image.levels().len() {
-            let levels = &image.levels()[n..];
-            let Some(finer) = coarser.take() else { break };
-            coarser = levels.get(1).map(|level| waiting(engine, level)).transpose()?;
-            let workers = Workers::new(|| (Vec::new(), Vec::new()));
-            stage.run(&visits(&levels[..1], engine.threads()), &workers, |(values, buffer), visit| {
-                visit.iter().try_for_each(|chunk| {
-                    values.resize(chunk.len(), T::default());
-                    finer.read_box(chunk, values)?;
-                    put(levels, reduce, coarser.as_ref(), chunk, values, buffer)
-                })
-            })?;
+    /// Takes a chunk of the finest level for that alone.
+    fn put_finest(&self, chunk: &Box3, values: &[T]) -> Result<()> {
+        self.finest().write_chunk(chunk, values).map(|_| ())
+    }
+
+    /// Takes a chunk of the finest level for the coarser ones.
+    fn put_coarser(&self, chunk: &Box3, values: &[T], buffer: &mut Vec<T>) -> Result<()> {
+        let mut whole = self.reduce_into(1, chunk, values, buffer);
+        let mut voxels = Vec::new();
+        while let Some((n, shard)) = whole.take() {
+            let level = &self.image.levels()[n];
+            for chunk in shard.tiles(level.chunk_shape()) {
+                voxels.resize(chunk.len(), T::default());
+                self.coarser[n - 1].waiting.read_box(&chunk, &mut voxels)?;
+                level.write_chunk(&chunk, &voxels)?;
+                // A shard ends with its last chunk, and with it at most one of the next level.
+                whole = self.reduce_into(n + 1, &chunk, &voxels, buffer).or(whole);
+            }
         }
         Ok(())
     }
-}
 
-/// Bricks of zeros for a level that waits for the visit of a finer one to end.
-fn waiting<T: Element>(engine: &Engine, level: &LevelWriter) -> Result<BrickArray<T>> {
-    let set = Arc::new(BrickSet::dense(BrickGrid::new(level.geometry().shape, COARSE_EDGE)));
-    BrickArray::new(engine.scratch(), &set)
-}
-
-/// Writes a chunk of the first of some levels, and what it is in the next.
-fn put<T: Element>(
-    levels: &[LevelWriter],
-    reduce: Reduce,
-    coarser: Option<&BrickArray<T>>,
-    chunk: &Box3,
-    values: &[T],
-    buffer: &mut Vec<T>,
-) -> Result<()> {
-    levels[0].write_chunk(chunk, values)?;
-    let Some((level, coarser)) = levels.get(1).zip(coarser) else { return Ok(()) };
-    if values.iter().all(|&value| value == T::default()) {
-        return Ok(());
+    /// Puts what a chunk of the level below is in level `n`; returns the shard of that level which has become whole.
+    fn reduce_into(&self, n: usize, chunk: &Box3, values: &[T], buffer: &mut Vec<T>) -> Option<(usize, Box3)> {
+        let (level, coarser) = (self.image.levels().get(n)?, self.coarser.get(n - 1)?);
+        let part = coarse_box(chunk, level.factors());
+        if self.again.load(Relaxed) || values.iter().any(|&value| value != T::default()) {
+            buffer.resize(part.len(), T::default());
+            self.reduce.reduce(values, chunk.shape(), level.factors(), buffer);
+            coarser.waiting.write_box(&part, buffer);
+        }
+        let shard = coarser.shards.of(part.lo);
+        // What other threads have put is seen by the one that finds nothing missing.
+        let before = coarser.missing[shard].fetch_sub(chunk.volume(), AcqRel);
+        (before == chunk.volume()).then(|| (n, coarser.shards.boxes[shard]))
     }
-    let part = coarse_box(chunk, level.factors());
-    buffer.resize(part.len(), T::default());
-    reduce.reduce(values, chunk.shape(), level.factors(), buffer);
-    coarser.write_box(&part, buffer);
-    Ok(())
+
+    /// Takes all chunks once more, of a finest level that has changed since.
+    pub(crate) fn again(&self) {
+        self.again.store(true, Relaxed);
+        let levels = self.image.levels();
+        levels.iter().for_each(LevelWriter::forget);
+        for (n, coarser) in (1..).zip(&self.coarser) {
+            for (missing, shard) in coarser.missing.iter().zip(&coarser.shards.boxes) {
+                missing.store(voxels_below(levels, n, shard), Release);
+            }
+        }
+    }
+}
+
+/// How many voxels of the level below a box of level `n` covers.
+fn voxels_below(levels: &[LevelWriter], n: usize, part: &Box3) -> u64 {
+    let factors = levels[n].factors();
+    let fine = |corner: [i64; 3]| std::array::from_fn(|a| corner[a] * factors[a]);
+    Box3::new(fine(part.lo), fine(part.hi)).intersect(&levels[n - 1].geometry().domain()).volume()
 }
 
 /// Visits of the chunks of levels that have the same grid, so that those of a shard come soon one after the other. A visit
@@ -147,16 +197,36 @@ pub(crate) fn visits_of(domain: Box3, mut edges: Vec<[i64; 3]>, threads: usize) 
 const VISITS_PER_THREAD: usize = 8;
 
 /// Bytes that images of these types hold while all of them are written in one visit: chunks that wait for the last of their
-/// shard, and of each thread a chunk as voxels, reduced, as bytes and compressed.
+/// shard, in the finest level and in the coarser one that it makes whole, and of each thread a chunk as voxels, reduced, as bytes and compressed.
 pub(crate) fn held(geometry: &Geometry, elements: &[ElementType], threads: u64) -> u64 {
     let chunk = COARSE_EDGE.pow(3) as u64 * 8;
+    let levels = 1 + u64::from(plan_levels(geometry).len() > 1);
     let bytes = |element: &ElementType| {
         let (shard, size) = (shard_bytes(geometry.shape, *element), element.size() as u64);
-        let waiting = threads.saturating_mul(shard).min(geometry.domain().volume().saturating_mul(size));
+        let waiting = levels * threads.saturating_mul(shard).min(geometry.domain().volume().saturating_mul(size));
         waiting.saturating_add(threads * 4 * chunk * size)
     };
     elements.iter().map(bytes).fold(0, u64::saturating_add)
 }
+
+/// Which levels of an image are written first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum First {
+    /// The finest: its voxels are read once.
+    Finest,
+    /// The coarser ones, for who looks on: its voxels are read twice.
+    Coarser,
+}
+
+impl First {
+    /// What suits a store.
+    pub(crate) fn of(store: &StoreWriter) -> Self {
+        if store.live().is_some() { Self::Coarser } else { Self::Finest }
+    }
+}
+
+/// Takes a chunk: its box, its voxels, scratch.
+type Put<'a, T> = &'a (dyn Fn(&Box3, &[T], &mut Vec<T>) -> Result<()> + Sync);
 
 /// Fills all levels of an image from `source`.
 ///
@@ -167,28 +237,40 @@ pub fn write_levels<T: Element>(
     engine: &Engine,
     image: ImageWriter,
     source: &dyn BoxSource<T>,
-    reduce: Reduce,
+    (reduce, first): (Reduce, First),
 ) -> Result<()> {
     let pyramid = Pyramid::new(engine, image, reduce)?;
     let workers = Workers::new(|| (Vec::new(), Vec::new()));
-    stage.run(&visits([pyramid.finest()], engine.threads()), &workers, |(values, buffer), visit| {
-        visit.iter().try_for_each(|chunk| {
-            values.resize(chunk.len(), T::default());
-            if source.constant_in(chunk) == Some(T::default()) {
-                values.fill(T::default());
-            } else {
-                source.read_box(chunk, values)?;
-            }
-            pyramid.put(chunk, values, buffer)
+    let visits = visits([pyramid.finest()], engine.threads());
+    let visit_all = |put: Put<'_, T>| {
+        stage.run(&visits, &workers, |(values, buffer), visit| {
+            visit.iter().try_for_each(|chunk| {
+                values.resize(chunk.len(), T::default());
+                if source.constant_in(chunk) == Some(T::default()) {
+                    values.fill(T::default());
+                } else {
+                    source.read_box(chunk, values)?;
+                }
+                put(chunk, values, buffer)
+            })
         })
-    })?;
-    pyramid.finish(stage, engine)
+    };
+    match first {
+        First::Coarser if !pyramid.coarser.is_empty() => {
+            visit_all(&|chunk, values, buffer| pyramid.put_coarser(chunk, values, buffer))?;
+            visit_all(&|chunk, values, _| pyramid.put_finest(chunk, values))?;
+        }
+        _ => {
+            visit_all(&|chunk, values, buffer| pyramid.put(chunk, values, buffer))?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
+    use crate::io::ome_zarr::{Content, ImageSpec};
 
     #[test]
     fn visits_take_each_chunk_once_shard_by_shard() {

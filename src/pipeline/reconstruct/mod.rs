@@ -16,6 +16,6 @@ mod spacing;
 pub use estimate::{Estimate, estimate, refuse_too_fine, spacing_memory};
 pub use grid::grid_for;
 pub use isolated::without_isolated;
-pub use output::{Reconstruction, reconstruct};
+pub use output::{Reconstruction, reconstruct, reconstruct_shown};
 pub use settings::ReconstructSettings;
 pub use spacing::typical_spacing;

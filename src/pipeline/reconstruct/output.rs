@@ -14,9 +14,10 @@ use crate::kernel::surface::{Hausdorff, Measures};
 use crate::pipeline::enclosure::search::{Deepest, Enclosure, Found, Hole, Search, Start, enclose, first_reach_for};
 use crate::pipeline::enclosure::sheets::{Company, hold_sheets};
 use crate::pipeline::level_set::band::Band;
+use crate::pipeline::level_set::growing::Growing;
 use crate::pipeline::level_set::ranks::evolve_on_ranks;
 use crate::pipeline::level_set::time_loop::Evolution;
-use crate::pipeline::output::pyramid::{Reduce, write_levels};
+use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 
@@ -105,7 +106,7 @@ impl Reconstruction {
             };
             let stage = engine.stage(&format!("write {name}"), 0);
             stage.voxels(geometry.domain().volume());
-            write_levels::<f32>(&stage, engine, store.image(group, &spec)?, field, Reduce::Mean)?;
+            write_levels::<f32>(&stage, engine, store.image(group, &spec)?, field, (Reduce::Mean, First::Finest))?;
             stage.finish();
         }
         Ok(())
@@ -125,6 +126,20 @@ pub fn reconstruct(
     settings: &ReconstructSettings,
     mesh: &mut dyn MeshSink,
 ) -> Result<Reconstruction> {
+    reconstruct_shown(engine, grid, cloud, settings, (mesh, None))
+}
+
+/// The same; a store that is live shows the surface while it moves.
+///
+/// # Errors
+/// As [`reconstruct`], and when what is shown cannot be written.
+pub fn reconstruct_shown(
+    engine: &Engine,
+    grid: &Geometry,
+    cloud: &[[f64; 3]],
+    settings: &ReconstructSettings,
+    (mesh, shown_in): (&mut dyn MeshSink, Option<&StoreWriter>),
+) -> Result<Reconstruction> {
     let _buffers = engine.reserve(BUFFERS)?;
     let held = engine.reserve(boxes(&begin(grid, cloud, settings), cloud))?;
     let enclosure = enclosed(engine, grid, cloud, settings)?;
@@ -133,7 +148,9 @@ pub fn reconstruct(
     let larger_beta = enclosure.larger_beta();
     let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
     let (mut band, held_by_box) = enclosure.into_band(engine, "")?;
-    let evolution = solve(engine, &geometry, cloud, settings, &mut band, &mut sheet)?;
+    let mut growing = Growing::of(shown_in, "surface", &geometry)?;
+    let evolution = solve(engine, &geometry, cloud, settings, (&mut band, &mut sheet), growing.as_mut())?;
+    drop(growing);
     let told = if settings.keeps_grid { grid.clone() } else { geometry.clone() };
     mesh.on_grid(&told)?;
     let stage = engine.stage("surface", 0);
@@ -192,13 +209,13 @@ fn solve(
     geometry: &Geometry,
     cloud: &[[f64; 3]],
     settings: &ReconstructSettings,
-    band: &mut Band,
-    sheet: &mut Vec<u32>,
+    (band, sheet): (&mut Band, &mut Vec<u32>),
+    mut growing: Option<&mut Growing<'_>>,
 ) -> Result<Evolution> {
     let stage = engine.stage("level set", 0);
     stage.voxels(band.voxels);
     let time_loop = settings.motion.time_loop(geometry);
-    let mut evolution = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop)?;
+    let mut evolution = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop, growing.as_deref_mut())?;
     // Where more smoothing was asked for, the surface leaves points because it shall.
     let keeps_points = settings.beta.is_none() && settings.motion.smooths_no_more_than_usual(geometry);
     let late = if keeps_points { hold_what_was_lost(&stage, geometry, cloud, band)? } else { Vec::new() };
@@ -206,7 +223,7 @@ fn solve(
         sheet.extend(late);
         sheet.sort_unstable();
         sheet.dedup();
-        let again = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop)?;
+        let again = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop, growing)?;
         let (steps, sor_iterations) = (evolution.steps + again.steps, evolution.sor_iterations + again.sor_iterations);
         evolution = Evolution { steps, sor_iterations, ..again };
     }

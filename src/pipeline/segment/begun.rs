@@ -10,6 +10,7 @@ use crate::pipeline::image::intensity::Normalised;
 use crate::pipeline::image::terms::{edges, presmooth};
 use crate::pipeline::level_set::band::Band;
 use crate::pipeline::level_set::evolve::evolve;
+use crate::pipeline::level_set::growing::Growing;
 use crate::pipeline::level_set::time_loop::Evolution;
 use crate::pipeline::marks::ObjectMarks;
 use crate::store::{BrickArray, Element};
@@ -83,7 +84,9 @@ impl Begun {
         let evolution = if rests {
             Evolution { steps: 0, sor_iterations: 0, stopped_by: "too thin", residual: 0.0 }
         } else {
-            evolve(&stage, engine, &mut band, image, geometry.spacing, &time_loop)?
+            let shown = Geometry { origin: picture.world.of(geometry.origin), ..geometry.clone() };
+            let mut growing = Growing::of(picture.shown_in, &format!("object-{}", marks.object), &shown)?;
+            evolve(&stage, engine, &mut band, image, geometry.spacing, &time_loop, growing.as_mut())?
         };
         stage.finish();
         let Band { u, distance: pull, voxels: band_voxels, .. } = band;

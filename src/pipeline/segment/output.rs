@@ -23,7 +23,7 @@ use crate::kernel::image::labels;
 use crate::kernel::image::picture::palette::label_color;
 use crate::kernel::surface::Contact;
 use crate::pipeline::image::ingest::{Image, ingest};
-use crate::pipeline::output::pyramid::{Reduce, write_levels};
+use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
 use crate::store::{BoxSource, Element, ElementType, Sample, SampleWork, VolumeSource};
 
 /// What a segmentation found.
@@ -130,7 +130,11 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let origin = guides.geometry.position(crop.lo.map(|v| -v));
     let whole = Geometry { shape: stack.shape(), origin, ..guides.geometry.clone() };
     let world = World { whole: &whole, origin: guides.geometry.origin };
-    let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry, world };
+    let shown_in = store.filter(|store| store.live().is_some());
+    if let Some(store) = shown_in {
+        write_image(engine, guides.geometry, &image, store)?;
+    }
+    let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry, world, shown_in };
     let Objects { solved, refused } = solve_all(engine, &picture, guides, settings, (store, meshes))?;
     let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
     let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, store)?;
@@ -142,7 +146,9 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let labels = keeps.then(|| labels_of(engine, guides.geometry, &joined)).transpose()?;
     drop(joined);
     if let Some(store) = store {
-        write_image(engine, guides.geometry, &image, store)?;
+        if shown_in.is_none() {
+            write_image(engine, guides.geometry, &image, store)?;
+        }
         write_marks(store, guides.objects)?;
     }
     let (objects, reports) = objects_of(solved);
@@ -199,7 +205,7 @@ fn write_labels_as<T: Element>(
             .collect();
         let spec = LabelSpec { name: "segmentation", geometry, element: T::TYPE, colors: &colors };
         let image = store.labels(&spec)?;
-        write_levels::<T>(stage, engine, image, volume, Reduce::Mode)?;
+        write_levels::<T>(stage, engine, image, volume, (Reduce::Mode, First::Finest))?;
     }
     count_labels(stage, geometry, volume)
 }
@@ -228,7 +234,7 @@ fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>
     let window = Some([image.range.low, image.range.high]);
     let written =
         store.image("", &ImageSpec { name: "image", geometry, element: T::TYPE, content: Content::Grey, window })?;
-    write_levels::<T>(&stage, engine, written, &image.bricks, Reduce::Mean)?;
+    write_levels::<T>(&stage, engine, written, &image.bricks, (Reduce::Mean, First::of(store)))?;
     stage.finish();
     Ok(())
 }

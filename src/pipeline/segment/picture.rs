@@ -1,6 +1,7 @@
 //! The image that objects are found in, and where an object lies in it.
 
 use crate::grid::{Geometry, digits};
+use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::image::grey::grey_range::GreyRange;
 use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::marks::ObjectMarks;
@@ -17,6 +18,8 @@ pub(crate) struct Picture<'a, T: Element> {
     pub geometry: &'a Geometry,
     /// Where it lies in truth, for messages.
     pub world: World<'a>,
+    /// The store that shows surfaces while they move, where it is live.
+    pub shown_in: Option<&'a StoreWriter>,
 }
 
 /// Where a picture lies that is solved as if its first voxel were the origin.
@@ -29,10 +32,15 @@ pub(crate) struct World<'a> {
 }
 
 impl World<'_> {
+    /// Where a place of the picture lies in the world.
+    pub(super) fn of(&self, place: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| place[a] + self.origin[a])
+    }
+
     /// A hole in an object's marks: how wide it is, and where; with the slice, where it is none beyond the image.
     pub(super) fn describe(&self, hole: &Hole) -> String {
         let whole = self.whole;
-        let place: [f64; 3] = std::array::from_fn(|a| hole.place[a] + self.origin[a]);
+        let place = self.of(hole.place);
         let slice = whole.to_voxels(place)[2].round();
         let last = (whole.shape[2] - 1) as f64;
         let on = if (0.0..=last).contains(&slice) {

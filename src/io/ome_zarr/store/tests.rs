@@ -1,5 +1,7 @@
 //! Stores in the making: what is left of them, what they replace, what their documents say.
 
+use std::fs;
+
 use super::*;
 use crate::error::ErrorKind;
 use crate::grid::Geometry;

@@ -60,11 +60,11 @@ pub(crate) struct Values<M: DistanceState> {
 
 impl<M: DistanceState> Values<M> {
     /// What was solved, where sources too are made of the state.
-    pub(crate) fn solved<'a, P: Precision>(self, fixed_voxels: u64, triangle_distances: u64) -> Solved<'a, P>
+    pub(crate) fn read<'a, P: Precision>(self: &Arc<Self>, fixed_voxels: u64, triangle_distances: u64) -> Solved<'a, P>
     where
         M: 'a,
     {
-        let (values, with_source) = (Arc::new(self), None);
+        let (values, with_source) = (self.clone(), None);
         let (sources, fixed) = (values.clone(), values.clone());
         Solved { values, sources, with_source, fixed, fixed_voxels, triangle_distances }
     }

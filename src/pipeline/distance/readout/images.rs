@@ -3,7 +3,7 @@
 
 use super::tile::Tile;
 use crate::error::Result;
-use crate::exec::{Engine, Stage};
+use crate::exec::Engine;
 use crate::grid::{Box3, DataSets, Geometry};
 use crate::io::ome_zarr::{Content, ImageSpec, LabelColor, LabelSpec, LevelWriter, StoreWriter};
 use crate::kernel::distance::state::precision::Precision;
@@ -122,17 +122,19 @@ impl<'a, P: Precision> Images<'a, P> {
         }
     }
 
-    /// Writes the coarser levels, and the range of distances.
-    pub(crate) fn finish(self, stage: &Stage<'_>, engine: &Engine, range: [f64; 2]) -> Result<()> {
-        self.distance.finish(stage, engine)?;
-        for image in [self.labels, self.borders].into_iter().flatten() {
-            image.finish(stage, engine)?;
-        }
-        match self.closest {
+    /// Takes all chunks once more.
+    pub(crate) fn again(&self) {
+        self.distance.again();
+        self.labels.iter().chain(&self.borders).for_each(|image| image.again());
+        match &self.closest {
             None => {}
-            Some(Closest::Single(images)) => finish_all(images, stage, engine)?,
-            Some(Closest::Double(images)) => finish_all(images, stage, engine)?,
+            Some(Closest::Single(images)) => images.iter().for_each(Pyramid::again),
+            Some(Closest::Double(images)) => images.iter().for_each(Pyramid::again),
         }
+    }
+
+    /// Says which range of distances there is.
+    pub(crate) fn describe(&self, range: [f64; 2]) -> Result<()> {
         self.store.describe("", &distance_spec::<P>(self.geometry, Some(range)))
     }
 }
@@ -159,15 +161,11 @@ fn put_coordinates<T: Element, P>(
     images.iter().zip(coordinates).try_for_each(|(image, values)| image.put(tile.part, values, buffer))
 }
 
-fn finish_all<T: Element>(images: [Pyramid<T>; 3], stage: &Stage<'_>, engine: &Engine) -> Result<()> {
-    images.into_iter().try_for_each(|image| image.finish(stage, engine))
-}
-
 /// An image of labels, whatever its type.
 trait LabelImage: Send + Sync {
     fn finest(&self) -> &LevelWriter;
     fn put(&self, chunk: &Box3, labels: &[u32], buffers: &mut LabelBuffers) -> Result<()>;
-    fn finish(self: Box<Self>, stage: &Stage<'_>, engine: &Engine) -> Result<()>;
+    fn again(&self);
 }
 
 /// Labels in the types that they may be written in.
@@ -192,8 +190,8 @@ macro_rules! label_image {
                 Pyramid::put(self, chunk, values, buffer)
             }
 
-            fn finish(self: Box<Self>, stage: &Stage<'_>, engine: &Engine) -> Result<()> {
-                Pyramid::finish(*self, stage, engine)
+            fn again(&self) {
+                Pyramid::again(self);
             }
         }
     };

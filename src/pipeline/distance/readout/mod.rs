@@ -4,6 +4,7 @@ pub(crate) mod field;
 pub(crate) mod found;
 pub(crate) mod images;
 pub(crate) mod kept;
+pub(crate) mod reading;
 pub(crate) mod repair;
 pub(crate) mod tile;
 pub(crate) mod visit;

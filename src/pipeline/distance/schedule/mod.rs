@@ -1,6 +1,7 @@
 //! In which order the bricks of a distance are relaxed, and how sources follow.
 
 pub(crate) mod front;
+pub mod passing;
 pub(crate) mod sweep;
 pub(crate) mod sweep_sources;
 pub(crate) mod textbook;

@@ -1,0 +1,195 @@
+//! Where a store stands while it is made: under a hidden name beside its final one until it is whole, or, a live one, under its
+//! own name from the start.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tempfile::TempDir;
+
+use super::abandoned::{self, REPLACED};
+use super::files::{io_error, sync_tree};
+use super::root::{LiveState, METADATA, Root, live};
+use crate::error::{Error, Result};
+use crate::store::Unfinished;
+
+/// A place for a store.
+#[derive(Debug)]
+pub(super) enum Place {
+    /// Dropped before it is finished it goes.
+    Hidden(Hidden),
+    /// Dropped before it is finished it stays, and says so; without a shard in it it goes.
+    Live(Standing),
+}
+
+/// A folder under a hidden name.
+#[derive(Debug)]
+pub(super) struct Hidden {
+    partial: TempDir,
+    /// Says so to whoever ends the process.
+    unfinished: Unfinished,
+    /// Says to other runs that somebody works in the folder.
+    _claim: Option<File>,
+}
+
+/// A folder under its own name.
+#[derive(Debug)]
+pub(super) struct Standing {
+    path: PathBuf,
+    root: Arc<Root>,
+    finished: bool,
+    /// What was there before, under a hidden name: it goes with this, or comes back where this never got a shard.
+    replaced: Option<(TempDir, Option<File>)>,
+    _claim: Option<File>,
+    _unfinished: Unfinished,
+}
+
+impl Place {
+    /// A hidden place for the store that is to lie at `path`. What killed runs left in the making of the same store goes.
+    pub(super) fn hidden(path: &Path) -> Result<Self> {
+        let partial = hidden_folder(path)?;
+        // Locked before anything is in it: see `abandoned`.
+        let claim = abandoned::claim(partial.path());
+        let unfinished = Unfinished::new(partial.path());
+        Ok(Self::Hidden(Hidden { partial, unfinished, _claim: claim }))
+    }
+
+    /// The place itself; a store that is there makes room.
+    pub(super) fn live(path: &Path, root: Arc<Root>) -> Result<Self> {
+        let fault = |error: std::io::Error| io_error("the output cannot be created in its folder", &error).at(path);
+        let aside = hidden_folder(path)?;
+        let replaced = if exists(path) {
+            // An empty folder gives way to what is renamed to its name.
+            fs::rename(path, aside.path()).map_err(fault)?;
+            let claim = abandoned::claim(aside.path());
+            Some((aside, claim))
+        } else {
+            None
+        };
+        fs::create_dir(path).map_err(fault)?;
+        let claim = abandoned::claim(path);
+        let at_the_end = root.clone();
+        let unfinished = Unfinished::settled_by(path, move || at_the_end.interrupt());
+        root.tell(LiveState::Running, 0.0).map_err(|error| error.at(path))?;
+        let path = path.to_path_buf();
+        Ok(Self::Live(Standing { path, root, finished: false, replaced, _claim: claim, _unfinished: unfinished }))
+    }
+
+    /// The folder.
+    pub(super) fn folder(&self) -> &Path {
+        match self {
+            Self::Hidden(hidden) => hidden.partial.path(),
+            Self::Live(standing) => &standing.path,
+        }
+    }
+
+    /// Puts what is whole into its place.
+    pub(super) fn finish(self, path: &Path, overwrite: bool) -> Result<()> {
+        sync_tree(self.folder()).map_err(|error| error.at(path))?;
+        match self {
+            Self::Hidden(hidden) => hidden.finish(path, overwrite),
+            Self::Live(standing) => standing.finish(),
+        }
+    }
+}
+
+impl Hidden {
+    fn finish(self, path: &Path, overwrite: bool) -> Result<()> {
+        check_target(path, overwrite)?;
+        let fault = |error: std::io::Error| io_error("the output cannot be put in its place", &error).at(path);
+        if exists(path) {
+            let mut old = self.partial.path().as_os_str().to_owned();
+            old.push(REPLACED);
+            let old = PathBuf::from(old);
+            self.unfinished.finish(|| {
+                fs::rename(path, &old).map_err(fault)?;
+                if let Err(error) = fs::rename(self.partial.path(), path) {
+                    fs::rename(&old, path).map_err(fault)?;
+                    return Err(fault(error));
+                }
+                Ok(())
+            })?;
+            let _goes = Unfinished::new(&old);
+            let left = |error| io_error("the output is complete, but the one it replaces cannot be removed", &error);
+            fs::remove_dir_all(&old).map_err(|error| left(error).at(&old))?;
+        } else {
+            self.unfinished.finish(|| fs::rename(self.partial.path(), path)).map_err(fault)?;
+        }
+        // The folder has its final name: nothing is left to clean up.
+        let _ = self.partial.keep();
+        Ok(())
+    }
+}
+
+impl Standing {
+    fn finish(mut self) -> Result<()> {
+        self.root.tell(LiveState::Complete, 1.0).map_err(|error| error.at(&self.path))?;
+        self.finished = true;
+        Ok(())
+    }
+}
+
+impl Drop for Standing {
+    fn drop(&mut self) {
+        if self.finished {
+            return;
+        }
+        self.root.interrupt();
+        // Where nothing can be seen in it, it is of no use.
+        if self.root.written() == 0
+            && fs::remove_dir_all(&self.path).is_ok()
+            && let Some((aside, _)) = self.replaced.take()
+        {
+            let aside = aside.keep();
+            let _ = fs::rename(&aside, &self.path);
+        }
+    }
+}
+
+/// An empty folder beside the one that a store is to have; what killed runs left of the same store goes.
+fn hidden_folder(path: &Path) -> Result<TempDir> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let folder = path.parent().unwrap_or(Path::new("."));
+    abandoned::remove(folder, &name, METADATA);
+    tempfile::Builder::new()
+        .prefix(&format!("{}{}-", abandoned::prefix(&name), std::process::id()))
+        .tempdir_in(folder)
+        .map_err(|error| io_error("the output cannot be created in its folder", &error).at(path))
+}
+
+fn exists(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok()
+}
+
+/// Whether a folder is a Zarr store, of version 2 or 3.
+#[must_use]
+pub fn is_store(path: &Path) -> bool {
+    [METADATA, ".zgroup", ".zattrs", ".zarray"].iter().any(|name| path.join(name).is_file())
+}
+
+/// Refuses a place that something is at which may not go.
+pub(super) fn check_target(path: &Path, overwrite: bool) -> Result<()> {
+    if !exists(path) {
+        return Ok(());
+    }
+    let is_live = live(path).map(|live| live.state);
+    if is_live == Some(LiveState::Running) {
+        let what = "another run writes this output, live; wait for its end, or choose another name";
+        return Err(Error::usage(what).at(path));
+    }
+    if !overwrite {
+        let what = match is_live {
+            Some(LiveState::Interrupted) => {
+                "the output is there, left incomplete by a run that was interrupted; give --overwrite to make it anew, or \
+                 choose another name"
+            }
+            _ => "the output exists already; choose another name, or give --overwrite to replace it",
+        };
+        return Err(Error::usage(what).at(path));
+    }
+    if is_store(path) {
+        return Ok(());
+    }
+    let what = "this is no Zarr store, so --overwrite does not replace it; remove it yourself or choose another name";
+    Err(Error::usage(what).at(path))
+}

@@ -1,0 +1,132 @@
+//! The document at a store's root: what its image is and, of a live store, whether somebody still writes it and how far that is.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde_json::{Map, Value, json};
+
+use super::abandoned;
+use super::files::write_json;
+use super::metadata;
+use crate::error::Result;
+
+/// What every store has at its root.
+pub(super) const METADATA: &str = "zarr.json";
+/// The attribute of live stores, beside `ome`.
+const ATTRIBUTE: &str = "strandline";
+
+/// Whether a live store is still written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LiveState {
+    /// A run writes it.
+    Running,
+    /// All of it is there.
+    Complete,
+    /// The run that wrote it has ended before it was complete.
+    Interrupted,
+}
+
+impl LiveState {
+    /// As the attribute says it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Running => "running",
+            Self::Complete => "complete",
+            Self::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// What a live store says of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Live {
+    /// Whether somebody writes it.
+    pub state: LiveState,
+    /// The share of the run that is done, 0 to 1.
+    pub done: f64,
+    /// Grows with each shard.
+    pub written: u64,
+}
+
+/// The document of one store that is being written.
+#[derive(Debug)]
+pub struct Root {
+    path: PathBuf,
+    said: Mutex<Said>,
+    written: Arc<AtomicU64>,
+}
+
+#[derive(Debug, Default)]
+struct Said {
+    ome: Option<Map<String, Value>>,
+    live: Option<Live>,
+}
+
+impl Root {
+    /// That of a store in `folder`, which says nothing yet.
+    pub(super) fn new(folder: &Path) -> Self {
+        Self { path: folder.join(METADATA), said: Mutex::default(), written: Arc::default() }
+    }
+
+    /// Counts the shards that were written.
+    pub(super) fn counter(&self) -> Arc<AtomicU64> {
+        self.written.clone()
+    }
+
+    /// Shards that were written.
+    pub(super) fn written(&self) -> u64 {
+        self.written.load(Relaxed)
+    }
+
+    /// Says what the image at the root is.
+    pub(super) fn describe(&self, ome: Map<String, Value>) -> Result<()> {
+        self.change(|said| said.ome = Some(ome))
+    }
+
+    /// Says how far a live store is.
+    ///
+    /// # Errors
+    /// When the document cannot be written.
+    pub fn tell(&self, state: LiveState, done: f64) -> Result<()> {
+        let done = if state == LiveState::Complete { 1.0 } else { (done.clamp(0.0, 1.0) * 1e4).round() / 1e4 };
+        let live = Live { state, done, written: self.written() };
+        self.change(|said| said.live = Some(live))
+    }
+
+    /// Says that nobody goes on with it, as far as it was.
+    pub(super) fn interrupt(&self) {
+        let said = self.said.lock().unwrap_or_else(PoisonError::into_inner).live;
+        if let Some(live) = said.filter(|live| live.state == LiveState::Running) {
+            // Readers find out by its lock too.
+            let _ = self.tell(LiveState::Interrupted, live.done);
+        }
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Said)) -> Result<()> {
+        // Written under the lock: what is said last stays.
+        let mut said = self.said.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut said);
+        let live = said.live.map(|live| {
+            let value = json!({ "state": live.state.name(), "done": live.done, "written": live.written });
+            (ATTRIBUTE.to_owned(), value)
+        });
+        write_json(&self.path, &metadata::group_with(said.ome.clone(), live))
+    }
+}
+
+/// What the store in a folder says of itself, where it is live. One that says `running` and is nobody's is interrupted: the
+/// lock on its folder goes with the process that writes it, whatever ends that.
+#[must_use]
+pub fn live(folder: &Path) -> Option<Live> {
+    let text = std::fs::read(folder.join(METADATA)).ok()?;
+    let root: Value = serde_json::from_slice(&text).ok()?;
+    let said = root["attributes"].get(ATTRIBUTE)?;
+    let state = match said["state"].as_str()? {
+        "running" if abandoned::is_claimed(folder) => LiveState::Running,
+        "complete" => LiveState::Complete,
+        _ => LiveState::Interrupted,
+    };
+    Some(Live { state, done: said["done"].as_f64()?, written: said["written"].as_u64()? })
+}

@@ -1,0 +1,169 @@
+//! The one look at all voxels of a solved distance: chunk by chunk they are read, measured for the report, and handed on to the
+//! images that are written; where somebody watches, as soon as a front has passed them.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::field::Solved;
+use super::found::DistanceFound;
+use super::images::{Buffers, Images};
+use super::visit::{Measured, ReadOut, Voxels};
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers};
+use crate::grid::Box3;
+use crate::io::ome_zarr::StoreWriter;
+use crate::kernel::distance::features::closest_point::ClosestPoints;
+use crate::kernel::distance::features::inside::Inside;
+use crate::kernel::distance::repair::bends::MARGIN;
+use crate::kernel::distance::state::precision::Precision;
+use crate::pipeline::distance::schedule::passing::Passed;
+use crate::pipeline::distance::solving::Early;
+use crate::pipeline::output::pyramid::{visits, visits_of};
+
+/// Edges of the boxes that voxels are looked at in where nothing is written: as if something was.
+const LOOK_EDGES: [[i64; 3]; 2] = [[128; 3], [64; 3]];
+
+/// A distance that is being read out.
+pub(crate) struct Reading<'a, P: Precision> {
+    what: ReadOut<'a, P>,
+    engine: &'a Engine,
+    images: Option<Images<'a, P>>,
+    inside: Option<Inside<'a>>,
+    closest: ClosestPoints<'a>,
+    visits: Vec<Vec<Box3>>,
+    workers: Workers<(Voxels<P>, Buffers<P>)>,
+    progress: Mutex<Progress>,
+}
+
+/// How far it is.
+struct Progress {
+    measured: Measured,
+    /// Of each visit.
+    done: Vec<bool>,
+    /// Nothing is read early before that.
+    due: Instant,
+    /// What was read early has changed.
+    reopened: bool,
+}
+
+/// Time between two looks at what can be read early, and the visits for each thread that are worth one.
+const BETWEEN: Duration = Duration::from_secs(1);
+const FEWEST_VISITS: usize = 2;
+
+impl<'a, P: Precision> Reading<'a, P> {
+    /// Begins to read out; `store` gets the images, none when it is absent.
+    ///
+    /// # Errors
+    /// When the output cannot be written or scratch runs out.
+    pub(crate) fn new(what: ReadOut<'a, P>, engine: &'a Engine, store: Option<&'a StoreWriter>) -> Result<Self> {
+        let (geometry, sets) = (what.geometry, what.sets);
+        let images = store.map(|store| Images::<P>::new(engine, geometry, sets, what.wanted, store)).transpose()?;
+        let visits = match &images {
+            Some(images) => visits(images.finest(), engine.threads()),
+            None => visits_of(geometry.domain(), LOOK_EDGES.to_vec(), engine.threads()),
+        };
+        let done = vec![false; visits.len()];
+        let progress = Progress { measured: Measured::default(), done, due: Instant::now(), reopened: false };
+        Ok(Self {
+            engine,
+            images,
+            inside: what.is_signed.then(|| Inside::new(geometry, &sets.mesh)),
+            closest: ClosestPoints::new(geometry, sets),
+            visits,
+            workers: Workers::new(|| (Voxels::default(), Buffers::default())),
+            progress: Mutex::new(progress),
+            what,
+        })
+    }
+
+    /// Reads out what was not yet.
+    ///
+    /// # Errors
+    /// When the output cannot be written, scratch runs out or the run is interrupted.
+    pub(crate) fn finish(&self, solved: &Solved<'_, P>) -> Result<DistanceFound> {
+        let stage = self.engine.stage("read out", 0);
+        stage.voxels(self.what.geometry.domain().volume());
+        if std::mem::take(&mut self.progress().reopened) {
+            self.begin_again();
+        }
+        let rest: Vec<usize> = (0..self.visits.len()).filter(|&visit| !self.progress().done[visit]).collect();
+        self.read_out(&stage, solved, &rest)?;
+        let measured = std::mem::take(&mut self.progress().measured);
+        self.describe(measured.max)?;
+        stage.finish();
+        Ok(self.what.found(measured, solved))
+    }
+
+    /// Next to never: what was read early is read once more.
+    fn begin_again(&self) {
+        self.engine.note("distances that were shown have fallen a little since; all are written again");
+        let mut progress = self.progress();
+        progress.done.fill(false);
+        progress.measured = Measured::default();
+        self.images.iter().for_each(Images::again);
+    }
+
+    fn describe(&self, max: f64) -> Result<()> {
+        let low = if self.what.is_signed { -max } else { 0.0 };
+        self.images.as_ref().map_or(Ok(()), |images| images.describe([low, max]))
+    }
+
+    /// Takes some visits.
+    fn read_out(&self, stage: &Stage<'_>, solved: &Solved<'_, P>, visits: &[usize]) -> Result<()> {
+        let measured = stage.run(visits, &self.workers, |(voxels, buffers), &visit| {
+            self.visits[visit].iter().try_fold(Measured::default(), |before, part| {
+                let measured = self.what.measure(part, solved, self.inside.as_ref(), voxels)?;
+                if let Some(kept) = self.what.kept {
+                    kept.put(&voxels.tile(part, &self.closest));
+                }
+                if let Some(images) = &self.images {
+                    images.put(&voxels.tile(part, &self.closest), buffers)?;
+                }
+                Ok(before.and(measured))
+            })
+        })?;
+        let mut progress = self.progress();
+        let before = std::mem::take(&mut progress.measured);
+        progress.measured = measured.into_iter().fold(before, Measured::and);
+        for &visit in visits {
+            progress.done[visit] = true;
+        }
+        Ok(())
+    }
+
+    fn progress(&self) -> MutexGuard<'_, Progress> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The visits that can be taken where the front has passed, when it is time to look and they are enough.
+    fn passed(&self, passed: &Passed<'_>) -> Vec<usize> {
+        let mut progress = self.progress();
+        if Instant::now() < progress.due {
+            return Vec::new();
+        }
+        progress.due = Instant::now() + BETWEEN;
+        let domain = self.what.geometry.domain();
+        let holds = |part: &Box3| passed.holds(&part.grow(MARGIN).intersect(&domain));
+        let ready = |visit: &usize| !progress.done[*visit] && self.visits[*visit].iter().all(holds);
+        let ready: Vec<usize> = (0..self.visits.len()).filter(ready).collect();
+        if ready.len() < FEWEST_VISITS * self.engine.threads() { Vec::new() } else { ready }
+    }
+}
+
+impl<P: Precision> Early<P> for Reading<'_, P> {
+    fn passed(&self, passed: &Passed<'_>, solved: &Solved<'_, P>) -> Result<()> {
+        let ready = self.passed(passed);
+        if ready.is_empty() {
+            return Ok(());
+        }
+        let quiet = self.engine.beside();
+        let stage = quiet.stage("read out early", 0);
+        self.read_out(&stage, solved, &ready)?;
+        let max = self.progress().measured.max;
+        self.describe(max)
+    }
+
+    fn reopened(&self) {
+        self.progress().reopened = true;
+    }
+}
