@@ -145,7 +145,8 @@ fn ours(scene: &Scene, threads: usize, tolerance: f64) -> Cost {
     let cells = (0..band.solved.set().len() as u32).filter(|slot| band.solved.read(*slot, |s| s.contains(&1))).count();
     let fill = band.voxels as f64 / (cells * CELL * CELL * CELL) as f64;
     let started = Instant::now();
-    let done = evolve(&stage, &lab.engine, &mut band, Some(&edges), [1.0; 3], &settings).expect("steps are taken");
+    let done =
+        evolve(&stage, &lab.engine, &mut band, Some(&edges), [1.0; 3], &settings, None).expect("steps are taken");
     let seconds = started.elapsed().as_secs_f64();
     let u = whole(&band.u).into_iter().map(f64::from).collect();
     Cost { seconds, assembly: 0.0, iterations: done.sor_iterations, fill, u }

@@ -2,6 +2,7 @@
 //
 //     STRANDLINE=PATH KEEP=FOLDER node look.mjs STORE WHAT,WHAT,... [STORE WHAT,...]...
 //
+// WHAT of a store that is still written: what is to be seen now, a slash, and what is to be seen on the same page when it is complete.
 // WHAT: image (grey values that vary), labels (a coloured tint over a section), surface (colour in the view of space), marks (points of
 // their own yellow). Pictures go to KEEP. Ends with 1 where something is missing, a request failed or the page had an error.
 
@@ -46,6 +47,16 @@ const serve = async (store) => {
   throw new Error(`strandline view ${store} said nothing`);
 };
 
+const said = (page) => page.evaluate(() => document.getElementById("status").textContent);
+
+// The run has ended, and the page has heard of it and drawn what there is.
+const completed = async (page) => {
+  const over = async () => (await (await fetch("live.json")).json()).text === "" && document.getElementById("status").textContent === "";
+  await page.waitForFunction(over, { timeout: 1000 * PATIENCE, polling: 1000 });
+  await new Promise((after) => setTimeout(after, 5000));
+  await page.waitForFunction(() => window.viewer.isReady(), { timeout: 1000 * PATIENCE, polling: 500 });
+};
+
 const look = async (browser, store, wanted) => {
   const { server, url } = await serve(store);
   const faults = [];
@@ -63,13 +74,16 @@ const look = async (browser, store, wanted) => {
       timeout: 1000 * PATIENCE,
       polling: 500,
     });
-    await new Promise((after) => setTimeout(after, 1500));
-    const picture = await page.screenshot({ path: join(process.env.KEEP, `${store.replace(/\W/g, "-")}.png`) });
-    const pixels = pixelsOf(picture);
-    for (const what of wanted) {
-      const seen = LOOKS[what](pixels);
-      console.log(`${store}: ${what} ${seen} (${ENOUGH} asked)`);
-      if (seen < ENOUGH) faults.push(`${what} is not to be seen`);
+    for (const [n, whats] of wanted.split("/").entries()) {
+      if (n > 0) await completed(page);
+      await new Promise((after) => setTimeout(after, 1500));
+      const picture = await page.screenshot({ path: join(process.env.KEEP, `${store.replace(/\W/g, "-")}${n > 0 ? "-complete" : ""}.png`) });
+      const pixels = pixelsOf(picture);
+      for (const what of whats.split(",")) {
+        const seen = LOOKS[what](pixels);
+        console.log(`${store}: ${what} ${seen} (${ENOUGH} asked); the page says ${JSON.stringify(await said(page))}`);
+        if (seen < ENOUGH) faults.push(`${what} is not to be seen`);
+      }
     }
     console.log(`${store}: ${(bytes / 1e6).toFixed(2)} MB loaded by the page itself`);
     await page.close();
@@ -87,6 +101,6 @@ const browser = await puppeteer.launch({
 });
 let good = true;
 const given = process.argv.slice(2);
-for (let n = 0; n + 1 < given.length; n += 2) good = (await look(browser, given[n], given[n + 1].split(","))) && good;
+for (let n = 0; n + 1 < given.length; n += 2) good = (await look(browser, given[n], given[n + 1])) && good;
 await browser.close();
 process.exit(good ? 0 : 1);

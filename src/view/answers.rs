@@ -1,8 +1,10 @@
 //! What each path of the server answers: the page at `/`, the files of stores at `/data/NAME/...`, meshes at `/mesh`, the page's
-//! state at `/state.json`, and how far a store that is still written is at `/live.json`.
+//! state at `/state.json`, surfaces that still move at `/growing`, and how far a store that is still written is at `/live.json`.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{Read, Seek, SeekFrom};
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::{Duration, Instant};
 
 use axum::Router;
 use axum::body::Body;
@@ -13,43 +15,85 @@ use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use flate2::read::GzDecoder;
-use serde_json::{Value, json};
+use serde_json::json;
 use tokio::io::AsyncReadExt;
 use tokio_util::io::ReaderStream;
 
-use super::folder::{Folder, Opened};
+use super::folder::Opened;
 use super::ranges::{Asked, Part, part};
-use super::shown::Shown;
+use super::shown::{MeshFile, Shown};
 use super::{mesh, page, state};
+use crate::io::ome_zarr::{Live, LiveState};
 
 /// Bytes of a file that are in memory at a time, of each request.
 const PIECE: usize = 64 << 10;
-/// The root attributes of a store are shorter than this.
-const MOST_ATTRIBUTES: u64 = 4 << 20;
 /// Metres where nobody says what a unit of length is: the page takes the numbers as they are.
 const NO_UNIT: f64 = 1.0;
 
 /// What all answers are made of.
 struct Site {
+    now: RwLock<Arc<Now>>,
+}
+
+/// What is shown at a moment.
+struct Now {
     shown: Shown,
     state: String,
+    /// Whether it was live when it was looked at.
+    is_live: bool,
+    looked: Instant,
+}
+
+/// Time after which a store that lives is looked at again.
+const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
+
+impl Now {
+    fn new(shown: Shown) -> Self {
+        Self { state: state::state(&shown).to_string(), is_live: shown.is_live(), looked: Instant::now(), shown }
+    }
+}
+
+impl Site {
+    fn now(&self) -> Arc<Now> {
+        self.now.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// What is shown; of what lives, looked at lately. Reads folders.
+    fn looked_at(&self) -> Arc<Now> {
+        let now = self.now();
+        if now.is_live
+            && now.looked.elapsed() > BETWEEN_LOOKS
+            && let Ok(shown) = now.shown.again()
+        {
+            *self.now.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(Now::new(shown));
+        }
+        self.now()
+    }
 }
 
 /// The answers for what is shown.
 pub(super) fn router(shown: Shown) -> Router {
-    let site = Arc::new(Site { state: state::state(&shown).to_string(), shown });
+    let site = Arc::new(Site { now: RwLock::new(Arc::new(Now::new(shown))) });
     Router::new()
         .route("/", get(|headers: HeaderMap| async move { page_file("", &headers) }))
-        .route(
-            "/state.json",
-            get(|State(site): State<Arc<Site>>| async move { of_type("application/json", site.state.clone()) }),
-        )
+        .route("/state.json", get(page_state))
         .route("/live.json", get(live))
         .route("/mesh/{name}", get(mesh_part))
+        .route("/growing/{moved}/{name}", get(growing_part))
         .route("/data/{*path}", get(data))
         .route("/{name}", get(|Path(name): Path<String>, headers: HeaderMap| async move { page_file(&name, &headers) }))
         .layer(middleware::from_fn(open_to_all))
         .with_state(site)
+}
+
+/// Looks at what is shown, where that does not hold up other answers.
+async fn looked_at(site: Arc<Site>) -> Arc<Now> {
+    let before = site.now();
+    tokio::task::spawn_blocking(move || site.looked_at()).await.unwrap_or(before)
+}
+
+async fn page_state(State(site): State<Arc<Site>>) -> Response {
+    of_type("application/json", looked_at(site).await.state.clone())
 }
 
 /// Pages of other origins may read what is shown, as a neuroglancer elsewhere does; nothing can be changed here.
@@ -93,38 +137,52 @@ fn text<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     headers.get(name).and_then(|value| value.to_str().ok())
 }
 
-/// How far the stores are that are still written, and a number that grows with what is written.
+/// How far the stores are that are still written, a number that grows with what is written, and one that is another when there
+/// is something else to show.
 async fn live(State(site): State<Arc<Site>>) -> Response {
-    let states: Vec<Value> = site.shown.roots.iter().filter_map(|(_, folder)| written_state(folder)).collect();
-    let running = states.iter().filter(|state| state["state"] == "running");
-    let share = running.clone().filter_map(|state| state["done"].as_f64()).fold(f64::INFINITY, f64::min);
+    let now = looked_at(site).await;
+    let states: Vec<Live> = now.shown.live().collect();
+    let running = states.iter().filter(|live| live.state == LiveState::Running);
+    let share = running.clone().map(|live| live.done).fold(1.0, f64::min);
     let words = match running.count() {
+        0 if states.iter().any(|live| live.state == LiveState::Interrupted) => {
+            "interrupted before it was complete".into()
+        }
         0 => String::new(),
-        1 => format!("running, {:.0} % done", 100.0 * share.clamp(0.0, 1.0)),
-        several => format!("{several} stores are written, {:.0} % done", 100.0 * share.clamp(0.0, 1.0)),
+        1 => format!("running, {:.0} % done", 100.0 * share),
+        several => format!("{several} stores are written, {:.0} % done", 100.0 * share),
     };
-    let written: u64 = states.iter().filter_map(|state| state["written"].as_u64()).sum();
-    of_type("application/json", json!({ "running": !words.is_empty(), "text": words, "written": written }).to_string())
-}
-
-fn written_state(folder: &Folder) -> Option<Value> {
-    let root: Value = serde_json::from_slice(&folder.read("zarr.json", MOST_ATTRIBUTES).ok()?).ok()?;
-    root["attributes"]["strandline"].is_object().then(|| root["attributes"]["strandline"].clone())
+    let written: u64 = states.iter().map(|live| live.written).sum();
+    let mut hasher = DefaultHasher::new();
+    now.state.hash(&mut hasher);
+    let shown = format!("{:x}", hasher.finish());
+    let answer = json!({ "running": now.is_live, "text": words, "written": written, "shown": shown });
+    of_type("application/json", answer.to_string())
 }
 
 async fn mesh_part(State(site): State<Arc<Site>>, Path(name): Path<String>) -> Response {
+    let now = looked_at(site).await;
+    part_of_mesh(&now.shown, &now.shown.meshes, &name).await
+}
+
+async fn growing_part(State(site): State<Arc<Site>>, Path((_moved, name)): Path<(String, String)>) -> Response {
+    let now = looked_at(site).await;
+    part_of_mesh(&now.shown, &now.shown.growing.0, &name).await
+}
+
+async fn part_of_mesh(shown: &Shown, meshes: &[MeshFile], name: &str) -> Response {
     if name == "info" {
         return of_type("application/json", json!({ "@type": "neuroglancer_legacy_mesh" }).to_string());
     }
     let numbered = |digits: &str| {
         let segment: u64 = digits.parse().ok()?;
-        site.shown.meshes.iter().find(|mesh| mesh.segment == segment)
+        meshes.iter().find(|mesh| mesh.segment == segment)
     };
     if let Some(mesh) = name.strip_suffix(":0").and_then(numbered) {
         return of_type("application/json", json!({ "fragments": [mesh.segment.to_string()] }).to_string());
     }
-    let Some(mesh_file) = numbered(&name) else { return StatusCode::NOT_FOUND.into_response() };
-    let metres = site.shown.images.iter().flat_map(|image| &image.axes).find_map(|axis| axis.metres).unwrap_or(NO_UNIT);
+    let Some(mesh_file) = numbered(name) else { return StatusCode::NOT_FOUND.into_response() };
+    let metres = shown.images.iter().flat_map(|image| &image.axes).find_map(|axis| axis.metres).unwrap_or(NO_UNIT);
     let file = mesh_file.file.clone();
     match tokio::task::spawn_blocking(move || mesh::fragment(&file, metres)).await {
         Ok(Ok(bytes)) => of_type("application/octet-stream", bytes),
@@ -140,11 +198,12 @@ async fn data(State(site): State<Arc<Site>>, request: Request) -> Response {
     let opened = tokio::task::spawn_blocking(move || {
         let (name, inside) = path.split_once('/')?;
         let name = percent_encoding::percent_decode_str(name).decode_utf8().ok()?;
-        site.shown.roots.iter().find(|(root, _)| *root == name)?.1.open(inside)
+        site.now().shown.roots.iter().find(|(root, _)| *root == name)?.1.open(inside)
     });
     match opened.await {
         Ok(Some(opened)) => part_of(opened, &headers),
-        _ => StatusCode::NOT_FOUND.into_response(),
+        // It may be there the next time.
+        _ => (StatusCode::NOT_FOUND, [(header::CACHE_CONTROL, "no-store")]).into_response(),
     }
 }
 

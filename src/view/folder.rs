@@ -2,7 +2,6 @@
 //! listing.
 
 use std::fs::{File, Metadata};
-use std::io;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
@@ -54,14 +53,6 @@ impl Folder {
             media_type: media_type(&file_path),
             file,
         })
-    }
-
-    /// The bytes of a small file.
-    pub(super) fn read(&self, path: &str, most: u64) -> io::Result<Vec<u8>> {
-        let opened = self.open(path).ok_or(io::ErrorKind::NotFound)?;
-        let mut bytes = Vec::new();
-        io::Read::read_to_end(&mut io::Read::take(opened.file, most), &mut bytes)?;
-        Ok(bytes)
     }
 
     pub(super) fn root(&self) -> &Path {

@@ -2,6 +2,7 @@
 //! fields by their OME metadata (versions 0.4 and 0.5), and meshes.
 
 use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
 
 use serde_json::Value;
 
@@ -9,6 +10,8 @@ use super::folder::Folder;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::point_file::PointFile;
 use crate::io::geometry::read::points::{LengthUnit, read_points};
+use crate::io::ome_zarr::{Live, LiveState, live};
+use crate::pipeline::level_set::growing::FOLDER as GROWING;
 use crate::pipeline::segment::MARKS;
 
 /// Folders below a store that are looked into.
@@ -24,10 +27,14 @@ const MOST_BYTES: u64 = 16 << 20;
 /// Everything that is shown.
 #[derive(Clone, Debug)]
 pub struct Shown {
+    /// What was given.
+    path: PathBuf,
     /// The stores and files by the names that they have on the server.
     pub(super) roots: Vec<(String, Folder)>,
     pub(super) images: Vec<Image>,
     pub(super) meshes: Vec<MeshFile>,
+    /// Surfaces that still move, of stores that live, and a number that is another when one has moved.
+    pub(super) growing: (Vec<MeshFile>, u64),
     /// Marks of segmentations, physical coordinates.
     pub(super) marks: Vec<[f64; 3]>,
 }
@@ -88,7 +95,15 @@ impl Shown {
     /// # Errors
     /// When there is nothing that can be shown.
     pub fn of(path: &Path) -> Result<Self> {
-        let mut shown = Self { roots: Vec::new(), images: Vec::new(), meshes: Vec::new(), marks: Vec::new() };
+        let path_given = path.to_path_buf();
+        let mut shown = Self {
+            path: path_given,
+            roots: Vec::new(),
+            images: Vec::new(),
+            meshes: Vec::new(),
+            growing: (Vec::new(), 0),
+            marks: Vec::new(),
+        };
         let found = std::fs::metadata(path)
             .map_err(|e| Error::input(format!("cannot be opened: {e}")).caused_by(e).at(path))?;
         if found.is_file() {
@@ -101,17 +116,32 @@ impl Shown {
                     shown.add_store(&below)?;
                 }
             }
-            // A store without an image of its own, such as that of a reconstruction.
+            // A store without an image of its own, such as one that was just begun.
             if shown.roots.is_empty() {
                 shown.add_store(path)?;
             }
         }
         shown.thin_fields();
-        if shown.images.is_empty() && shown.meshes.is_empty() {
+        if shown.images.is_empty() && shown.meshes.is_empty() && !shown.is_live() {
             let what = "holds nothing that can be shown; give an OME-Zarr store, a folder of some, or a PLY mesh";
             return Err(Error::input(what).at(path));
         }
         Ok(shown)
+    }
+
+    /// Looks again.
+    pub(super) fn again(&self) -> Result<Self> {
+        Self::of(&self.path)
+    }
+
+    /// Whether a store is still written.
+    pub(super) fn is_live(&self) -> bool {
+        self.live().any(|live| live.state == LiveState::Running)
+    }
+
+    /// What those stores say that are or were live.
+    pub(super) fn live(&self) -> impl Iterator<Item = Live> {
+        self.roots.iter().filter_map(|(_, folder)| live(folder.root()))
     }
 
     fn add_store(&mut self, path: &Path) -> Result<()> {
@@ -147,6 +177,15 @@ impl Shown {
         self.meshes.push(MeshFile { path, file, segment });
     }
 
+    fn push_growing(&mut self, file: PathBuf) {
+        let (meshes, moved) = &mut self.growing;
+        let changed = std::fs::metadata(&file).and_then(|found| found.modified()).ok();
+        let since = changed.and_then(|at| at.duration_since(UNIX_EPOCH).ok()).unwrap_or_default();
+        *moved = moved.wrapping_mul(31).wrapping_add(since.as_millis() as u64);
+        let segment = meshes.len() as u64 + 1;
+        meshes.push(MeshFile { path: file_name(&file), file, segment });
+    }
+
     /// Leaves out fields where there are more than somebody would look through.
     fn thin_fields(&mut self) {
         let mut fields = 0;
@@ -175,7 +214,9 @@ impl Shown {
         }
         for file in files(folder) {
             let is_mesh = file.extension().is_some_and(|e| ["ply", "obj", "stl", "off"].map(str::as_ref).contains(&e));
-            if is_mesh && self.meshes.len() < MOST {
+            if is_mesh && folder.ends_with(GROWING) {
+                self.push_growing(file);
+            } else if is_mesh && self.meshes.len() < MOST {
                 self.push_mesh(format!("{path}/{}", file_name(&file)), file);
             }
         }

@@ -14,6 +14,9 @@ pub(super) fn state(shown: &Shown) -> Value {
     if !shown.meshes.is_empty() {
         layers.push(meshes(shown));
     }
+    if !shown.growing.0.is_empty() {
+        layers.push(growing(shown));
+    }
     layers.extend(shown.images.first().filter(|_| !shown.marks.is_empty()).map(|image| marks(image, &shown.marks)));
     let mut state = json!({
         "layers": layers,
@@ -104,7 +107,15 @@ fn meshes(shown: &Shown) -> Value {
     let numbers = || shown.meshes.iter().map(|mesh| mesh.segment);
     let colors: Map<String, Value> = numbers().map(|n| (n.to_string(), hex(color(n)).into())).collect();
     let segments: Vec<String> = numbers().map(|n| n.to_string()).collect();
-    let mut source = json!({ "url": "precomputed:///mesh" });
+    json!({
+        "type": "segmentation", "name": "surfaces", "source": mesh_source(shown, "mesh"), "segments": segments,
+        "segmentColors": colors, "objectAlpha": 0.8,
+    })
+}
+
+/// Meshes at a path of the server, in the world of the first image.
+fn mesh_source(shown: &Shown, path: &str) -> Value {
+    let mut source = json!({ "url": format!("precomputed:///{path}") });
     if let Some(axes) =
         shown.images.first().map(|image| &image.axes).filter(|axes| axes.iter().all(|axis| axis.metres.is_none()))
     {
@@ -115,9 +126,16 @@ fn meshes(shown: &Shown) -> Value {
         let of_image = names().map(|name| (name, json!([1.0, ""]))).collect::<Map<String, Value>>();
         source["transform"] = json!({ "inputDimensions": of("m"), "outputDimensions": of_image });
     }
+    source
+}
+
+/// Surfaces that still move, under an address that is another when they have moved: pages keep what they have read.
+fn growing(shown: &Shown) -> Value {
+    let (meshes, moved) = &shown.growing;
+    let segments: Vec<String> = meshes.iter().map(|mesh| mesh.segment.to_string()).collect();
     json!({
-        "type": "segmentation", "name": "surfaces", "source": source, "segments": segments, "segmentColors": colors,
-        "objectAlpha": 0.8,
+        "type": "segmentation", "name": "growing", "source": mesh_source(shown, &format!("growing/{moved}")),
+        "segments": segments, "segmentDefaultColor": "#7fd4ff", "objectAlpha": 0.6,
     })
 }
 

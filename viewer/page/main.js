@@ -1,12 +1,14 @@
 // The page of `strandline view`: neuroglancer laid out as the server's state says, and kept up with a store that is still written.
 //
 // `state.json` is a state of neuroglancer; sources in it that begin with a slash lie on this server. `live.json` says what is
-// running, how far it is, and a number that grows with every shard; when it does, what was read of the store is read again.
+// running, how far it is, a number that grows with every shard (when it does, what was read of the store is read again), and one
+// that is another when there are other layers.
 
 import "neuroglancer/unstable/util/polyfills.js";
 import "neuroglancer/unstable/layer/enabled_frontend_modules.js";
 import "neuroglancer/unstable/datasource/enabled_frontend_modules.js";
 import "neuroglancer/unstable/kvstore/enabled_frontend_modules.js";
+import { makeLayer } from "neuroglancer/unstable/layer/index.js";
 import { setupDefaultViewer } from "neuroglancer/unstable/ui/default_viewer_setup.js";
 
 // Seconds between two looks at a store that is written.
@@ -34,19 +36,34 @@ const status = document.getElementById("status");
 
 // Reads again what was read of the chunks; layers, position and colours stay.
 const readAgain = (viewer) => {
-  for (const { layer } of viewer.layerManager.managedLayers) {
-    for (const data of layer?.dataSources ?? []) {
-      for (const loaded of data.loadState?.subsources ?? []) {
-        loaded.subsourceEntry.subsource.volume?.rpc && invalidate(loaded.subsourceEntry.subsource.volume);
-      }
-    }
-  }
+  for (const source of viewer.chunkManager.memoize.map.values()) source.invalidateCache?.();
 };
 
-const invalidate = (volume) => {
-  for (const scales of volume.getSources({ displayRank: 3, multiscaleToViewTransform: new Float32Array(9), modelChannelDimensionIndices: [] })) {
-    for (const { chunkSource } of scales) chunkSource.invalidateCache();
+// Layers as the server gave them, by their names.
+let given = new Map();
+
+// Puts in layers that are new or have another source, takes out those that are gone; leaves all others as they are.
+const followLayers = async (viewer) => {
+  const state = withSources(await load("state.json"));
+  if (given.size === 0) return open(viewer, state);
+  const now = byName(state);
+  for (const name of given.keys()) {
+    if (!now.has(name)) remove(viewer, name);
   }
+  for (const [name, layer] of now) {
+    const before = given.get(name);
+    const there = viewer.layerManager.getLayerByName(name);
+    if (there !== undefined && (before === undefined || JSON.stringify(before) === JSON.stringify(layer))) continue;
+    const visible = there?.visible ?? layer.visible ?? true;
+    remove(viewer, name);
+    viewer.layerSpecification.add(makeLayer(viewer.layerSpecification, name, { ...layer, visible }));
+  }
+  given = now;
+};
+
+const remove = (viewer, name) => {
+  const layer = viewer.layerManager.getLayerByName(name);
+  if (layer !== undefined) viewer.layerManager.removeManagedLayer(layer);
 };
 
 const follow = async (viewer, before) => {
@@ -56,10 +73,24 @@ const follow = async (viewer, before) => {
     return;
   }
   status.textContent = live.text;
-  if (before !== undefined && live.written !== before) readAgain(viewer);
-  if (live.running) setTimeout(() => follow(viewer, live.written), 1000 * PATIENCE);
+  if (before !== undefined && live.shown !== before.shown) await followLayers(viewer);
+  if (before !== undefined && live.written !== before.written) readAgain(viewer);
+  // Once more when it is complete: the last shards have come since.
+  if (live.running || before?.running) setTimeout(() => follow(viewer, live), 1000 * PATIENCE);
 };
 
-const viewer = setupDefaultViewer();
-if (location.hash.length < 3) viewer.state.restoreState(withSources(await load("state.json")));
+// Lays out all that there is; nothing of a store that was just begun.
+const open = (viewer, state) => {
+  given = byName(state);
+  if (given.size > 0) viewer.state.restoreState(state);
+};
+
+const byName = (state) => new Map(state.layers.map((layer) => [layer.name, layer]));
+
+// A store that was just begun has nothing to show yet, and nobody is to be asked for a layer then.
+const viewer = setupDefaultViewer({ showLayerDialog: false, resetStateWhenEmpty: false });
+const first = withSources(await load("state.json"));
+// Who opens a link to a place of the page finds that.
+if (location.hash.length < 3) open(viewer, first);
+else given = byName(first);
 follow(viewer, undefined);

@@ -9,11 +9,16 @@ use super::store_contents::{contents, groups, range};
 use crate::cli::report::lines::{Lines, line};
 use crate::cli::terminal::text::{number, place};
 use crate::error::{Error, Result};
+use crate::io::ome_zarr::live;
 use crate::io::stack::zarr::{LevelDescription, ZarrDescription, describe, holds_image};
 
 /// What a store holds, as JSON and as lines; `image` chooses the image of a store with several.
 pub(crate) fn store(path: &Path, image: Option<u32>) -> Result<(Value, Lines)> {
     let mut lines = vec![line("kind", "OME-Zarr store")];
+    let live = live(path);
+    lines.extend(
+        live.map(|live| line("state", format!("{}, {:.0} % of the run done", live.state.name(), 100.0 * live.done))),
+    );
     let (mut images, mut stored) = (Map::new(), Map::new());
     for group in groups(path) {
         let name = if group.is_empty() { "image" } else { &group };
@@ -60,7 +65,11 @@ pub(crate) fn store(path: &Path, image: Option<u32>) -> Result<(Value, Lines)> {
         lines.extend(summary(report));
     }
     let result = report.as_ref().map_or(Value::Null, |report| report["result"].clone());
-    Ok((json!({ "kind": "store", "images": images, "stored": stored, "files": named, "result": result }), lines))
+    let state = live.map(|live| live.state.name());
+    Ok((
+        json!({ "kind": "store", "state": state, "images": images, "stored": stored, "files": named, "result": result }),
+        lines,
+    ))
 }
 
 fn image_lines(name: &str, image: &ZarrDescription) -> Lines {

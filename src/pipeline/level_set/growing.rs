@@ -13,6 +13,8 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::pipeline::surface::extract;
 use crate::store::{BoxSource, BrickArray};
 
+/// The folder of such surfaces, of a store.
+pub const FOLDER: &str = "growing";
 /// Voxels that it is drawn on at most: small enough for any viewer.
 const MOST_VOXELS: u64 = 2 << 20;
 /// Time between two drawings, and how many times longer than one takes: it is to cost a fiftieth of the run at most.
@@ -33,7 +35,7 @@ impl<'a> Growing<'a> {
     /// When its folder cannot be made.
     pub(crate) fn of(store: Option<&StoreWriter>, name: &str, geometry: &'a Geometry) -> Result<Option<Self>> {
         let Some(store) = store.filter(|store| store.live().is_some()) else { return Ok(None) };
-        let path = store.file(&format!("growing/{name}.ply"))?;
+        let path = store.file(&format!("{FOLDER}/{name}.ply"))?;
         Ok(Some(Self { path, geometry, due: Instant::now() }))
     }
 
