@@ -31,6 +31,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
+    if cli.command.tells_json() {
+        terminal::log::be_json();
+    }
     let typed: Vec<String> = arguments.iter().map(|a| a.to_string_lossy().into_owned()).collect();
     let ended = catch_unwind(AssertUnwindSafe(|| execute(cli, &typed)));
     if !terminal::signals::speak_last() {
@@ -40,10 +43,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     }
     match ended {
-        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Ok(())) => {
+            terminal::log::success();
+            ExitCode::SUCCESS
+        }
         Ok(Err(error)) => {
             let error = terminal::signals::seen(error);
-            complain(&error.to_string());
+            tell(&error);
             ExitCode::from(error.exit_code())
         }
         Err(_) => {
@@ -67,6 +73,11 @@ fn execute(cli: Cli, typed: &[String]) -> Result<()> {
         Command::Completions { shell } => commands::shell::completions(shell),
         Command::Man { folder } => commands::shell::manual(&folder),
     }
+}
+
+/// Says on stderr why a run failed, in the form that was asked for.
+fn tell(error: &Error) {
+    if terminal::log::is_json() { terminal::log::failure(error) } else { complain(&error.to_string()) }
 }
 
 fn complain(message: &str) {

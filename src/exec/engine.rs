@@ -5,12 +5,12 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::budget::{Budget, machine_memory, peak_resident};
 use super::cancel::Cancel;
 use super::comm::{Comm, SelfComm};
-use super::footprint::{Account, Footprint, Hold};
-use super::outlook::Outlook;
-use super::progress::{OfRank, Progress};
+use super::memory::budget::{Budget, machine_memory, peak_resident};
+use super::memory::footprint::{Account, Footprint, Hold};
+use super::progress::heard::{OfRank, Progress};
+use super::progress::outlook::{Outlook, Running};
 use crate::error::{Error, Result};
 use crate::store::{Scratch, Traffic};
 
@@ -70,6 +70,7 @@ impl Engine {
         let comm = Arc::new(SelfComm);
         let account = Account::new(budget, scratch.clone());
         let (outlook, reports) = (Arc::default(), Mutex::default());
+        progress.look_out(&outlook);
         Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, outlook, reports })
     }
 
@@ -194,6 +195,7 @@ impl Engine {
         self.progress.begin(name, total);
         Stage {
             engine: self,
+            planned: self.outlook.begin(name, total),
             started: Instant::now(),
             before: self.scratch.traffic(),
             report: Mutex::new(StageReport { name: name.into(), ..StageReport::default() }),
@@ -218,6 +220,7 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 /// A stage under way.
 pub struct Stage<'a> {
     engine: &'a Engine,
+    planned: Option<Arc<Running>>,
     started: Instant,
     before: Traffic,
     report: Mutex<StageReport>,
@@ -279,6 +282,7 @@ impl<'a> Stage<'a> {
                 engine.cancel.check()?;
                 let done = work(n);
                 engine.progress.advance(1);
+                self.planned.iter().for_each(|planned| planned.advance(1));
                 done
             })
         })?;
@@ -319,6 +323,11 @@ impl<'a> Stage<'a> {
         }
     }
 
+    /// Says how many steps the stage has, where that is known only later than its beginning.
+    pub fn expect(&self, total: u64) {
+        self.planned.iter().for_each(|planned| planned.expect(total));
+    }
+
     /// Says how many voxels the stage works on.
     pub fn voxels(&self, voxels: u64) {
         self.report.lock().unwrap_or_else(PoisonError::into_inner).voxels = voxels;
@@ -334,6 +343,7 @@ impl<'a> Stage<'a> {
         report.bytes_written = moved.bytes_written;
         report.peak_rss_bytes = peak_resident();
         self.engine.progress.end();
+        self.planned.iter().for_each(|planned| self.engine.outlook.end(planned));
         self.engine.reports.lock().unwrap_or_else(PoisonError::into_inner).push(report.clone());
         report
     }

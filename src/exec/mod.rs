@@ -1,15 +1,13 @@
 //! Which tiles are computed, when and where: the halo, the schedules, the one loop over bricks, the memory budget.
 //! The only threads of the crate.
 
-mod budget;
 mod cancel;
 mod comm;
 mod engine;
 mod exchange;
 mod fixed_point;
-mod footprint;
 mod halo;
-mod outlook;
+mod memory;
 mod ownership;
 mod progress;
 mod ranks;
@@ -18,17 +16,17 @@ mod schedule;
 mod side_by_side;
 mod thread_comm;
 
-pub use budget::{Budget, machine_memory, peak_resident};
 pub use cancel::Cancel;
 pub use comm::{Comm, SelfComm};
 pub use engine::{Engine, Stage, StageReport, Workers};
 pub use exchange::{Exchange, Note};
 pub use fixed_point::{FixedPoint, relax_to_fixed_point};
-pub use footprint::{Footprint, Hold};
 pub use halo::{Boundary, HaloPlan, Reach};
-pub use outlook::Outlook;
+pub use memory::budget::{Budget, machine_memory, peak_resident};
+pub use memory::footprint::{Footprint, Hold};
 pub use ownership::Ownership;
-pub use progress::{Progress, Silent};
+pub use progress::heard::{Progress, Silent};
+pub use progress::outlook::{Outlook, Plan};
 pub use relax::{Relax, Until, Waves};
 pub use schedule::{checkerboard, corner_colours, one_wave, sweep_waves};
 pub use thread_comm::ThreadComm;

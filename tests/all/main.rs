@@ -20,6 +20,7 @@ mod fuzz;
 mod gaussian;
 mod heat;
 mod level_set;
+mod live;
 mod maximum_principle;
 mod memory;
 mod mesh_dialects;

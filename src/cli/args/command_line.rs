@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use super::common::{DemoArgs, InfoArgs, MeasureArgs, SegmentArgs};
+use super::common::{DemoArgs, InfoArgs, LogArg, MeasureArgs, SegmentArgs};
 use super::distance::DistanceJobArgs;
 use super::middle::MiddleArgs;
 use super::reconstruct::ReconstructArgs;
@@ -51,6 +51,20 @@ pub(crate) enum Command {
         #[arg(value_name = "FOLDER")]
         folder: std::path::PathBuf,
     },
+}
+
+impl Command {
+    /// Whether the run tells what it does as lines of JSON.
+    pub(crate) fn tells_json(&self) -> bool {
+        let output = match self {
+            Self::Segment(args) => &args.output,
+            Self::Distance(args) => &args.job.output,
+            Self::Middle(args) => &args.job.output,
+            Self::Reconstruct(args) => &args.output,
+            _ => return false,
+        };
+        output.log == LogArg::Json
+    }
 }
 
 pub(crate) const HELP_ON_SEGMENT: &str = "\

@@ -200,6 +200,16 @@ pub(crate) struct OutputArgs {
     /// Print settings and each stage as it ends
     #[arg(short, long)]
     pub(crate) verbose: bool,
+    /// How the run tells what it does: lines to read, or one JSON object an event
+    #[arg(long, value_enum, default_value_t = LogArg::Text)]
+    pub(crate) log: LogArg,
+}
+
+/// How events are told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogArg {
+    Text,
+    Json,
 }
 
 impl OutputArgs {

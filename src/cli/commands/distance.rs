@@ -23,7 +23,7 @@ use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, place, triple};
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Engine, Progress};
+use crate::exec::{Budget, Cancel, Engine, Plan, Progress};
 use crate::grid::{DataSets, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::job::disk::Disk;
@@ -75,7 +75,7 @@ impl Job {
         };
         outputs.check()?;
         let resources = settings::resources(&args.job.resources, args.job.output.store())?;
-        let console = Arc::new(Console::new(Voice::of(args.job.output.quiet, args.job.output.verbose)));
+        let console = Arc::new(Console::new(Voice::of_run(&args.job.output)));
         let mut notes = Vec::new();
         let given = grid::given(&args.job.grid, &mut notes)?;
         for note in &notes {
@@ -121,7 +121,7 @@ impl Job {
         self.console.say(&plan);
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
         let engine = engine.with_ranks(self.args.job.ranks);
-        engine.outlook().expect(needs.seconds);
+        engine.outlook().expect(self.stages::<P>(threads));
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
         let found = result?;
@@ -185,12 +185,24 @@ impl Job {
         if let Some(middle) = self.middle_settings() {
             return middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes);
         }
-        let writes = match writes {
-            true if self.args.job.output.live => Writes::FieldsMeanwhile,
-            true => Writes::Fields,
-            false => Writes::Nothing,
-        };
-        self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], writes)
+        self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], self.writes())
+    }
+
+    /// The stages of the run, and what each will probably take.
+    fn stages<P: Precision>(&self, threads: usize) -> Plan {
+        let writes = self.args.job.output.store().is_some();
+        match self.middle_settings() {
+            Some(middle) => middle.plan::<P>(&self.geometry, threads, writes),
+            None => self.settings.plan::<P>(&self.geometry, threads, self.writes()),
+        }
+    }
+
+    fn writes(&self) -> Writes {
+        match self.args.job.output.store() {
+            Some(_) if self.args.job.output.live => Writes::FieldsMeanwhile,
+            Some(_) => Writes::Fields,
+            None => Writes::Nothing,
+        }
     }
 
     /// Refuses a run that cannot fit memory or disk.

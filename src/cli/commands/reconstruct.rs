@@ -29,7 +29,7 @@ use crate::io::geometry::read::source::Source;
 use crate::job::disk::Disk;
 use crate::job::resources::Resources;
 use crate::pipeline::reconstruct::{
-    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, reconstruct_shown, refuse_too_fine,
+    Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, plan, reconstruct_shown, refuse_too_fine,
     spacing_memory, typical_spacing, without_isolated,
 };
 
@@ -124,7 +124,7 @@ impl Job {
         outputs.check()?;
         args.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = settings::resources(&args.resources, args.output.store())?;
-        let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
+        let console = Arc::new(Console::new(Voice::of_run(&args.output)));
         let cloud = match read_told(&args.cloud, &|text| console.note(text))? {
             Source::Cloud(cloud) => cloud.positions,
             Source::Mesh(mesh) => {
@@ -185,7 +185,7 @@ impl Job {
 
     fn run(&self, seconds: f64) -> Result<()> {
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
-        engine.outlook().expect(seconds);
+        engine.outlook().expect(plan(seconds, self.writes_fields()));
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let found = result?;

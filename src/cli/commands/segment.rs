@@ -28,7 +28,7 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::io::stack::volume::Stack;
 use crate::job::resources::Resources;
 use crate::pipeline::segment::{
-    Estimate, Grids, Guides, ObjectMeshes, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing,
+    Estimate, Grids, Guides, ObjectMeshes, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing, plan,
     segment,
 };
 use crate::store::Unfinished;
@@ -94,7 +94,7 @@ impl Job {
         args.drawn.mesh.as_deref().map(mesh_format).transpose()?;
         args.drawn.picture.as_deref().map(picture::check_name).transpose()?;
         let resources = settings::resources(&args.resources, args.output.store())?;
-        let console = Arc::new(Console::new(Voice::of(args.output.quiet, args.output.verbose)));
+        let console = Arc::new(Console::new(Voice::of_run(&args.output)));
         let picture = &args.picture;
         let select = picture.volume.select();
         let opened = open_stack(&args.image, select, spacing)?;
@@ -163,7 +163,8 @@ impl Job {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
-        engine.outlook().expect(estimate.seconds);
+        let (voxels, threads, writes) = (self.crop.volume(), self.resources.threads, self.needs_store());
+        engine.outlook().expect(plan(estimate, &self.guides(), voxels, threads, writes));
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let outcome = result?;

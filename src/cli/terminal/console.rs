@@ -5,14 +5,18 @@
 
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use serde_json::json;
+
+use super::log;
 use super::text::{duration, grouped};
+use crate::cli::args::common::{LogArg, OutputArgs};
 use crate::error::one_line;
-use crate::exec::Progress;
+use crate::exec::{Outlook, Progress};
 
 /// Notes that are said; the report has all.
 const MOST_NOTES: usize = 20;
@@ -28,6 +32,8 @@ pub(crate) enum Voice {
     Normal,
     /// Each stage as it ends, too.
     Verbose,
+    /// All of it, as lines of JSON.
+    Json,
 }
 
 impl Voice {
@@ -37,6 +43,15 @@ impl Voice {
             (true, _) => Self::Quiet,
             (_, true) => Self::Verbose,
             _ => Self::Normal,
+        }
+    }
+
+    /// What the flags of a run ask for.
+    pub(crate) fn of_run(output: &OutputArgs) -> Self {
+        match output.log {
+            LogArg::Text => Self::of(output.quiet, output.verbose),
+            LogArg::Json if output.quiet => Self::Quiet,
+            LogArg::Json => Self::Json,
         }
     }
 }
@@ -51,6 +66,7 @@ pub(crate) struct Console {
     due: AtomicU64,
     open: Mutex<Open>,
     notes: Mutex<Vec<String>>,
+    outlook: OnceLock<Arc<Outlook>>,
 }
 
 /// The stages that are open.
@@ -75,6 +91,7 @@ impl Console {
             due: AtomicU64::new(BETWEEN_LINES.as_millis() as u64),
             open: Mutex::default(),
             notes: Mutex::default(),
+            outlook: OnceLock::new(),
         }
     }
 
@@ -85,9 +102,20 @@ impl Console {
 
     /// One line on stderr that is no note: what is about to be done.
     pub(crate) fn say(&self, line: &str) {
-        if self.voice != Voice::Quiet {
-            draw_line(&self.lock(), line);
+        match self.voice {
+            Voice::Quiet => {}
+            Voice::Json => log::event("message", json!({ "text": line })),
+            _ => draw_line(&self.lock(), line),
         }
+    }
+
+    /// Seconds that are left of the run, as far as that can be told.
+    fn left(&self) -> Option<f64> {
+        self.outlook.get().and_then(|outlook| outlook.left())
+    }
+
+    fn left_in_words(&self) -> String {
+        self.left().map_or(String::new(), |left| format!("  about {} left", duration(left)))
     }
 
     /// What was noted so far, for the report.
@@ -108,16 +136,31 @@ impl Console {
         self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Whether there is no bar to draw.
+    fn is_plain(&self) -> bool {
+        !self.terminal || matches!(self.voice, Voice::Quiet | Voice::Json)
+    }
+
     fn plain_line(&self) {
         let open = self.lock();
         let Some(since) = open.since else { return };
         let steps = self.steps.load(Relaxed);
+        if self.voice == Voice::Json {
+            let total = (open.total > 0).then_some(open.total);
+            let done = self.outlook.get().map(|outlook| outlook.done());
+            let what = json!({
+                "stage": open.names.join(", "), "steps": steps, "total": total, "done": done, "left": self.left(),
+                "seconds": self.started.elapsed().as_secs_f64(),
+            });
+            return log::event("progress", what);
+        }
         let far = if open.total > 0 && steps <= open.total {
             format!("{:3} %", 100 * steps / open.total)
         } else {
             format!("{} steps", grouped(steps))
         };
-        draw_line(&open, &format!("{}  {far}  {}", open.names.join(", "), duration(since.elapsed().as_secs_f64())));
+        let (names, took) = (open.names.join(", "), duration(since.elapsed().as_secs_f64()));
+        draw_line(&open, &format!("{names}  {far}  {took}{}", self.left_in_words()));
     }
 }
 
@@ -134,16 +177,21 @@ fn draw_line(open: &Open, line: &str) {
 }
 
 fn measured() -> ProgressStyle {
-    ProgressStyle::with_template("{msg:24} {bar:40} {percent:>3} %  {elapsed}")
+    ProgressStyle::with_template("{msg:24} {bar:40} {percent:>3} %  {elapsed}{prefix}")
         .unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 fn counting() -> ProgressStyle {
-    ProgressStyle::with_template("{msg:24} {spinner} {human_pos} steps  {elapsed}")
+    ProgressStyle::with_template("{msg:24} {spinner} {human_pos} steps  {elapsed}{prefix}")
         .unwrap_or_else(|_| ProgressStyle::default_spinner())
 }
 
 impl Progress for Console {
+    fn look_out(&self, outlook: &Arc<Outlook>) {
+        // A console is that of one run.
+        let _ = self.outlook.set(outlook.clone());
+    }
+
     fn begin(&self, name: &str, total: u64) {
         let mut open = self.lock();
         open.names.push(name.into());
@@ -155,7 +203,10 @@ impl Progress for Console {
             open.since = Some(Instant::now());
             self.steps.store(0, Relaxed);
         }
-        if self.voice == Voice::Quiet || !self.terminal {
+        if self.voice == Voice::Json {
+            log::event("begin", json!({ "stage": name, "seconds": self.started.elapsed().as_secs_f64() }));
+        }
+        if self.is_plain() {
             return;
         }
         open.measured = open.total > 0;
@@ -178,7 +229,7 @@ impl Progress for Console {
         if self.voice == Voice::Quiet {
             return;
         }
-        if self.terminal {
+        if !self.is_plain() {
             // Drawing is left to the bar's own clock; the count is handed over now and then.
             if now.is_multiple_of(8) || steps > 1 {
                 let mut open = self.lock();
@@ -191,6 +242,7 @@ impl Progress for Console {
                 }
                 if let Some(bar) = &open.bar {
                     bar.set_position(now);
+                    bar.set_prefix(self.left_in_words());
                 }
             }
             return;
@@ -209,10 +261,12 @@ impl Progress for Console {
             notes.push(line.into());
             notes.len() - 1
         };
-        if before == MOST_NOTES {
+        if before == MOST_NOTES && self.voice != Voice::Json {
             self.say("more notes are in the report alone");
         }
-        if self.voice != Voice::Quiet && before < MOST_NOTES {
+        if self.voice == Voice::Json {
+            log::event("note", json!({ "text": line }));
+        } else if self.voice != Voice::Quiet && before < MOST_NOTES {
             draw_line(&self.lock(), &format!("note: {}", one_line(line.into())));
         }
     }
@@ -227,6 +281,9 @@ impl Progress for Console {
             bar.finish_and_clear();
         }
         let ended = std::mem::take(&mut *open);
+        if let Some(since) = ended.since.filter(|_| self.voice == Voice::Json) {
+            log::event("end", json!({ "stage": ended.names.join(", "), "took": since.elapsed().as_secs_f64() }));
+        }
         if let Some(since) = ended.since.filter(|_| self.voice == Voice::Verbose) {
             let seconds = since.elapsed().as_secs_f64();
             draw_line(&open, &format!("{}  done  {seconds:.1} s", ended.names.join(", ")));

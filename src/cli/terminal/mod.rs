@@ -1,5 +1,6 @@
 //! The terminal: what is told while a run goes on, and the signals that end it.
 
 pub(crate) mod console;
+pub(crate) mod log;
 pub(crate) mod signals;
 pub(crate) mod text;

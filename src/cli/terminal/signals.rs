@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 
-use crate::cli::complain;
+use crate::cli::tell;
 use crate::error::{Error, Result};
 use crate::exec::Cancel;
 use crate::store::remove_unfinished;
@@ -86,6 +86,6 @@ pub(crate) fn seen(error: Error) -> Error {
 fn end(signal: usize) -> ! {
     remove_unfinished();
     let error = Error::interrupted(signal as i32);
-    complain(&error.to_string());
+    tell(&error);
     exit(i32::from(error.exit_code()))
 }

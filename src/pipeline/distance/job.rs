@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use super::ranks::solve_watched;
+use super::readout::early::Early;
 use super::readout::found::DistanceFound;
 use super::readout::images::Wanted;
 use super::readout::kept::Kept;
 use super::readout::reading::Reading;
 use super::readout::visit::ReadOut;
 use super::seeding::contiguous::contiguous_margin;
-use super::solving::Early;
 use super::{Method, Options, Schedule, Solved, Sources, Writes};
 use crate::error::Result;
 use crate::exec::Engine;

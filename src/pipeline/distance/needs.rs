@@ -1,7 +1,7 @@
 //! What a distance will take: memory that must be held, temporary fields, time. The job reserves what is told here.
 
 use super::{DistanceSettings, Kept, Schedule, Textbook, Wanted};
-use crate::exec::Footprint;
+use crate::exec::{Footprint, Plan};
 use crate::grid::{BrickGrid, DataSets, Geometry};
 use crate::kernel::distance::repair::descent::remembered_bytes;
 use crate::kernel::distance::seeding::outside::count_outside;
@@ -70,8 +70,9 @@ const READ_SOURCE_BYTES: u64 = 4 + 4 + 24;
 const READ_BORDER_BYTES: u64 = 4 + 10;
 /// Bytes of a voxel whose side is told: whether it is fixed, known, inside; the flood's list.
 const READ_SIDE_BYTES: u64 = 3 + 24;
-/// Seconds for a voxel on one thread.
-const VOXEL_SECONDS: f64 = 30e-9;
+/// Seconds of one thread to read out a voxel, and more where it is written: its distance, its label, a coordinate.
+const READ_SECONDS: f64 = 8e-9;
+const WRITE_SECONDS: [f64; 3] = [30e-9, 10e-9, 20e-9];
 
 /// Bytes that the trees of all sources take.
 pub(crate) fn tree_bytes(sets: &DataSets) -> u64 {
@@ -91,9 +92,27 @@ impl DistanceSettings {
     ) -> Needs {
         let grid = BrickGrid::new(geometry.shape, self.brick);
         let footprint = self.footprint::<P>(geometry, sets, [threads, ranks], writes);
-        let seconds = geometry.domain().volume() as f64 * VOXEL_SECONDS / threads as f64;
+        let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
         let held = footprint.bytes(threads as u64);
         Needs { footprint, held, scratch: self.scratch::<P>(&grid, ranks), seconds }
+    }
+
+    /// The stages of a distance, and what each will probably take.
+    #[must_use]
+    pub fn plan<P: Precision>(&self, geometry: &Geometry, threads: usize, writes: Writes) -> Plan {
+        let all = geometry.domain().volume() as f64 / threads as f64;
+        let solver = self.method.solver::<P>();
+        // What is found apart from distances is found in a pass of its own; the textbook's order makes many.
+        let apart = if self.keeps_sources() && !solver.tracks_sources() { 2.0 } else { 1.0 };
+        let order = if self.schedule == Schedule::Front { 1.0 } else { 3.0 };
+        let [distance, label, coordinate] = WRITE_SECONDS;
+        let labels = f64::from(u32::from(self.labels) + u32::from(writes == Writes::FieldsAndBorders));
+        let places = if self.closest_point { 3.0 } else { 0.0 };
+        let written = distance + label * labels + coordinate * places;
+        let written = if writes == Writes::Nothing { 0.0 } else { written };
+        let looks_again = if self.keeps_sources() { 2.0 } else { 1.0 };
+        let read = looks_again * READ_SECONDS + written;
+        vec![("distance".into(), all * solver.seconds * apart * order), ("read out".into(), all * read)]
     }
 
     /// Bytes of a store, if nothing of it could be compressed: the distance, what was asked for beside it, and where it is that

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use super::readout::repair::with_repair;
-use super::readout::within::within;
-use super::solving::{Early, Solving};
+use super::readout::early::Early;
+use super::readout::repair::looked_over;
+use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;
 use crate::exec::{HaloPlan, Ownership, Reach, Stage};
@@ -34,7 +34,7 @@ pub fn solve<'a, P: Precision>(
 ///
 /// # Errors
 /// As [`solve`], and when the output cannot be written.
-pub(crate) fn solve_watched<'a, P: Precision>(
+pub fn solve_watched<'a, P: Precision>(
     stage: &Stage<'_>,
     sources: &Sources<'a>,
     set: &BrickSet,
@@ -44,17 +44,6 @@ pub(crate) fn solve_watched<'a, P: Precision>(
 ) -> Result<Solved<'a, P>> {
     let solved = solve_once(stage, sources, set, (method, schedule), options, early)?;
     Ok(looked_over(solved, sources, options, (method.solver::<P>().tracks_sources(), schedule)))
-}
-
-/// A solved distance as it is read: where its sources are tracked, with a second look at them.
-pub(super) fn looked_over<'a, P: Precision>(
-    solved: Solved<'a, P>,
-    sources: &Sources<'a>,
-    options: Options,
-    (is_tracked, schedule): (bool, Schedule),
-) -> Solved<'a, P> {
-    let solved = if is_tracked { with_repair(solved, sources, options, schedule == Schedule::Front) } else { solved };
-    within(solved, options.farthest)
 }
 
 /// The same without a second look at voxels whose nearest source the front may have lost (they are few, away from the

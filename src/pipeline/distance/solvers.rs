@@ -39,6 +39,8 @@ pub struct Solver<P> {
     pub takes_all_neighbours: bool,
     /// Edge of bricks that it is fastest with on large grids.
     pub brick: i64,
+    /// Seconds for a voxel on one thread, with `front`.
+    pub seconds: f64,
     /// Bytes of a voxel's state.
     pub state_bytes: u64,
     /// Bytes of a voxel's source, where sources are asked for and not part of the state.
@@ -84,6 +86,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             textbook: Textbook::Sweeps,
             takes_all_neighbours: false,
             brick: 64,
+            seconds: 25e-9,
             state_bytes: size_of::<P>() as u64,
             source_bytes: 4,
             cost: costs::fast_sweeping::<P>,
@@ -95,6 +98,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             textbook: Textbook::Sweeps,
             takes_all_neighbours: true,
             brick: 32,
+            seconds: 20e-9,
             state_bytes: 4,
             source_bytes: 0,
             cost: costs::vector_distance::<P>,
@@ -106,6 +110,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             textbook: Textbook::Heap { bytes: size_of::<P>() as u64 + 4 + marching_heap::SCRATCH_BYTES },
             takes_all_neighbours: false,
             brick: 32,
+            seconds: 55e-9,
             state_bytes: size_of::<P>() as u64,
             source_bytes: 4,
             cost: costs::fast_marching::<P>,
@@ -117,6 +122,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             textbook: Textbook::Heap { bytes: 4 + dijkstra_heap::SCRATCH_BYTES },
             takes_all_neighbours: true,
             brick: 32,
+            seconds: 45e-9,
             state_bytes: 4,
             source_bytes: 0,
             cost: costs::dijkstra_pythagoras::<P>,

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::ranks::looked_over;
+use super::readout::early::Early;
 use super::readout::field::{Solved, Values};
+use super::readout::repair::looked_over;
 use super::schedule::front::advance_front;
 use super::schedule::passing::{Passed, Watch};
 use super::schedule::sweep::{NoCompanion, sweep_all};
@@ -44,18 +45,6 @@ pub struct Solving<'j, 'a, P> {
     pub options: Options,
     /// Who reads bricks out while others are still solved.
     pub early: Option<&'j dyn Early<P>>,
-}
-
-/// Reads a distance out as far as a front has passed it.
-pub trait Early<P>: Sync {
-    /// The front has come farther; `solved` is what can be read where it has passed.
-    ///
-    /// # Errors
-    /// When the output cannot be written or the run is interrupted.
-    fn passed(&self, passed: &Passed<'_>, solved: &Solved<'_, P>) -> Result<()>;
-
-    /// Something has changed that was read.
-    fn reopened(&self);
 }
 
 /// Who reads out early, and what from.

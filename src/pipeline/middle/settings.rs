@@ -1,11 +1,15 @@
 //! What `middle` is asked for.
 
 use super::surface::{SurfaceKind, drawing};
-use crate::exec::Footprint;
+use crate::exec::{Footprint, Plan};
 use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::geometry::triangle::Triangle;
 use crate::pipeline::distance::{DistanceSettings, Needs, Writes, tree_bytes};
+
+/// Seconds of one thread for a voxel whose label is made exact, and whose cell is looked at for surfaces.
+const EXACT_SECONDS: f64 = 40e-9;
+const SURFACE_SECONDS: f64 = 250e-9;
 
 /// How labels are told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +53,21 @@ impl MiddleSettings {
         // A copy of the triangles of their own, for what lies on labels' borders.
         let shapes = (sets.mesh.len() * size_of::<Triangle>()) as u64;
         let footprint = needs.footprint.and(Footprint::of_all(trees + shapes)).and(drawing(geometry));
-        Needs { footprint, held: footprint.bytes(threads as u64), ..needs }
+        let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
+        Needs { footprint, held: footprint.bytes(threads as u64), seconds, ..needs }
+    }
+
+    /// The stages of the job, and what each will probably take.
+    #[must_use]
+    pub fn plan<P: Precision>(&self, geometry: &Geometry, threads: usize, writes: bool) -> Plan {
+        let distance = DistanceSettings { labels: true, ..self.distance };
+        let fields = if writes { Writes::FieldsAndBorders } else { Writes::Nothing };
+        let mut plan = distance.plan::<P>(geometry, threads, fields);
+        let all = geometry.domain().volume() as f64 / threads as f64;
+        if self.labels == LabelMode::Exact {
+            plan.insert(1, ("exact labels".into(), all * EXACT_SECONDS));
+        }
+        plan.insert(plan.len() - 1, ("surface".into(), all * SURFACE_SECONDS));
+        plan
     }
 }

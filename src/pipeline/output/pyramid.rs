@@ -242,6 +242,8 @@ pub fn write_levels<T: Element>(
     let pyramid = Pyramid::new(engine, image, reduce)?;
     let workers = Workers::new(|| (Vec::new(), Vec::new()));
     let visits = visits([pyramid.finest()], engine.threads());
+    let twice = first == First::Coarser && !pyramid.coarser.is_empty();
+    stage.expect(visits.len() as u64 * if twice { 2 } else { 1 });
     let visit_all = |put: Put<'_, T>| {
         stage.run(&visits, &workers, |(values, buffer), visit| {
             visit.iter().try_for_each(|chunk| {
@@ -255,14 +257,11 @@ pub fn write_levels<T: Element>(
             })
         })
     };
-    match first {
-        First::Coarser if !pyramid.coarser.is_empty() => {
-            visit_all(&|chunk, values, buffer| pyramid.put_coarser(chunk, values, buffer))?;
-            visit_all(&|chunk, values, _| pyramid.put_finest(chunk, values))?;
-        }
-        _ => {
-            visit_all(&|chunk, values, buffer| pyramid.put(chunk, values, buffer))?;
-        }
+    if twice {
+        visit_all(&|chunk, values, buffer| pyramid.put_coarser(chunk, values, buffer))?;
+        visit_all(&|chunk, values, _| pyramid.put_finest(chunk, values))?;
+    } else {
+        visit_all(&|chunk, values, buffer| pyramid.put(chunk, values, buffer))?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
-use crate::exec::Footprint;
+use crate::exec::{Footprint, Plan};
 use crate::grid::digits::{bytes, grouped};
 use crate::grid::{BrickGrid, Geometry};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
@@ -79,6 +79,15 @@ pub(super) fn begin(grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructS
 /// What that box holds; it may grow.
 pub(super) fn boxes(region: &RegionOfInterest, cloud: &[[f64; 3]]) -> Footprint {
     Footprint::of_boxes(region.held(cloud))
+}
+
+/// The stages of a reconstruction that is thought to take so many seconds, and what each will probably take.
+#[must_use]
+pub fn plan(seconds: f64, writes: bool) -> Plan {
+    let stages = [("distance", 0.15), ("tagging", 0.2), ("band", 0.1), ("level set", 0.5), ("surface", 0.05)];
+    let written = [("write levelset", 0.02), ("write distance", 0.02)];
+    let written = written.into_iter().filter(|_| writes);
+    stages.into_iter().chain(written).map(|(name, share)| (name.into(), share * seconds)).collect()
 }
 
 /// Estimates a reconstruction on a grid with so many threads; `writes` says whether there is an output.

@@ -13,7 +13,7 @@ mod output;
 mod settings;
 mod spacing;
 
-pub use estimate::{Estimate, estimate, refuse_too_fine, spacing_memory};
+pub use estimate::{Estimate, estimate, plan, refuse_too_fine, spacing_memory};
 pub use grid::grid_for;
 pub use isolated::without_isolated;
 pub use output::{Reconstruction, reconstruct, reconstruct_shown};

@@ -9,13 +9,13 @@ use super::neighbours::needs;
 use super::outlined::shape_start::BAND;
 use super::reach::first_reach;
 use super::settings::{Guides, SegmentSettings};
-use crate::exec::Footprint;
+use crate::exec::{Footprint, Plan};
 use crate::grid::{Box3, BrickGrid};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
 use crate::pipeline::enclosure::needs::{
     COARSE_VOXELS, DISTANCE_BYTES, KEPT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES, THREAD_BYTES, box_bytes,
 };
-use crate::pipeline::enclosure::region::RegionOfInterest;
+use crate::pipeline::enclosure::region::{RegionOfInterest, voxel_bounds};
 use crate::pipeline::image::smoothing::thread_bytes;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::marks::{ObjectMarks, cloud_of, contour_gap};
@@ -65,6 +65,11 @@ impl Estimate {
 const PROGRAM_BYTES: u64 = 12 << 20;
 /// Seconds of one thread for a voxel of the image.
 const SECONDS_PER_VOXEL: f64 = 6e-8;
+/// The same to read it, to write it, and to write its label.
+const STACK_SECONDS: [f64; 3] = [7e-9, 8e-9, 3e-9];
+/// The longest stages of an object, and their shares of its time.
+const OBJECT_STAGES: [(&str, f64); 6] =
+    [("profiles", 0.03), ("shape", 0.28), ("distance", 0.1), ("speed", 0.08), ("level set", 0.46), ("surface", 0.05)];
 
 /// Memory that an outline takes: its curve, its edges and where they lie; and what an object's profiles and shape take.
 const OUTLINE_BYTES: u64 = 256 << 10;
@@ -187,6 +192,31 @@ pub fn estimate(
         near_voxels,
         seconds: (near_voxels as f64 * SECONDS_PER_NEAR_VOXEL + voxels as f64 * SECONDS_PER_VOXEL) / threads as f64,
     }
+}
+
+/// The stages of a segmentation, and what each will probably take.
+#[must_use]
+pub fn plan(estimate: &Estimate, guides: &Guides<'_>, voxels: u64, threads: usize, writes: bool) -> Plan {
+    let all = voxels as f64 / threads as f64;
+    let mut plan = vec![("read stack".to_owned(), all * STACK_SECONDS[0])];
+    if writes {
+        plan.extend([("write image".into(), all * STACK_SECONDS[1]), ("write labels".into(), all * STACK_SECONDS[2])]);
+    }
+    // The surface of an object goes with its extents squared.
+    let surface = |marks: &ObjectMarks| {
+        let part = match marks.seed {
+            Some(_) => guides.geometry.domain(),
+            None => voxel_bounds(&marks.contours.concat(), guides.geometry),
+        };
+        libm::pow(part.volume().max(1) as f64, 2.0 / 3.0)
+    };
+    let surfaces: Vec<f64> = guides.objects.iter().map(surface).collect();
+    let near = estimate.near_voxels as f64 * SECONDS_PER_NEAR_VOXEL / threads as f64 / surfaces.iter().sum::<f64>();
+    for (marks, surface) in guides.objects.iter().zip(surfaces) {
+        let stages = OBJECT_STAGES.iter();
+        plan.extend(stages.map(|(name, share)| (format!("{name} {}", marks.object), near * surface * share)));
+    }
+    plan
 }
 
 /// What is in memory at one time: while the image comes in; then, decoders keeping their buffers, while objects are solved,

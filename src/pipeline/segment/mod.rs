@@ -29,7 +29,7 @@ pub use checks::all_marks::{CheckedMarks, check_all_marks};
 pub use checks::doubts::{doubts, open_outlines, spans_slices};
 pub use checks::lengths::{Grids, check_lengths, check_marks, check_seed, check_smoothing};
 pub use checks::same_object::{Extent, shared};
-pub use estimate::{Estimate, estimate};
+pub use estimate::{Estimate, estimate, plan};
 pub use kept::{Kept, KeptObject};
 pub use labels::{Overlap, Placed};
 pub use marks_table::MARKS;

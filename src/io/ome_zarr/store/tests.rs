@@ -5,6 +5,7 @@ use std::fs;
 use super::*;
 use crate::error::ErrorKind;
 use crate::grid::Geometry;
+use crate::io::ome_zarr::{Live, LiveState, live};
 
 fn geometry() -> Geometry {
     Geometry { shape: [5, 4, 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None }
@@ -151,4 +152,85 @@ fn groups_on_the_way_say_that_they_are_groups() {
     }
     let list = json(&store.folder().join("labels/zarr.json"));
     assert_eq!(list["attributes"]["ome"]["labels"], serde_json::json!(["border", "segmentation"]));
+}
+
+fn live_image(store: &StoreWriter) -> ImageWriter {
+    let geometry = geometry();
+    let spec = ImageSpec {
+        name: "image",
+        geometry: &geometry,
+        element: ElementType::U8,
+        content: Content::Grey,
+        window: None,
+    };
+    store.image("", &spec).unwrap()
+}
+
+fn write_all(image: &ImageWriter, value: u8) {
+    let level = &image.levels()[0];
+    for shard in level.shards() {
+        level.write_shard(&shard, &vec![value; shard.len()]).unwrap();
+    }
+}
+
+#[test]
+fn live_stores_stand_there_from_the_start_and_say_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.zarr");
+    let store = StoreWriter::create_live(&path, false).unwrap();
+    let said = || live(&path).unwrap();
+    assert_eq!((said().state, said().written), (LiveState::Running, 0));
+    let image = live_image(&store);
+    assert_eq!(json(&path.join(METADATA))["attributes"]["ome"]["multiscales"][0]["name"], "image");
+    // Nobody else begins it, whatever is allowed.
+    for overwrite in [false, true] {
+        for create in [StoreWriter::create, StoreWriter::create_live] {
+            let error = create(&path, overwrite).unwrap_err();
+            assert!(error.kind() == ErrorKind::Usage && error.to_string().contains("another run"), "{error}");
+        }
+    }
+    write_all(&image, 7);
+    let telling = store.live().unwrap();
+    telling.tell(LiveState::Running, 0.5).unwrap();
+    assert_eq!(said(), Live { state: LiveState::Running, done: 0.5, written: 1 });
+    store.finish().unwrap();
+    assert_eq!(said(), Live { state: LiveState::Complete, done: 1.0, written: 1 });
+    assert_eq!(entries(folder.path()), ["out.zarr"]);
+}
+
+#[test]
+fn live_stores_that_are_given_up_say_so_or_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.zarr");
+    let store = StoreWriter::create_live(&path, false).unwrap();
+    let image = live_image(&store);
+    write_all(&image, 7);
+    drop(store);
+    assert_eq!(live(&path).unwrap().state, LiveState::Interrupted);
+    let error = StoreWriter::create(&path, false).unwrap_err();
+    assert!(error.to_string().contains("interrupted"), "{error}");
+    // One that never got a shard goes, and what it replaced comes back.
+    let store = StoreWriter::create_live(&path, true).unwrap();
+    assert_eq!(live(&path).unwrap(), Live { state: LiveState::Running, done: 0.0, written: 0 });
+    drop(store);
+    assert_eq!(live(&path).unwrap(), Live { state: LiveState::Interrupted, done: 0.0, written: 1 });
+    assert!(path.join("0/c/0/0/0").is_file());
+    // Who says running and is gone is interrupted.
+    let document = fs::read_to_string(path.join(METADATA)).unwrap().replace("interrupted", "running");
+    fs::write(path.join(METADATA), document).unwrap();
+    assert_eq!(live(&path).unwrap().state, LiveState::Interrupted);
+    let store = StoreWriter::create_live(&path, true).unwrap();
+    write_all(&live_image(&store), 8);
+    store.finish().unwrap();
+    assert_eq!(live(&path).unwrap().state, LiveState::Complete);
+    assert_eq!(entries(folder.path()), ["out.zarr"]);
+}
+
+#[test]
+fn stores_that_are_not_live_say_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.zarr");
+    write_store(&path, false, 3).unwrap();
+    assert_eq!(live(&path), None);
+    assert_eq!(live(folder.path()), None);
 }

@@ -1,5 +1,6 @@
 //! A solved distance as it is read: repaired, told from which side, measured, and put into images.
 
+pub(crate) mod early;
 pub(crate) mod field;
 pub(crate) mod found;
 pub(crate) mod images;

@@ -4,6 +4,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::early::Early;
 use super::field::Solved;
 use super::found::DistanceFound;
 use super::images::{Buffers, Images};
@@ -17,7 +18,6 @@ use crate::kernel::distance::features::inside::Inside;
 use crate::kernel::distance::repair::bends::MARGIN;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::schedule::passing::Passed;
-use crate::pipeline::distance::solving::Early;
 use crate::pipeline::output::pyramid::{visits, visits_of};
 
 /// Edges of the boxes that voxels are looked at in where nothing is written: as if something was.
@@ -87,6 +87,7 @@ impl<'a, P: Precision> Reading<'a, P> {
             self.begin_again();
         }
         let rest: Vec<usize> = (0..self.visits.len()).filter(|&visit| !self.progress().done[visit]).collect();
+        stage.expect(rest.len() as u64);
         self.read_out(&stage, solved, &rest)?;
         let measured = std::mem::take(&mut self.progress().measured);
         self.describe(measured.max)?;

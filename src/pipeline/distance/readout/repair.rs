@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::field::DistanceWithSource;
+use super::within::within;
 use crate::error::Result;
 use crate::exec::Workers;
 use crate::grid::{Box3, Geometry, NO_SOURCE};
@@ -16,15 +17,26 @@ use crate::kernel::distance::repair::bends::{MARGIN, Repair};
 use crate::kernel::distance::repair::repair_box::Labels;
 use crate::kernel::distance::repair::repair_box::RepairBox;
 use crate::kernel::distance::state::precision::Precision;
-use crate::pipeline::distance::{Options, Solved, Sources};
+use crate::pipeline::distance::{Options, Schedule, Solved, Sources};
 use crate::store::BoxSource;
 
 /// Edge of the pieces that a box is looked at in: some 6 MB of buffers for each thread.
 const PIECE: i64 = 64;
 
+/// A solved distance as it is read: where its sources are tracked, with a second look at them.
+pub(crate) fn looked_over<'a, P: Precision>(
+    solved: Solved<'a, P>,
+    sources: &Sources<'a>,
+    options: Options,
+    (is_tracked, schedule): (bool, Schedule),
+) -> Solved<'a, P> {
+    let solved = if is_tracked { with_repair(solved, sources, options, schedule == Schedule::Front) } else { solved };
+    within(solved, options.farthest)
+}
+
 /// A solved distance of a method that tracks sources, each voxel looked at again as it is read: for sources that were
 /// lost too where a `front` solved it.
-pub(crate) fn with_repair<'a, P: Precision>(
+fn with_repair<'a, P: Precision>(
     solved: Solved<'a, P>,
     sources: &Sources<'a>,
     options: Options,

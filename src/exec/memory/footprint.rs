@@ -18,7 +18,7 @@ pub struct Footprint {
     /// Of each thread: its tiles and a kernel's scratch.
     pub per_thread: u64,
     /// So many of these bytes are there for boxes that may still grow: what these turn out to take is told with
-    /// [`Engine::hold`](super::Engine::hold).
+    /// [`Engine::hold`](crate::exec::Engine::hold).
     pub growing: u64,
 }
 
@@ -69,7 +69,7 @@ impl Footprint {
 }
 
 /// Who holds how much of a budget. Engines beside each other share one.
-pub(super) struct Account {
+pub(in crate::exec) struct Account {
     budget: Budget,
     scratch: Scratch,
     /// The window is never more than it was made with.
@@ -95,19 +95,19 @@ impl Held {
 }
 
 impl Account {
-    pub(super) fn new(budget: Budget, scratch: Scratch) -> Arc<Self> {
+    pub(in crate::exec) fn new(budget: Budget, scratch: Scratch) -> Arc<Self> {
         let widest = scratch.window();
         Arc::new(Self { budget, scratch, widest, held: Mutex::default() })
     }
 
     /// Takes a job's footprint off the window for as long as the guard lives.
-    pub(super) fn reserve(self: &Arc<Self>, footprint: Footprint, threads: u64) -> Result<Hold> {
+    pub(in crate::exec) fn reserve(self: &Arc<Self>, footprint: Footprint, threads: u64) -> Result<Hold> {
         let more = Held { reserved: footprint.bytes(threads), growing: footprint.growing, boxes: 0 };
         self.add(more, |held| self.budget.window(held))
     }
 
     /// Takes what a box holds off what is reserved for boxes, and what goes beyond that off the window.
-    pub(super) fn hold(self: &Arc<Self>, bytes: u64) -> Result<Hold> {
+    pub(in crate::exec) fn hold(self: &Arc<Self>, bytes: u64) -> Result<Hold> {
         self.add(Held { boxes: bytes, ..Held::default() }, |held| self.budget.window_under_way(held))
     }
 

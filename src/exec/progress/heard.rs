@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use super::outlook::Outlook;
+
 /// Hears how stages begin, advance and end. Called from one thread at a time, `advance` from many.
 pub trait Progress: Send + Sync {
     /// A stage begins; it has about `total` steps, 0 when that is not known.
@@ -15,6 +17,9 @@ pub trait Progress: Send + Sync {
 
     /// The stage is over.
     fn end(&self);
+
+    /// A run begins, whose outlook this is.
+    fn look_out(&self, _outlook: &Arc<Outlook>) {}
 }
 
 /// Hears nothing.
@@ -29,7 +34,7 @@ impl Progress for Silent {
 }
 
 /// What one of several ranks tells: its steps, which are part of a stage that all of them work on.
-pub(super) struct OfRank(pub(super) Arc<dyn Progress>);
+pub(in crate::exec) struct OfRank(pub(in crate::exec) Arc<dyn Progress>);
 
 impl Progress for OfRank {
     fn begin(&self, _name: &str, _total: u64) {}

@@ -1,0 +1,4 @@
+//! How far a run is, and who hears of it.
+
+pub(super) mod heard;
+pub(super) mod outlook;

@@ -1,0 +1,183 @@
+//! How far a run is: the share of it that is done, and the seconds that are left, as far as can be told.
+//!
+//! A run has a plan: its stages, and the seconds that each is thought to take on some machine. What the stages that are over took
+//! says how fast this machine is; of those under way counts what they have done of their steps, or else their time.
+
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// The share of a stage under way that is told at most: what takes longer than was thought is nearly over, never over.
+const NEARLY: f64 = 0.95;
+
+/// The stages of a run in their order, each with the seconds that it is thought to take.
+pub type Plan = Vec<(String, f64)>;
+
+/// What a run has behind it and before it.
+#[derive(Debug)]
+pub struct Outlook {
+    begun: Instant,
+    stages: Mutex<Vec<Planned>>,
+}
+
+/// A stage of the plan.
+#[derive(Debug)]
+struct Planned {
+    name: String,
+    seconds: f64,
+    state: State,
+}
+
+#[derive(Debug)]
+enum State {
+    Waiting,
+    Running(Arc<Running>),
+    Over,
+}
+
+/// A stage under way.
+#[derive(Debug)]
+pub(in crate::exec) struct Running {
+    since: Instant,
+    steps: AtomicU64,
+    /// 0 where it is not known.
+    total: AtomicU64,
+}
+
+impl Running {
+    /// Steps were done.
+    pub(in crate::exec) fn advance(&self, steps: u64) {
+        self.steps.fetch_add(steps, Relaxed);
+    }
+
+    /// The stage has so many steps.
+    pub(in crate::exec) fn expect(&self, total: u64) {
+        self.total.store(total, Relaxed);
+    }
+
+    /// The share of the stage that is done, where it counts its steps.
+    fn done(&self) -> Option<f64> {
+        let (steps, total) = (self.steps.load(Relaxed), self.total.load(Relaxed));
+        (total > 0 && steps > 0).then(|| (steps as f64 / total as f64).min(NEARLY))
+    }
+}
+
+impl Default for Outlook {
+    fn default() -> Self {
+        Self { begun: Instant::now(), stages: Mutex::default() }
+    }
+}
+
+impl Outlook {
+    /// Tells what the run is going to do.
+    pub fn expect(&self, plan: Plan) {
+        let waiting = |(name, seconds)| Planned { name, seconds, state: State::Waiting };
+        *self.stages() = plan.into_iter().map(waiting).collect();
+    }
+
+    /// A stage begins; of several with that name, the next.
+    pub(in crate::exec) fn begin(&self, name: &str, total: u64) -> Option<Arc<Running>> {
+        let mut stages = self.stages();
+        let planned = stages.iter_mut().find(|stage| stage.name == name && matches!(stage.state, State::Waiting))?;
+        let running =
+            Arc::new(Running { since: Instant::now(), steps: AtomicU64::new(0), total: AtomicU64::new(total) });
+        planned.state = State::Running(running.clone());
+        Some(running)
+    }
+
+    /// A stage is over.
+    pub(in crate::exec) fn end(&self, running: &Arc<Running>) {
+        let is_it = |stage: &&mut Planned| matches!(&stage.state, State::Running(other) if Arc::ptr_eq(other, running));
+        if let Some(stage) = self.stages().iter_mut().find(is_it) {
+            stage.state = State::Over;
+        }
+    }
+
+    /// The share of the run that is done, 0 to 1, never 1; 0 for a run without a plan.
+    #[must_use]
+    pub fn done(&self) -> f64 {
+        self.done_at(Instant::now())
+    }
+
+    /// The seconds that are left, where something is done that tells how fast the run is.
+    #[must_use]
+    pub fn left(&self) -> Option<f64> {
+        let (now, done) = (Instant::now(), self.done());
+        (done > 0.0).then(|| now.duration_since(self.begun).as_secs_f64() * (1.0 - done) / done)
+    }
+
+    fn done_at(&self, now: Instant) -> f64 {
+        let stages = self.stages();
+        let all: f64 = stages.iter().map(|stage| stage.seconds).sum();
+        let gone = now.duration_since(self.begun).as_secs_f64().max(f64::MIN_POSITIVE);
+        // Of what took its time and is over: how much of the plan a second does.
+        let over: f64 =
+            stages.iter().filter(|stage| matches!(stage.state, State::Over)).map(|stage| stage.seconds).sum();
+        let running = || stages.iter().filter_map(|stage| Some((stage.seconds, stage.running()?)));
+        let since = running().map(|(_, running)| running.since).min().unwrap_or(now);
+        let before = since.duration_since(self.begun).as_secs_f64();
+        let pace = if over > PART * all { over / before.max(f64::MIN_POSITIVE) } else { 1.0 };
+        let under_way: f64 = running()
+            .map(|(seconds, running)| {
+                let elapsed = now.duration_since(running.since).as_secs_f64();
+                let by_time = (elapsed * pace / seconds.max(f64::MIN_POSITIVE)).min(NEARLY);
+                seconds * running.done().unwrap_or(by_time)
+            })
+            .sum();
+        let share = (over + under_way) / all.max(f64::MIN_POSITIVE);
+        if all > 0.0 { share.min(gone / (gone + LEAST_LEFT)) } else { 0.0 }
+    }
+
+    fn stages(&self) -> MutexGuard<'_, Vec<Planned>> {
+        self.stages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Planned {
+    fn running(&self) -> Option<&Running> {
+        match &self.state {
+            State::Running(running) => Some(running),
+            _ => None,
+        }
+    }
+}
+
+/// The part of a plan that has to be over before it tells the machine's pace.
+const PART: f64 = 0.05;
+/// Seconds that are always thought to be left: of a run that is not over.
+const LEAST_LEFT: f64 = 0.1;
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn what_is_over_tells_the_pace_of_what_is_left() {
+        let outlook = Outlook::default();
+        outlook.expect(vec![("read".into(), 1.0), ("solve".into(), 3.0), ("write".into(), 1.0)]);
+        let at = |seconds: f64| outlook.begun + Duration::from_secs_f64(seconds);
+        assert_eq!(outlook.done_at(at(0.0)), 0.0);
+        let read = outlook.begin("read", 0).unwrap();
+        outlook.end(&read);
+        assert!(outlook.begin("something else", 0).is_none());
+        let solve = outlook.begin("solve", 100).unwrap();
+        // A fifth of the plan took two seconds: half as fast as was thought.
+        solve.advance(50);
+        assert!((outlook.done_at(at(10.0)) - 2.5 / 5.0).abs() < 1e-9);
+        outlook.end(&solve);
+        let write = outlook.begin("write", 0).unwrap();
+        assert!(outlook.begin("write", 0).is_none(), "it is planned once");
+        // However long the last stage takes, the run is not over.
+        assert!(outlook.done_at(at(1e6)) < 1.0);
+        outlook.end(&write);
+        assert!(outlook.done_at(at(20.0)) < 1.0);
+    }
+
+    #[test]
+    fn a_run_without_a_plan_tells_nothing() {
+        let outlook = Outlook::default();
+        assert_eq!((outlook.done(), outlook.left()), (0.0, None));
+    }
+}

@@ -1,0 +1,175 @@
+//! Stores that live: what a front has passed does not change any more, a live run leaves the bits of another one, and what an
+//! interrupted one leaves says so.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use strandline::error::Result;
+use strandline::grid::{Box3, BrickGrid, BrickSet, Geometry, PointBins};
+use strandline::pipeline::distance::{
+    Early, Method, Options, Passed, SOLVERS, Schedule, Solved, Sources, solve_watched,
+};
+
+use crate::common::ball::Bench;
+use crate::common::lab::Lab;
+use crate::common::random::Random;
+
+/// Keeps what was read of boxes when the front had passed them.
+struct Watched {
+    boxes: Vec<Box3>,
+    seen: Mutex<Vec<(Box3, Vec<f32>)>>,
+}
+
+impl Early<f32> for Watched {
+    fn passed(&self, passed: &Passed<'_>, solved: &Solved<'_, f32>) -> Result<()> {
+        let mut seen = self.seen.lock().unwrap();
+        for part in &self.boxes {
+            if passed.holds(part) && seen.iter().all(|(other, _)| other != part) {
+                let mut values = vec![0.0; part.len()];
+                solved.values.read_box(part, &mut values)?;
+                seen.push((*part, values));
+            }
+        }
+        Ok(())
+    }
+
+    fn reopened(&self) {
+        panic!("what was passed has changed");
+    }
+}
+
+/// Against the finished field, all methods, random clouds on grids of unequal spacings.
+#[test]
+fn what_a_front_has_passed_is_final() {
+    let mut random = Random(5);
+    for round in 0..6 {
+        let spacing = [1.0, 1.0 + 0.5 * random.unit(), 1.0 + random.unit()];
+        let geometry = Geometry { shape: [150, 90, 80], spacing, origin: [0.0; 3], unit: None };
+        // Some corner is far from all of them.
+        let cloud: Vec<[f64; 3]> =
+            (0..1 + 40 * round).map(|_| [30.0, 60.0, 60.0].map(|reach| 10.0 + reach * random.unit())).collect();
+        let grid = BrickGrid::new(geometry.shape, 16);
+        let bins = PointBins::new(grid, &geometry, &cloud);
+        let sources = Sources::cloud(&geometry, &cloud, &bins);
+        for row in SOLVERS {
+            let lab = Lab::new(2);
+            let stage = lab.engine.stage("distance", 0);
+            let boxes = geometry.domain().tiles([16; 3]).collect();
+            let watched = Watched { boxes, seen: Mutex::default() };
+            let order = (Method::named(row.name).unwrap(), Schedule::Front);
+            let options = Options::up_to(f64::INFINITY);
+            let set = BrickSet::dense(grid);
+            let solved = solve_watched::<f32>(&stage, &sources, &set, order, options, Some(&watched)).unwrap();
+            let seen = watched.seen.into_inner().unwrap();
+            assert!(seen.len() > 20, "{}: only {} boxes were read early", row.name, seen.len());
+            for (part, values) in seen {
+                let mut last = vec![0.0; part.len()];
+                solved.values.read_box(&part, &mut last).unwrap();
+                assert!(values == last, "{} {part:?}", row.name);
+            }
+        }
+    }
+}
+
+fn on_sphere(random: &mut Random) -> [f64; 3] {
+    loop {
+        let place = [0; 3].map(|_| 2.0 * random.unit() - 1.0);
+        let length = place.iter().map(|v| v * v).sum::<f64>().sqrt();
+        if (0.1..1.0).contains(&length) {
+            return place.map(|v| v / length);
+        }
+    }
+}
+
+/// Files of a store that hold chunks or surfaces, and their bytes.
+fn contents(store: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut found = Vec::new();
+    let mut folders = vec![store.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.file_name().is_some_and(|name| name != "zarr.json" && name != "report.json") {
+                found.push((path.strip_prefix(store).unwrap().to_path_buf(), fs::read(&path).unwrap()));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn live_runs_leave_the_bits_of_others() {
+    let bench = Bench::bare();
+    let mut ball = Vec::new();
+    let mut random = Random(2);
+    for _ in 0..2000 {
+        let place = on_sphere(&mut random);
+        ball.push(format!("{} {} {}", place[0], place[1], place[2]));
+    }
+    fs::write(bench.path("ball.xyz"), ball.join("\n")).unwrap();
+    fs::write(bench.path("other.xyz"), "3 0 0\n3 1 0\n3 0 1\n").unwrap();
+    for (name, command) in [
+        ("distance", "distance ball.xyz --spacing 0.05 --labels --closest-point"),
+        ("reconstruct", "reconstruct ball.xyz"),
+        ("middle", "middle ball.xyz other.xyz --spacing 0.05"),
+    ] {
+        bench.succeed(&format!("{command} -q -o {name}.zarr"));
+        bench.succeed(&format!("{command} -q --live -o {name}-live.zarr"));
+        let [plain, live] = ["", "-live"].map(|end| contents(&bench.path(&format!("{name}{end}.zarr"))));
+        assert!(plain == live, "{name}");
+        let root = fs::read_to_string(bench.path(&format!("{name}-live.zarr/zarr.json"))).unwrap();
+        assert!(root.contains("\"complete\""), "{root}");
+    }
+}
+
+/// Killed in the midst of it, a live store stays, says that it was interrupted, and is replaced when that is asked for.
+#[test]
+fn a_killed_live_run_is_told_by_the_next() {
+    let bench = Bench::bare();
+    fs::write(bench.path("points.xyz"), "0 0 0\n1 0 0\n0 1 0\n").unwrap();
+    let grid = "--origin=-1,-1,-1 --spacing 0.01 --shape 300,300,300";
+    let command = format!("distance points.xyz {grid} --method fsm --labels --live -q -o out.zarr");
+    let store = bench.path("out.zarr");
+    let mut child = bench.command(&command).stderr(Stdio::null()).spawn().unwrap();
+    let until = Instant::now() + Duration::from_mins(1);
+    while !store.join("zarr.json").is_file() && Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let said = bench.fail(&command, 2);
+    assert!(said.contains("another run writes this output"), "{said}");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(bench.succeed("info out.zarr").contains("interrupted"), "it says that it is not complete");
+    let said = bench.fail(&command, 2);
+    assert!(said.contains("left incomplete by a run that was interrupted"), "{said}");
+    bench.succeed(&format!("{command} --overwrite"));
+    assert!(bench.succeed("info out.zarr").contains("complete"));
+    let left: Vec<_> = fs::read_dir(store.parent().unwrap()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert!(!left.iter().any(|name| name.to_string_lossy().contains(".partial-")), "{left:?}");
+}
+
+/// Each event of a run is an object on a line of its own, the last of which says how it ended.
+#[test]
+fn events_are_lines_of_json() {
+    let bench = Bench::bare();
+    fs::write(bench.path("points.xyz"), "0 0 0\n1 0 0\n0 1 0\n").unwrap();
+    let told = |command: &str| -> Vec<serde_json::Value> {
+        let ended = bench.command(command).env("NO_COLOR", "1").output().unwrap();
+        let text = String::from_utf8(ended.stderr).unwrap();
+        text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("{line}"))).collect()
+    };
+    let events = told("distance points.xyz --spacing 0.1 --log json -o out.zarr");
+    let of = |name: &str| events.iter().filter(|event| event["event"] == name).count();
+    assert!(of("begin") > 2 && of("begin") == of("end") && of("message") == 1, "{events:?}");
+    assert_eq!(events.last().unwrap()["event"], "done");
+    let events = told("distance points.xyz --spacing 0.1 --log json -o out.zarr");
+    let last = events.last().unwrap();
+    assert_eq!((&last["event"], &last["code"]), (&"error".into(), &2.into()), "{events:?}");
+}
