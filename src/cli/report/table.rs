@@ -62,11 +62,13 @@ fn rows_of(reports: &[StageReport]) -> String {
     let mut rows = vec![["stage", "seconds", "voxels", "Mvoxel/s", "brick loads", "peak MiB"].map(String::from)];
     for stage in reports {
         let rate = stage.voxels as f64 / 1e6 / stage.seconds.max(1e-9);
+        // A time that is printed as zero tells no rate.
+        let has_rate = stage.voxels > 0 && stage.seconds >= 0.005;
         rows.push([
             stage.name.clone(),
             format!("{:.2}", stage.seconds),
             grouped(stage.voxels),
-            if stage.voxels > 0 { format!("{rate:.2}") } else { "-".into() },
+            if has_rate { format!("{rate:.2}") } else { "-".into() },
             grouped(stage.brick_loads),
             (stage.peak_rss_bytes >> 20).to_string(),
         ]);
@@ -192,6 +194,8 @@ mod tests {
         };
         let text = stages(&[wide, StageReport { name: "band".into(), ..StageReport::default() }]);
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+        let quick = StageReport { name: "faces".into(), seconds: 1e-6, voxels: 793_600, ..StageReport::default() };
+        assert_eq!(stages(&[quick]).lines().nth(1).unwrap().split_whitespace().nth(4), Some("-"));
         let ends: Vec<usize> = text.lines().map(|line| line.chars().count()).collect();
         assert_eq!(ends[0], ends[1]);
         assert!(text.lines().nth(2).unwrap().starts_with("band   "));

@@ -40,11 +40,11 @@ pub(super) fn write_faces(
     store: Option<&StoreWriter>,
 ) -> Result<Vec<Contact>> {
     let stage = engine.stage("faces", 0);
-    stage.voxels(geometry.domain().volume());
     if settings.fill_gaps.is_none() {
         stage.finish();
         return Ok(Vec::new());
     }
+    stage.voxels(geometry.domain().volume());
     let contacts = match store {
         Some(store) => {
             let mut mesh = PlyWriter::tagged_on_grid(&store.file("meshes/cells.ply")?, geometry)?;
