@@ -2,12 +2,13 @@
 //! folder to lie in.
 
 use std::fs::Metadata;
+use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::io::geometry::read::sources::is_standard_input;
-use crate::io::ome_zarr::is_store;
+use crate::io::ome_zarr::{LONGEST_ENDING, is_store};
 use crate::job::resources::folder_of;
 
 /// What a run reads and writes.
@@ -39,13 +40,17 @@ impl Outputs<'_> {
                 return Err(Error::usage("is named for two outputs; give each a name of its own").at(path));
             }
             seen.push(place);
-            if self.inputs.iter().any(|input| would_replace(path, input)) {
-                return Err(Error::usage("is an input of this run; give the output another name").at(path));
+            refuse_long_name(path, self.store == Some(path))?;
+            let is_read = |replaces: fn(&Path, &Path) -> bool| {
+                let error = || Err(Error::usage("is an input of this run; give the output another name").at(path));
+                if self.inputs.iter().any(|input| replaces(path, input)) { error() } else { Ok(()) }
+            };
+            is_read(is_input)?;
+            // A folder that inputs lie in is none of them.
+            if self.files.contains(&path) && is_folder(path) {
+                return Err(Error::usage("is a folder; give the name of a file").at(path));
             }
-        }
-        let is_folder = |path: &&&Path| path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/");
-        if let Some(path) = self.files.iter().find(is_folder) {
-            return Err(Error::usage("is a folder; give the name of a file").at(path));
+            is_read(would_replace)?;
         }
         self.files.iter().try_for_each(|path| self.check_store_of(path))?;
         self.files.iter().try_for_each(|path| may_write(path, self.overwrite))
@@ -74,6 +79,26 @@ fn place_of(path: &Path) -> PathBuf {
     })
 }
 
+fn is_folder(path: &Path) -> bool {
+    path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/")
+}
+
+/// Refuses a name that is too long for the disk, or for the hidden one that a store has while it is made.
+fn refuse_long_name(path: &Path, is_store: bool) -> Result<()> {
+    let mut hidden = path.file_name().unwrap_or_default().to_owned();
+    if is_store {
+        hidden.push("x".repeat(LONGEST_ENDING));
+    }
+    match folder_of(path).join(&hidden).symlink_metadata() {
+        Err(error) if error.kind() == ErrorKind::InvalidFilename => {
+            let bytes = path.file_name().unwrap_or_default().len();
+            let what = format!("has a name of {bytes} bytes, which is too long for this disk; give a shorter one");
+            Err(Error::usage(what).at(path))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Refuses a file that is there, and what is none.
 fn may_write(path: &Path, overwrite: bool) -> Result<()> {
     // A device or a folder would be replaced by a file.
@@ -91,17 +116,30 @@ fn may_write(path: &Path, overwrite: bool) -> Result<()> {
 /// Whether writing an output would replace an input: the same file by any name or link, also as standard input; a file
 /// within a folder that is read, or one that a link in it leads to; or a folder in which an input lies.
 fn would_replace(output: &Path, input: &Path) -> bool {
-    let input = if is_standard_input(input) { Path::new("/dev/stdin") } else { input };
-    let (Ok(there), Ok(read)) = (output.metadata(), input.metadata()) else { return false };
-    let is_output = |read: &Metadata| (there.dev(), there.ino()) == (read.dev(), read.ino());
-    if is_output(&read) {
+    let Some((there, read)) = both(output, input) else { return false };
+    if is_one(&there, &read) {
         return true;
     }
-    if read.is_dir() && !is_store(input) && slices_of(input).any(|slice| is_output(&slice)) {
+    if read.is_dir() && !is_store(input) && slices_of(input).any(|slice| is_one(&there, &slice)) {
         return true;
     }
     let (Ok(output), Ok(input)) = (output.canonicalize(), input.canonicalize()) else { return false };
     input.starts_with(&output) || output.starts_with(&input)
+}
+
+/// Whether an output is an input itself, by any name or link.
+fn is_input(output: &Path, input: &Path) -> bool {
+    both(output, input).is_some_and(|(there, read)| is_one(&there, &read))
+}
+
+/// What is known of an output that is there, and of an input.
+fn both(output: &Path, input: &Path) -> Option<(Metadata, Metadata)> {
+    let input = if is_standard_input(input) { Path::new("/dev/stdin") } else { input };
+    Some((output.metadata().ok()?, input.metadata().ok()?))
+}
+
+fn is_one(there: &Metadata, read: &Metadata) -> bool {
+    (there.dev(), there.ino()) == (read.dev(), read.ino())
 }
 
 /// What lies directly in a folder, links followed.
@@ -156,8 +194,24 @@ mod tests {
             }
         }
         assert!(check("new.ply", false).is_ok() && check("slices/new.ply", false).is_ok());
+        let error = check("slices/..", true).unwrap_err().to_string();
+        assert!(error.contains("is a folder"), "{error}");
         let whole = folder.path();
         assert!(Outputs { inputs: vec![&scan], store: Some(whole), files: vec![], overwrite: true }.check().is_err());
+    }
+
+    #[test]
+    fn names_are_no_longer_than_the_disk_takes() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |bytes: usize| folder.path().join("n".repeat(bytes));
+        let file = |path: &Path| Outputs { inputs: vec![], store: None, files: vec![path], overwrite: false }.check();
+        let store =
+            |path: &Path| Outputs { inputs: vec![], store: Some(path), files: vec![], overwrite: false }.check();
+        assert!(file(&at(255)).is_ok() && store(&at(255 - LONGEST_ENDING)).is_ok());
+        for error in [file(&at(256)), store(&at(255))] {
+            let error = error.unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().contains("too long for this disk"), "{error}");
+        }
     }
 
     #[test]

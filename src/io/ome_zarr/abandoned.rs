@@ -27,6 +27,10 @@ pub(super) fn prefix(name: &str) -> String {
 /// The end of the hidden name that a store has while another one takes its place.
 pub(super) const REPLACED: &str = "-replaced";
 
+/// A store's name is longer by so much at most while it is made: by the dot, `.partial-`, a number of 32 bits, `-`, six
+/// letters and [`REPLACED`].
+pub const LONGEST_ENDING: usize = 1 + 9 + 10 + 1 + 6 + REPLACED.len();
+
 /// Removes what runs that are dead left of the store `name` in a folder. `document` is what every store in the making
 /// holds from the moment on at which it is locked.
 pub(super) fn remove(folder: &Path, name: &str, document: &str) {

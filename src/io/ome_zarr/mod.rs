@@ -18,6 +18,7 @@ mod root;
 mod shard;
 mod store;
 
+pub use abandoned::LONGEST_ENDING;
 pub use compression::{Compression, Content};
 pub use level::LevelWriter;
 pub use metadata::{ImageSpec, LabelColor, LabelSpec};
