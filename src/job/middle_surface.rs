@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::surface::{Measures, Pair};
 use crate::pipeline::distance::Kept;
-use crate::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, middle_kept};
+use crate::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, check_sets, middle_kept};
 use crate::store::MeshSink;
 
 /// The surfaces equally far from two data sets or more.
@@ -89,6 +89,7 @@ impl<'a> MiddleSurface<'a> {
 
     fn solved<P: Precision>(&self, mesh: &mut dyn MeshSink) -> Result<SolvedMiddle<P>> {
         let mut ready = self.task.ready::<P>()?;
+        check_sets(&ready.sets, self.surface)?;
         ready.settings.labels = true;
         let settings = MiddleSettings { distance: ready.settings, surface: self.surface, labels: self.mode };
         let Ready { sets, geometry, resources, notes, settings: distance } = &mut ready;

@@ -32,7 +32,7 @@ use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::{
     DistanceSettings, Init, Needs, Schedule, Writes, check_iterations, distance, outside_note,
 };
-use crate::pipeline::middle::{MiddleSettings, middle};
+use crate::pipeline::middle::{MiddleSettings, check_sets, middle};
 use crate::store::MeshSink;
 
 /// A distance that is ready to be computed: all inputs are read and checked.
@@ -82,6 +82,7 @@ impl Job {
             console.note(note);
         }
         let Read { sets, volume } = read_sets(&args, given.as_ref(), resources.memory, &console, &cancel)?;
+        middle.as_ref().map_or(Ok(()), |choice| check_sets(&sets, choice.surface))?;
         let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
         let geometry = match (given, volume) {
             (Some(geometry), _) => geometry,

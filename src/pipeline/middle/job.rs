@@ -58,7 +58,7 @@ pub fn middle_kept<P: Precision>(
     (store, kept): (Option<&StoreWriter>, Option<&Kept<P>>),
     mesh: &mut dyn MeshSink,
 ) -> Result<MiddleFound> {
-    refuse(sets, settings.surface)?;
+    check_sets(sets, settings.surface)?;
     let needs = settings.needs::<P>(geometry, sets, engine.threads(), engine.ranks(), store.is_some());
     let _held = engine.reserve(needs.footprint)?;
     let distance = DistanceSettings { labels: true, ..settings.distance };
@@ -95,7 +95,11 @@ pub fn middle_kept<P: Precision>(
     })
 }
 
-fn refuse(sets: &DataSets, surface: SurfaceKind) -> Result<()> {
+/// Refuses data sets between which no such surface lies.
+///
+/// # Errors
+/// With what to give.
+pub(crate) fn check_sets(sets: &DataSets, surface: SurfaceKind) -> Result<()> {
     match (sets.count(), surface) {
         (0 | 1, _) => Err(Error::usage(
             "a middle surface lies between data sets, but the files hold one; give two files or more, or a label volume \

@@ -12,5 +12,6 @@ mod surface;
 mod table;
 
 pub use job::{MiddleFound, middle, middle_kept};
+pub(crate) use job::check_sets;
 pub use settings::{LabelMode, MiddleSettings};
 pub use surface::SurfaceKind;
