@@ -5,25 +5,24 @@ use std::io::BufWriter;
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::store::HiddenFile;
 
-/// Writes a picture of `width` by `height` pixels; `pixels` are rows from the top, red, green and blue of each pixel.
+/// Writes a picture of `width` by `height` pixels; `pixels` are rows from the top, red, green and blue of each pixel. Nothing
+/// stands under the name before it is whole; what did is replaced if that may be.
 ///
 /// # Errors
-/// When the file cannot be written; what was written of it is removed then.
+/// When the file cannot be written, or something is there that it may not replace.
 ///
 /// # Panics
 /// When `pixels` does not fit the size.
-pub fn write_rgb(path: &Path, width: u32, height: u32, pixels: &[u8]) -> Result<()> {
+pub fn write_rgb(path: &Path, [width, height]: [u32; 2], pixels: &[u8], replace: bool) -> Result<()> {
     assert_eq!(pixels.len() as u64, 3 * u64::from(width) * u64::from(height), "the pixels do not fit the size");
     let fault = |error: png::EncodingError| {
         Error::failed(format!("the picture cannot be written: {error}")).caused_by(error).at(path)
     };
-    let file = File::create(path).map_err(|error| fault(error.into()))?;
-    encode(file, width, height, pixels).map_err(|error| {
-        // The first error is the one to report.
-        let _ = std::fs::remove_file(path);
-        fault(error)
-    })
+    let (hidden, file) = HiddenFile::create(path, ".png").map_err(|error| fault(error.into()))?;
+    encode(file, width, height, pixels).map_err(fault)?;
+    hidden.place(replace).map_err(|error| fault(error.into()))
 }
 
 fn encode(file: File, width: u32, height: u32, pixels: &[u8]) -> std::result::Result<(), png::EncodingError> {
@@ -45,7 +44,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("picture.png");
         let pixels: Vec<u8> = (0..5 * 3 * 3).map(|v| (v * 37 % 251) as u8).collect();
-        write_rgb(&path, 5, 3, &pixels).unwrap();
+        write_rgb(&path, [5, 3], &pixels, false).unwrap();
         let mut reader = png::Decoder::new(std::io::BufReader::new(File::open(&path).unwrap())).read_info().unwrap();
         let mut read = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut read).unwrap();
@@ -55,7 +54,7 @@ mod tests {
 
     #[test]
     fn a_missing_folder_is_named() {
-        let error = write_rgb(Path::new("/nowhere/at/all.png"), 1, 1, &[0; 3]).unwrap_err();
+        let error = write_rgb(Path::new("/nowhere/at/all.png"), [1; 2], &[0; 3], false).unwrap_err();
         assert_eq!(error.exit_code(), 1);
         assert!(error.to_string().starts_with("/nowhere/at/all.png: "), "{error}");
     }

@@ -48,6 +48,8 @@ mod cli;
 mod clouds_cli;
 mod layering;
 mod outlines;
+#[cfg(target_os = "linux")]
+mod outputs;
 mod room_circles;
 #[cfg(target_os = "linux")]
 mod segment_notes;

@@ -51,7 +51,7 @@ fn write(path: &Path, origin: [f64; 3], is_tagged: bool) {
     stream(origin, |place| file.borrow_mut().vertex(place).unwrap(), facet);
     let whole = file.into_inner().complete().unwrap();
     assert!(!path.exists(), "it has no name before it is given one");
-    whole.place().unwrap();
+    whole.place(false).unwrap();
 }
 
 /// The triangles of the stream, and their labels.

@@ -11,7 +11,7 @@ use crate::cli::args::values::Output;
 use crate::cli::print;
 use crate::cli::terminal::signals;
 use crate::error::{Error, Result};
-use crate::store::Unfinished;
+use crate::store::HiddenFolder;
 
 const STACK: &[u8] = include_bytes!("../../../data/arabidopsis-embryo.tif");
 const MARKS: &[u8] = include_bytes!("../../../data/arabidopsis-marks.csv");
@@ -27,8 +27,8 @@ pub(crate) fn run(args: &DemoArgs, typed: &[String]) -> Result<()> {
     }
     // Before there is anything that a signal must not leave behind.
     let cancel = signals::cancel_on_signals()?;
-    let folder = tempfile::tempdir().map_err(|e| Error::from_io("cannot make a temporary folder", &e))?;
-    let _passes = Unfinished::new(folder.path());
+    let folder = HiddenFolder::create(&std::env::temp_dir())
+        .map_err(|e| Error::from_io("cannot make a temporary folder", &e).at(&std::env::temp_dir()))?;
     let unpack = |name: &str, bytes: &[u8]| -> Result<PathBuf> {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes)

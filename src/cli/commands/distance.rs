@@ -56,7 +56,6 @@ pub(crate) fn run(args: &DistanceJobArgs, typed: &[String]) -> Result<()> {
 
 /// Runs `middle`: a distance with labels, and the surface between them.
 pub(crate) fn run_middle(args: DistanceJobArgs, choice: MiddleChoice, typed: &[String]) -> Result<()> {
-    choice.mesh.as_deref().map(mesh_format).transpose()?;
     Job::new(args, Some(choice), typed)?.run_precise()
 }
 
@@ -74,6 +73,7 @@ impl Job {
             overwrite: output.overwrite,
         };
         outputs.check()?;
+        mesh.as_deref().map(mesh_format).transpose()?;
         let resources = settings::resources(&args.job.resources, args.job.output.store())?;
         let console = Arc::new(Console::new(Voice::of_run(&args.job.output)));
         let mut notes = Vec::new();
@@ -141,21 +141,22 @@ impl Job {
         let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
         let (store, telling) = begin_store(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
-        let to = mesh.map(|path| ToFile { path, scratch, is_tagged: true, is_copy });
+        let replace = output.overwrite;
+        let to = mesh.map(|path| ToFile { path, scratch, is_tagged: true, is_copy, replace });
         let has_surface = self.middle.is_some();
         let mut drawing = Drawing::new(store.as_ref().filter(|_| has_surface), to, &self.geometry, true)?;
         let found = self.solve::<P>(engine, store.as_ref(), &mut drawing)?;
         let file = drawing.finish()?;
         note_anchor(mesh, &self.geometry, &self.console);
         if let Some(store) = store {
-            self.report(engine, &found).write(&store.file("report.json")?)?;
+            self.report(engine, &found).write(&store.file("report.json")?, true)?;
             engine.check()?;
             drop(telling);
             store.finish()?;
         }
         file.map_or(Ok(()), Finished::place)?;
         match &output.report {
-            Some(path) => self.report(engine, &found).write(path)?,
+            Some(path) => self.report(engine, &found).write(path, output.overwrite)?,
             None => engine.check()?,
         }
         Ok(found)

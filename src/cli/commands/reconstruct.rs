@@ -199,7 +199,8 @@ impl Job {
         let output = &self.args.output;
         let (store, telling) = begin_store(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
-        let to = self.args.mesh.as_deref().map(|path| ToFile { path, scratch, is_tagged: false, is_copy });
+        let replace = output.overwrite;
+        let to = self.args.mesh.as_deref().map(|path| ToFile { path, scratch, is_tagged: false, is_copy, replace });
         let mut drawing = Drawing::new(store.as_ref(), to, &self.grid, false)?;
         let found = reconstruct_shown(engine, &self.grid, &self.cloud, &self.settings, (&mut drawing, store.as_ref()))
             .map_err(|error| error.at(&self.args.cloud))?;
@@ -210,7 +211,7 @@ impl Job {
         self.note_lost(&found);
         note_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
         if let Some(store) = store {
-            self.report(engine, &found).write(&store.file("report.json")?)?;
+            self.report(engine, &found).write(&store.file("report.json")?, true)?;
             engine.check()?;
             drop(telling);
             store.finish()?;
@@ -218,7 +219,7 @@ impl Job {
         engine.check()?;
         mesh.map_or(Ok(()), Finished::place)?;
         if let Some(path) = &output.report {
-            self.report(engine, &found).write(path)?;
+            self.report(engine, &found).write(path, output.overwrite)?;
         }
         Ok(found)
     }

@@ -31,7 +31,7 @@ use crate::pipeline::segment::{
     Estimate, Grids, Guides, ObjectMeshes, Outcome, SegmentSettings, check_lengths, check_seed, check_smoothing, plan,
     segment,
 };
-use crate::store::Unfinished;
+use crate::store::HiddenFolder;
 use notes::refusal;
 
 /// A segmentation that is ready to start: all inputs are open and checked.
@@ -185,9 +185,8 @@ impl Job {
     fn solve_and_write(&self, engine: &Engine) -> Result<Outcome> {
         let output = &self.args.output;
         // What is drawn from fields that nobody wants to keep needs them for a while all the same.
-        let passing = tempfile::tempdir_in(&self.resources.scratch)
+        let passing = HiddenFolder::create(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
-        let _passes = Unfinished::new(passing.path());
         let (store, telling) = begin_store(output, engine)?;
         let store = match store {
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
@@ -202,9 +201,9 @@ impl Job {
         note_anchor(self.args.drawn.mesh.as_deref(), &self.geometry, &self.console);
         if let Some(store) = &store {
             if self.names.command == "demo" {
-                picture::draw(store.folder(), self.centre(), &store.file("picture.png")?)?;
+                picture::draw(store.folder(), self.centre(), &store.file("picture.png")?, true)?;
             }
-            self.report(engine, &outcome).write(&store.file("report.json")?)?;
+            self.report(engine, &outcome).write(&store.file("report.json")?, true)?;
         }
         engine.check()?;
         drop(telling);
@@ -228,18 +227,19 @@ impl Job {
     /// The files that surfaces are drawn into, where they were asked for.
     fn mesh_files(&self) -> Option<ObjectFiles<'_>> {
         let path = self.args.drawn.mesh.as_deref()?;
-        let (scratch, is_copy) = (self.resources.scratch.as_path(), self.args.output.store().is_some());
-        let to = ToFile { path, scratch, is_tagged: false, is_copy };
+        let (scratch, output) = (self.resources.scratch.as_path(), &self.args.output);
+        let (is_copy, replace) = (output.store().is_some(), output.overwrite);
+        let to = ToFile { path, scratch, is_tagged: false, is_copy, replace };
         Some(ObjectFiles::new(to, self.objects.numbers().len() > 1, &self.geometry))
     }
 
     /// The picture and the report beside the store.
     fn write_copies(&self, engine: &Engine, outcome: &Outcome, folder: &Path) -> Result<()> {
         if let Some(path) = &self.args.drawn.picture {
-            picture::draw(folder, self.centre(), path)?;
+            picture::draw(folder, self.centre(), path, self.args.output.overwrite)?;
         }
         match &self.args.output.report {
-            Some(path) => self.report(engine, outcome).write(path),
+            Some(path) => self.report(engine, outcome).write(path, self.args.output.overwrite),
             None => Ok(()),
         }
     }

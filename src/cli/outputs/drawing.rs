@@ -27,16 +27,20 @@ pub(crate) struct ToFile<'a> {
     pub(crate) is_tagged: bool,
     /// Whether the surface is in a store too.
     pub(crate) is_copy: bool,
+    /// Whether what has its name may be replaced.
+    pub(crate) replace: bool,
 }
 
 /// The file while it is written; what went wrong with a copy.
 pub(crate) struct Asked {
     file: Result<MeshFile>,
     is_copy: bool,
+    replace: bool,
 }
 
-/// A file that was asked for, without its name yet; or what went wrong with a copy.
-pub(crate) struct Finished(Result<WholeMesh>);
+/// A file that was asked for, without its name yet, or what went wrong with a copy; and whether what has its name may be
+/// replaced.
+pub(crate) struct Finished(Result<WholeMesh>, bool);
 
 impl Drawing {
     /// The surface on a grid, into a store and a file as far as these are there.
@@ -62,7 +66,7 @@ impl Asked {
     fn new(to: ToFile<'_>, geometry: &Geometry) -> Result<Self> {
         let format = mesh_format(to.path)?;
         let file = MeshFile::create(format, to.path, geometry, to.is_tagged, to.scratch)?;
-        Ok(Self { file: Ok(file), is_copy: to.is_copy })
+        Ok(Self { file: Ok(file), is_copy: to.is_copy, replace: to.replace })
     }
 
     fn take(&mut self, take: impl FnOnce(&mut MeshFile) -> Result<()>) -> Result<()> {
@@ -78,14 +82,14 @@ impl Asked {
 
     fn finish(self) -> Result<Finished> {
         let whole = self.file.and_then(MeshFile::complete);
-        Ok(Finished(if self.is_copy { whole } else { Ok(whole?) }))
+        Ok(Finished(if self.is_copy { whole } else { Ok(whole?) }, self.replace))
     }
 }
 
 impl Finished {
     /// Puts the file under its name.
     pub(crate) fn place(self) -> Result<()> {
-        self.0?.place()
+        self.0?.place(self.1)
     }
 }
 
@@ -176,7 +180,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.stl");
         let geometry = Geometry { shape: [9; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
-        let to = |is_copy| ToFile { path: &path, scratch: folder.path(), is_tagged: false, is_copy };
+        let to = |is_copy| ToFile { path: &path, scratch: folder.path(), is_tagged: false, is_copy, replace: false };
         let mut alone = Drawing::new(None, Some(to(false)), &geometry, false).unwrap();
         assert!(alone.triangle([0, 1, 2]).is_err());
         drop(alone);

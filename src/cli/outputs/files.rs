@@ -1,8 +1,7 @@
 //! Files beside the store: each appears under its name when it is whole.
 
-use std::fs::{File, Permissions};
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use crate::cli::terminal::console::Console;
@@ -10,25 +9,20 @@ use crate::error::{Error, Result};
 use crate::exec::Progress;
 use crate::grid::Geometry;
 use crate::io::geometry::write::formats::{FORMATS, Format};
-use crate::job::resources::folder_of;
-use crate::store::Unfinished;
+use crate::store::HiddenFile;
 
-/// Writes a file through `write`; it gets its name, and replaces what had it, only when all is written.
-pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
-    // The permissions of any new file, not those of a private temporary one.
-    let mut builder = tempfile::Builder::new();
-    let file = builder
-        .prefix(".strandline-")
-        .suffix(".part")
-        .permissions(Permissions::from_mode(0o666))
-        .tempfile_in(folder_of(path))?;
-    let unfinished = Unfinished::new(file.path());
-    let mut sink = BufWriter::new(file.as_file());
+/// Writes a file through `write`; it gets its name only when all is written, in place of what has it if it may `replace` that.
+pub(crate) fn write_whole(
+    path: &Path,
+    replace: bool,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let (hidden, file) = HiddenFile::create(path, "")?;
+    let mut sink = BufWriter::new(file);
     write(&mut sink)?;
     sink.flush()?;
     drop(sink);
-    unfinished.finish(|| file.persist(path)).map_err(|error| error.error)?;
-    Ok(())
+    hidden.place(replace)
 }
 
 /// Says from where positions are seen in a mesh file that cannot hold them as they are.

@@ -25,8 +25,9 @@ pub(crate) fn check_name(file: &Path) -> Result<()> {
     }
 }
 
-/// Draws the store in `folder`, cut at the world position `centre`, into a PNG file.
-pub(crate) fn draw(folder: &Path, centre: [f64; 3], file: &Path) -> Result<()> {
+/// Draws the store in `folder`, cut at the world position `centre`, into a PNG file, in place of one that is there if it may
+/// `replace` that.
+pub(crate) fn draw(folder: &Path, centre: [f64; 3], file: &Path, replace: bool) -> Result<()> {
     let image = ImageReader::open(folder)?;
     let labels = ImageReader::open(&folder.join("labels/segmentation"))?;
     let coarsest = image.levels().len().min(labels.levels().len()) - 1;
@@ -65,7 +66,7 @@ pub(crate) fn draw(folder: &Path, centre: [f64; 3], file: &Path) -> Result<()> {
     if size.contains(&u32::MAX) {
         return Err(Error::failed("the picture would be too large").at(file));
     }
-    write_rgb(file, size[0], size[1], &picture.pixels)
+    write_rgb(file, size, &picture.pixels, replace)
 }
 
 /// Pixels for a unit of length, so that the three slices fill the picture.

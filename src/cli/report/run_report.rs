@@ -368,12 +368,12 @@ impl<S: Serialize, R: Serialize> Report<S, R> {
         }
     }
 
-    /// Writes the report; nothing stands under the name before it is whole.
-    pub(crate) fn write(&self, path: &Path) -> Result<()> {
+    /// Writes the report; nothing stands under the name before it is whole. What did is replaced if that may be.
+    pub(crate) fn write(&self, path: &Path, replace: bool) -> Result<()> {
         let fault = |error: std::io::Error| Error::from_io("the report cannot be written", &error).at(path);
         let mut text = serde_json::to_string_pretty(self).map_err(|error| fault(error.into()))?;
         text.push('\n');
-        crate::cli::outputs::files::write_whole(path, |file| std::io::Write::write_all(file, text.as_bytes()))
+        crate::cli::outputs::files::write_whole(path, replace, |file| std::io::Write::write_all(file, text.as_bytes()))
             .map_err(fault)
     }
 }

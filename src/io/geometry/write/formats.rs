@@ -6,13 +6,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use tempfile::TempPath;
-
 use super::body::{Body, Form, Start};
-use super::{obj, ply, stl, vtp};
+use super::{obj, ply, stl, temporary, vtp};
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
-use crate::store::{MeshSink, Unfinished};
+use crate::store::{HiddenFile, MeshSink};
 
 /// A file format of surfaces.
 #[derive(Debug)]
@@ -55,8 +53,7 @@ pub struct WholeMesh(Named);
 /// A hidden file beside the one that it is to be.
 struct Named {
     path: PathBuf,
-    hidden: TempPath,
-    unfinished: Unfinished,
+    hidden: HiddenFile,
 }
 
 impl MeshFile {
@@ -73,10 +70,9 @@ impl MeshFile {
         temporary: &Path,
     ) -> Result<Self> {
         let begin = || -> io::Result<_> {
-            let (file, hidden) = ply::hidden_file(path, &format!(".{}.part", format.extension))?.into_parts();
-            let unfinished = Unfinished::new(&hidden);
+            let (hidden, file) = HiddenFile::create(path, &format!(".{}", format.extension))?;
             let body = (format.start)(file, temporary, &Form::of(geometry, is_tagged))?;
-            Ok(Self { body, named: Named { path: path.to_path_buf(), hidden, unfinished } })
+            Ok(Self { body, named: Named { path: path.to_path_buf(), hidden } })
         };
         begin().map_err(|error| unwritable(&error, path))
     }
@@ -93,13 +89,13 @@ impl MeshFile {
 }
 
 impl WholeMesh {
-    /// Puts the file under its name, in place of any that was there.
+    /// Puts the file under its name, in place of any that was there if it may `replace` that.
     ///
     /// # Errors
-    /// When it cannot be renamed.
-    pub fn place(self) -> Result<()> {
-        let Named { path, hidden, unfinished } = self.0;
-        unfinished.finish(|| hidden.persist(&path)).map_err(|error| unwritable(&error.error, &path))
+    /// When it cannot be renamed, or something is there that it may not replace.
+    pub fn place(self, replace: bool) -> Result<()> {
+        let Named { path, hidden } = self.0;
+        hidden.place(replace).map_err(|error| unwritable(&error, &path))
     }
 }
 
@@ -123,5 +119,5 @@ impl MeshSink for MeshFile {
 }
 
 fn unwritable(error: &io::Error, path: &Path) -> Error {
-    Error::from_io("the mesh cannot be written", error).at(path)
+    temporary::told(error).unwrap_or_else(|| Error::from_io("the mesh cannot be written", error).at(path))
 }

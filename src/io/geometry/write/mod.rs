@@ -7,4 +7,5 @@ mod places;
 pub mod ply;
 mod spool;
 mod stl;
+mod temporary;
 mod vtp;

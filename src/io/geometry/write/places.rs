@@ -1,9 +1,10 @@
 //! Positions of vertices that later triangles name: the last ones in memory, those before in a temporary file. Surfaces are drawn
 //! in layers, so few triangles have a vertex from far before.
 
-use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+
+use super::temporary::Temporary;
 
 /// So many stay in memory, and as many again until they are written: 12 bytes each.
 const RECENT: usize = 1 << 17;
@@ -12,7 +13,7 @@ const RECENT: usize = 1 << 17;
 pub(super) struct Places {
     folder: PathBuf,
     /// Made when it is needed.
-    early: Option<File>,
+    early: Option<Temporary>,
     /// How many lie there.
     before: usize,
     recent: Vec<[f32; 3]>,
@@ -31,7 +32,7 @@ impl Places {
         }
         let file = match &mut self.early {
             Some(file) => file,
-            none => none.insert(tempfile::tempfile_in(&self.folder)?),
+            none => none.insert(Temporary::new(&self.folder)?),
         };
         file.seek(SeekFrom::End(0))?;
         let bytes: Vec<u8> = self.recent[..RECENT].as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();

@@ -9,18 +9,17 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
-
 use super::body::{BUFFER, Body, Form};
+use super::temporary::Temporary;
 use crate::error::{Error, Result};
 use crate::grid::Geometry;
-use crate::store::MeshSink;
+use crate::store::{HiddenFile, MeshSink};
 
 /// A PLY file in the making: a [`MeshSink`] that [`PlyWriter::finish`] completes.
 #[derive(Debug)]
 pub struct PlyWriter {
     path: PathBuf,
-    named: NamedTempFile,
+    hidden: HiddenFile,
     body: Ply,
 }
 
@@ -30,7 +29,7 @@ struct Ply {
     form: Form,
     /// The header, or at first the room for it, and the vertices.
     file: BufWriter<File>,
-    triangles: BufWriter<File>,
+    triangles: BufWriter<Temporary>,
     vertex_count: u64,
     triangle_count: u64,
 }
@@ -64,9 +63,9 @@ impl PlyWriter {
 
     fn start(path: &Path, form: Form) -> Result<Self> {
         let start = || -> io::Result<_> {
-            let named = hidden_file(path, ".ply.part")?;
-            let body = Ply::start(named.reopen()?, folder_of(path), form)?;
-            Ok(Self { path: path.to_path_buf(), named, body })
+            let (hidden, file) = HiddenFile::create(path, ".ply")?;
+            let body = Ply::start(file, folder_of(path), form)?;
+            Ok(Self { path: path.to_path_buf(), hidden, body })
         };
         start().map_err(|e| unwritable(&e, path))
     }
@@ -76,12 +75,11 @@ impl PlyWriter {
     /// # Errors
     /// When the file cannot be written or renamed.
     pub fn finish(self) -> Result<()> {
-        let Self { path, named, body } = self;
+        let Self { path, hidden, body } = self;
         let finish = || -> io::Result<()> {
             body.end()?;
-            named.as_file().sync_all()?;
-            named.persist(&path).map_err(|e| e.error)?;
-            Ok(())
+            hidden.sync()?;
+            hidden.place(true)
         };
         finish().map_err(|e| unwritable(&e, &path))
     }
@@ -109,7 +107,7 @@ impl Ply {
     fn start(file: File, folder: &Path, form: Form) -> io::Result<Self> {
         let mut file = BufWriter::with_capacity(BUFFER, file);
         file.write_all(&header(&form, u64::MAX, u64::MAX))?;
-        let triangles = BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?);
+        let triangles = BufWriter::with_capacity(BUFFER, Temporary::new(folder)?);
         Ok(Self { form, file, triangles, vertex_count: 0, triangle_count: 0 })
     }
 
@@ -167,19 +165,6 @@ fn header_text(form: &Form, vertices: u64, triangles: u64, padding: usize) -> St
          element face {triangles}\nproperty list uchar {index} vertex_indices\n{tags}end_header\n",
         ""
     )
-}
-
-/// A hidden file beside the one that it is to be, which gets the permissions of any new file when it is renamed, not those of a
-/// private scratch file.
-pub(super) fn hidden_file(path: &Path, ending: &str) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".strandline-").suffix(ending);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder_of(path))
 }
 
 fn folder_of(path: &Path) -> &Path {

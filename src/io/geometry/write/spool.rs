@@ -1,21 +1,21 @@
 //! Triangles that wait in a temporary file, which has no name and goes with its handle.
 
-use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::body::BUFFER;
+use super::temporary::Temporary;
 
 /// Takes triangles: three numbers each, and two labels where they have any.
 pub(super) struct Spool {
-    file: BufWriter<File>,
+    file: BufWriter<Temporary>,
     is_tagged: bool,
     count: u64,
 }
 
 /// Triangles that were taken.
 pub(super) struct Spooled {
-    file: BufReader<File>,
+    file: BufReader<Temporary>,
     is_tagged: bool,
     pub(super) count: u64,
 }
@@ -23,7 +23,7 @@ pub(super) struct Spooled {
 impl Spool {
     /// An empty one in a folder.
     pub(super) fn new(folder: &Path, is_tagged: bool) -> io::Result<Self> {
-        let file = BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?);
+        let file = BufWriter::with_capacity(BUFFER, Temporary::new(folder)?);
         Ok(Self { file, is_tagged, count: 0 })
     }
 

@@ -8,17 +8,18 @@ use std::path::Path;
 
 use super::body::{BUFFER, Body, Form};
 use super::spool::Spool;
+use super::temporary::Temporary;
 
 struct Vtp {
     file: File,
-    points: BufWriter<File>,
+    points: BufWriter<Temporary>,
     vertices: u64,
     triangles: Spool,
     form: Form,
 }
 
 pub(super) fn start(file: File, folder: &Path, form: &Form) -> io::Result<Box<dyn Body>> {
-    let points = BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?);
+    let points = BufWriter::with_capacity(BUFFER, Temporary::new(folder)?);
     let triangles = Spool::new(folder, form.is_tagged)?;
     Ok(Box::new(Vtp { file, points, vertices: 0, triangles, form: form.clone() }))
 }
