@@ -18,7 +18,7 @@ pub(crate) struct Disk<'a> {
     what: String,
     /// The folder of temporary fields.
     scratch: &'a Path,
-    /// Bytes of temporary fields that memory does not hold.
+    /// Bytes of temporary fields that memory does not hold, and of triangles that wait for the end of a mesh file.
     needed: u64,
     /// Where the output is made: the store that is to be, or the folder of temporary fields.
     output: &'a Path,
@@ -30,6 +30,10 @@ pub(crate) struct Disk<'a> {
 
 /// Fields are seldom compressed to less than this part.
 const LEAST_WRITTEN: u64 = 10;
+
+/// Bytes of triangles that wait in a temporary file, for each voxel near a surface: two triangles of 20 bytes a cell of it,
+/// and ten voxels on either side.
+const WAITING_BYTES: u64 = 2;
 
 impl<'a> Disk<'a> {
     /// A distance on a grid, with a store of so many bytes where there is one.
@@ -86,6 +90,18 @@ impl<'a> Disk<'a> {
         Ok(Self { what, scratch, needed, output: store.unwrap_or(scratch), written, coarser })
     }
 
+    /// With triangles that wait in a temporary file for the end of a mesh file, so many bytes of them.
+    #[must_use]
+    pub(crate) fn with_waiting(self, waiting: u64) -> Self {
+        Self { needed: self.needed.saturating_add(waiting), ..self }
+    }
+
+    /// The same where surfaces have so many voxels near them.
+    #[must_use]
+    pub(crate) fn with_mesh_near(self, near_voxels: u64) -> Self {
+        self.with_waiting(near_voxels.saturating_mul(WAITING_BYTES))
+    }
+
     /// Refuses a run that cannot fit, and says so of one that may not.
     ///
     /// # Errors
@@ -112,7 +128,7 @@ impl<'a> Disk<'a> {
                 _ => String::new(),
             };
             return Err(Error::failed(format!(
-                "{} needs {} of temporary fields that memory does not hold{and}, but {} are free there; name a folder on \
+                "{} needs {} of temporary files that memory does not hold{and}, but {} are free there; name a folder on \
                  another disk with --scratch, or give {}",
                 self.what,
                 bytes(self.needed),
@@ -168,6 +184,9 @@ mod tests {
         for part in ["scratch: ", "a grid needs 182 GiB", "68 GiB", "--scratch", "--spacing"] {
             assert!(text.contains(part), "{part}: {text}");
         }
+        let resources = Resources { memory: 1 << 30, threads: 1, scratch: "/proc".into() };
+        let disk = Disk::new(&resources, None, "a grid".into(), [0; 3], "a larger --spacing").unwrap();
+        assert_eq!((disk.needed, disk.with_waiting(7).with_mesh_near(10).needed), (0, 27));
         // Each alone would fit.
         assert!(check(60 << 30, 100 << 30, true, [68 << 30; 2]).is_err());
         let (_, text) = check(0, 1000 << 30, true, [68 << 30; 2]).unwrap_err();

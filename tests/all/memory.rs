@@ -5,7 +5,8 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::ball::{Ball, Bench};
+use crate::common::ball::{Ball, Bench, write_stack};
+use crate::common::lab::PlainGrid;
 use crate::common::random::Random;
 use std::sync::Arc;
 use strandline::exec::{Budget, Cancel, Engine, Silent};
@@ -135,4 +136,40 @@ fn a_job_of_the_library_refuses_a_budget_that_is_too_small() {
     let engine = Engine::new(2, scratch.clone(), budget, Cancel::default(), Arc::new(Silent)).unwrap();
     distance::<f32>(&engine, &geometry, &sets, &settings, None).unwrap();
     assert!(scratch.window() <= 80 << 20, "what was not held is the window: {}", scratch.window());
+}
+
+/// Volumes of cells, with gaps between them and without: what their surfaces take is told before the run.
+#[test]
+fn crowded_labels_are_refused_before_they_begin_or_not_at_all() {
+    let bench = Bench::bare();
+    let geometry = Geometry { shape: [36; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+    let mut random = Random(5);
+    let seeds: Vec<[f64; 3]> = (0..700).map(|_| std::array::from_fn(|_| 36.0 * random.unit())).collect();
+    for gap in [0.0, 1.0] {
+        let label = |voxel: [i64; 3]| {
+            let square = |seed: &[f64; 3]| (0..3).map(|a| (seed[a] - voxel[a] as f64).powi(2)).sum::<f64>();
+            let mut nearest = [(f64::INFINITY, 0), (f64::INFINITY, 0)];
+            for (n, seed) in seeds.iter().enumerate() {
+                let found = (square(seed).sqrt(), n as u16 + 1);
+                if found < nearest[0] {
+                    nearest = [found, nearest[0]];
+                } else if found < nearest[1] {
+                    nearest[1] = found;
+                }
+            }
+            if nearest[1].0 - nearest[0].0 < gap { 0 } else { nearest[0].1 }
+        };
+        let voxels: Vec<u16> = PlainGrid { shape: geometry.shape }.voxels().map(label).collect();
+        write_stack(&bench.path("cells.tif"), &geometry, &[&voxels]);
+        let run = "middle cells.tif -o none --threads 2";
+        let plan = bench.succeed(&format!("{run} --dry-run"));
+        let least = (bytes(&between(&plan, ", at least ", ";")) / 1024_f64.powi(2)).round() as u64;
+        let less = bench.run(&format!("{run} --memory {}MiB", least - 1));
+        let said = String::from_utf8_lossy(&less.stderr).into_owned();
+        assert!(less.status.code() == Some(2) && said.contains(&format!("--memory {least}MiB")), "{said}");
+        assert!(said.contains("a grid of 46 656 voxels needs"), "refused before it began: {said}");
+        bench.succeed(&format!("{run} --memory {least}MiB -q --report out/r.json --overwrite"));
+        let peak = bench.json("out/r.json")["peak_rss_bytes"].as_f64().unwrap();
+        assert!(peak <= (least << 20) as f64, "{peak} of {least} MiB");
+    }
 }

@@ -227,7 +227,8 @@ impl Job {
         let output = self.args.job.output.store();
         let written = if output.is_some() { self.written() } else { 0 };
         let disk = Disk::of_grid(&self.resources, output, &self.geometry, needs, written)?;
-        disk.check(|text| self.console.note(text))
+        let has_mesh = self.middle.as_ref().is_some_and(|choice| choice.mesh.is_some());
+        disk.with_waiting(if has_mesh { needs.waiting } else { 0 }).check(|text| self.console.note(text))
     }
 
     /// Bytes of the output, if nothing of it could be compressed.

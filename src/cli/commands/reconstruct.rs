@@ -162,6 +162,7 @@ impl Job {
     /// Refuses a run that cannot fit memory or disk.
     fn fits(&self, estimate: &Estimate) -> Result<()> {
         let disk = Disk::of_cloud(&self.resources, self.args.output.store(), estimate)?;
+        let disk = if self.args.mesh.is_some() { disk.with_mesh_near(estimate.near_voxels) } else { disk };
         disk.check(|text| self.console.note(text))
     }
 

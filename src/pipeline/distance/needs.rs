@@ -18,6 +18,8 @@ pub struct Needs {
     pub held: u64,
     /// Temporary fields.
     pub scratch: u64,
+    /// Triangles that wait in a temporary file, where there is a surface and it goes into a mesh file. About.
+    pub waiting: u64,
     /// Time, very roughly.
     pub seconds: f64,
 }
@@ -94,7 +96,7 @@ impl DistanceSettings {
         let footprint = self.footprint::<P>(geometry, sets, [threads, ranks], writes);
         let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
         let held = footprint.bytes(threads as u64);
-        Needs { footprint, held, scratch: self.scratch::<P>(&grid, ranks), seconds }
+        Needs { footprint, held, scratch: self.scratch::<P>(&grid, ranks), waiting: 0, seconds }
     }
 
     /// The stages of a distance, and what each will probably take.

@@ -4,7 +4,7 @@
 use super::exact::with_exact_labels;
 use super::settings::{LabelMode, MiddleSettings};
 use super::surface::SurfaceKind;
-use super::surface::{Labelled, draw};
+use super::surface::{Drawing, Labelled, draw};
 use super::table::csv;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
@@ -61,6 +61,7 @@ pub fn middle_kept<P: Precision>(
     check_sets(sets, settings.surface)?;
     let needs = settings.needs::<P>(geometry, sets, engine.threads(), engine.ranks(), store.is_some());
     let _held = engine.reserve(needs.footprint)?;
+    let Drawing { stated, .. } = Drawing::new(geometry, sets, engine.threads());
     let distance = DistanceSettings { labels: true, ..settings.distance };
     let trees = SourceTrees::new(sets);
     solve_sets::<P, _>(engine, geometry, sets, Some(&trees), &distance, |mut solved, set| {
@@ -76,7 +77,7 @@ pub fn middle_kept<P: Precision>(
         stage.voxels(geometry.domain().volume());
         let first_labels = std::array::from_fn(|n| sets.labels().get(n).copied().unwrap_or(0));
         let labelled = Labelled { geometry, shapes: &shapes, trees: &trees, sources: &*solved.sources, first_labels };
-        let (measures, pairs) = draw(&stage, &labelled, settings.surface, mesh)?;
+        let (measures, pairs) = draw(&stage, &labelled, settings.surface, stated, mesh)?;
         stage.finish();
         if measures.triangles == 0 {
             return Err(Error::vanished(

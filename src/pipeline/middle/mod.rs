@@ -5,13 +5,14 @@
 //! sources -> distance with tracking -> labels -> surfaces between them -> mesh, measures of each pair
 //! ```
 
+mod crowded;
 mod exact;
 mod job;
 pub(crate) mod settings;
 mod surface;
 mod table;
 
-pub use job::{MiddleFound, middle, middle_kept};
 pub(crate) use job::check_sets;
+pub use job::{MiddleFound, middle, middle_kept};
 pub use settings::{LabelMode, MiddleSettings};
 pub use surface::SurfaceKind;

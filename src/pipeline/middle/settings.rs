@@ -1,6 +1,6 @@
 //! What `middle` is asked for.
 
-use super::surface::{SurfaceKind, drawing};
+use super::surface::{Drawing, SurfaceKind};
 use crate::exec::{Footprint, Plan};
 use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::state::precision::Precision;
@@ -52,9 +52,11 @@ impl MiddleSettings {
         let trees = if distance.looks_closer::<P>(sets) { 0 } else { tree_bytes(sets) };
         // A copy of the triangles of their own, for what lies on labels' borders.
         let shapes = (sets.mesh.len() * size_of::<Triangle>()) as u64;
-        let footprint = needs.footprint.and(Footprint::of_all(trees + shapes)).and(drawing(geometry));
+        let drawing = Drawing::new(geometry, sets, threads);
+        let footprint = needs.footprint.and(Footprint::of_all(trees + shapes)).and(drawing.footprint());
         let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
-        Needs { footprint, held: footprint.bytes(threads as u64), seconds, ..needs }
+        let held = footprint.bytes(threads as u64);
+        Needs { footprint, held, waiting: drawing.waiting, seconds, ..needs }
     }
 
     /// The stages of the job, and what each will probably take.

@@ -1,9 +1,9 @@
 //! Draws the surfaces between labels brick by brick, welded in grid order, and measures them.
 
+use super::crowded::Crowded;
 use crate::error::Result;
 use crate::exec::{Footprint, Stage, Workers};
-use crate::grid::Geometry;
-use crate::grid::{Box3, BrickGrid, BrickId};
+use crate::grid::{Box3, BrickGrid, BrickId, DataSets, Geometry};
 use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::features::source_trees::SourceTrees;
@@ -21,11 +21,37 @@ const EDGE: i64 = 32;
 /// Bytes of what is remembered for each voxel of the layer that is drawn.
 const LAYER_BYTES: u64 = 64;
 
-/// Memory that drawing holds: patches, and what is remembered of the layer that is drawn. What surfaces take that
-/// are larger than a few planes through the grid is held as they are drawn.
-pub(super) fn drawing(geometry: &Geometry) -> Footprint {
-    let plane = libm::cbrt(geometry.domain().volume() as f64).powi(2) as u64;
-    Footprint::of_all(STATED + LAYER_BYTES * plane)
+/// A run that is under way makes do with a smaller window than it is started with: so much less needs to be stated.
+const SLACK: u64 = 16 << 20;
+/// Bytes of a triangle that waits in a temporary file, at most; and how many triangles a plane has for each of its cells.
+const WAITING_BYTES: u64 = 20;
+const PLANE_TRIANGLES: u64 = 6;
+
+/// What drawing takes of memory and disk.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drawing {
+    /// Bytes that patches are stated with, and what goes with them.
+    pub(super) stated: u64,
+    /// Bytes of what is remembered of the layer that is drawn.
+    layer: u64,
+    /// Bytes of triangles that wait in a temporary file, where the surface goes into a mesh file.
+    pub(super) waiting: u64,
+}
+
+impl Drawing {
+    /// Of the surfaces between sources on so many threads. What they take beyond that is held as they are drawn.
+    pub(super) fn new(geometry: &Geometry, sets: &DataSets, threads: usize) -> Self {
+        let plane = libm::cbrt(geometry.domain().volume() as f64).powi(2) as u64;
+        let crowded = Crowded::new(geometry, sets, EDGE);
+        let stated = STATED.max(crowded.drawing(threads).saturating_sub(SLACK));
+        let triangles = crowded.triangles().max(PLANE_TRIANGLES * plane);
+        Self { stated, layer: LAYER_BYTES * plane, waiting: WAITING_BYTES * triangles }
+    }
+
+    /// What it holds.
+    pub(super) fn footprint(&self) -> Footprint {
+        Footprint::of_all(self.stated + self.layer)
+    }
 }
 
 /// The voxels' nearest sources and what they are.
@@ -47,11 +73,13 @@ struct Worker {
     labels: Vec<u32>,
 }
 
-/// Sends the surfaces between labels to `sink`; measures all of them, and each pair.
+/// Sends the surfaces between labels to `sink`, where so many bytes were stated for that; measures all of them, and each
+/// pair.
 pub(super) fn draw(
     stage: &Stage<'_>,
     labelled: &Labelled<'_>,
     kind: SurfaceKind,
+    stated: u64,
     sink: &mut dyn MeshSink,
 ) -> Result<(Measures, Vec<Pair>)> {
     let geometry = labelled.geometry;
@@ -68,7 +96,7 @@ pub(super) fn draw(
     };
     let workers = Workers::new(make);
     let bricks: Vec<BrickId> = (0..grid.len()).collect();
-    let (mut drawn, mut left) = (Drawn::new(stage), bricks.as_slice());
+    let (mut drawn, mut left) = (Drawn::new(stage, stated), bricks.as_slice());
     while !left.is_empty() {
         let batch;
         (batch, left) = left.split_at(drawn.next().min(left.len()));

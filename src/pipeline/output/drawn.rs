@@ -9,7 +9,7 @@ use crate::kernel::surface::Growing;
 
 /// Boxes whose patches are made in parallel before they are welded, at most.
 const BATCH: usize = 64;
-/// What drawing holds is stated as so much: patches of [`BATCH`] boxes of 32^3 voxels that surfaces cross once or twice.
+/// What drawing holds is stated as so much at least: patches of [`BATCH`] boxes of 32^3 voxels that surfaces cross once or twice.
 pub(crate) const STATED: u64 = 36 << 20;
 /// As long as nothing is known of the surface, so many boxes are drawn at a time: what they take fits what was stated.
 const FIRST: usize = 4;
@@ -33,6 +33,8 @@ pub(crate) struct Wave<'w> {
 /// What was drawn so far.
 pub(crate) struct Drawn<'s, 'a> {
     stage: &'s Stage<'a>,
+    /// Bytes that were stated.
+    stated: u64,
     /// Boxes that a surface crosses, bytes of their patches, of the largest one, and of the largest set of buffers.
     crossed: usize,
     sum: u64,
@@ -46,9 +48,9 @@ pub(crate) struct Drawn<'s, 'a> {
 }
 
 impl<'s, 'a> Drawn<'s, 'a> {
-    /// Nothing.
-    pub(crate) fn new(stage: &'s Stage<'a>) -> Self {
-        Self { stage, crossed: 0, sum: 0, largest: 0, buffers: 0, next: FIRST, more: 0, held: None }
+    /// Nothing, where so many bytes were stated.
+    pub(crate) fn new(stage: &'s Stage<'a>, stated: u64) -> Self {
+        Self { stage, stated, crossed: 0, sum: 0, largest: 0, buffers: 0, next: FIRST, more: 0, held: None }
     }
 
     /// How many boxes are drawn next.
@@ -71,7 +73,7 @@ impl<'s, 'a> Drawn<'s, 'a> {
         self.next = self.wished().min(wave.left);
         loop {
             let room = self.room(wave, self.next);
-            let more = (room + if self.next > 1 { room / RESERVE } else { 0 }).saturating_sub(STATED);
+            let more = (room + if self.next > 1 { room / RESERVE } else { 0 }).saturating_sub(self.stated);
             if more <= self.more {
                 return Ok(());
             }
@@ -91,7 +93,7 @@ impl<'s, 'a> Drawn<'s, 'a> {
     /// seen in, for the next may be the first ones that are crossed.
     fn wished(&self) -> usize {
         let least = 2 * self.stage.threads();
-        let fit = (STATED / 2).checked_div(self.largest).map_or(BATCH, |fit| fit.min(BATCH as u64) as usize);
+        let fit = (self.stated / 2).checked_div(self.largest).map_or(BATCH, |fit| fit.min(BATCH as u64) as usize);
         fit.max(least).min(FIRST.max(2 * self.crossed))
     }
 
@@ -125,7 +127,7 @@ mod tests {
         let (scratch, budget) = (Scratch::new(folder.path(), 1 << 40), Budget { total: BESIDE + allowed * MIB });
         let engine = Engine::new(3, scratch.clone(), budget, Cancel::default(), Arc::new(Silent)).unwrap();
         let stage = engine.stage("surface", 0);
-        let mut drawn = Drawn::new(&stage);
+        let mut drawn = Drawn::new(&stage, STATED);
         assert_eq!(drawn.next(), 4);
         let [patches, buffers] = [patches, [4, 4, 0, 0]].map(|all| all.map(|n| n * MIB));
         drawn.took(&Wave { patches: &patches, buffers: &buffers[..2], last: 0, tables: &[], left: 100 })?;

@@ -23,6 +23,7 @@ impl Job {
         let coarser =
             "a part of the image with --crop; a spacing of the image that is wrong is put right with --image-spacing";
         let disk = Disk::of_image(&self.resources, self.args.output.store(), estimate, coarser)?;
+        let disk = if self.args.drawn.mesh.is_some() { disk.with_mesh_near(estimate.near_voxels) } else { disk };
         disk.check(|text| self.console.note(text))
     }
 

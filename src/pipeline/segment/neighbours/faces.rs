@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
 use crate::kernel::surface::{Contact, Contacts, PARTITION_REACH, Partition, Patch, Welder, cells_of_brick};
-use crate::pipeline::output::drawn::{Drawn, Wave};
+use crate::pipeline::output::drawn::{Drawn, STATED, Wave};
 use crate::store::{BoxSource, MeshSink};
 
 /// Sends the surfaces between labels, and to what has none, to `sink`; measures what lies between each two.
@@ -23,7 +23,7 @@ pub fn draw(
     let (mut welder, mut contacts) = (Welder::new(geometry), Contacts::new(geometry));
     let workers = Workers::new(|| (Partition::default(), Vec::new()));
     let bricks: Vec<BrickId> = (0..grid.len()).collect();
-    let (mut drawn, mut left) = (Drawn::new(stage), bricks.as_slice());
+    let (mut drawn, mut left) = (Drawn::new(stage, STATED), bricks.as_slice());
     while !left.is_empty() {
         let batch;
         (batch, left) = left.split_at(drawn.next().min(left.len()));
