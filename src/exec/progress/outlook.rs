@@ -18,6 +18,8 @@ pub type Plan = Vec<(String, f64)>;
 pub struct Outlook {
     begun: Instant,
     stages: Mutex<Vec<Planned>>,
+    /// What was told: the share that is done does not fall, whatever is learned of the pace.
+    told: Mutex<f64>,
 }
 
 /// A stage of the plan.
@@ -64,7 +66,7 @@ impl Running {
 
 impl Default for Outlook {
     fn default() -> Self {
-        Self { begun: Instant::now(), stages: Mutex::default() }
+        Self { begun: Instant::now(), stages: Mutex::default(), told: Mutex::default() }
     }
 }
 
@@ -96,13 +98,15 @@ impl Outlook {
     /// The share of the run that is done, 0 to 1, never 1; 0 for a run without a plan.
     #[must_use]
     pub fn done(&self) -> f64 {
-        self.done_at(Instant::now())
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        *told = told.max(self.done_at(Instant::now()));
+        *told
     }
 
     /// The seconds that are left, where something is done that tells how fast the run is.
     #[must_use]
     pub fn left(&self) -> Option<f64> {
-        let (now, done) = (Instant::now(), self.done());
+        let (now, done) = (Instant::now(), self.done_at(Instant::now()));
         (done > 0.0).then(|| now.duration_since(self.begun).as_secs_f64() * (1.0 - done) / done)
     }
 

@@ -3,8 +3,8 @@
 //!
 //! Of a box of n voxels along its edges in which N labels have sources, each label has n^3 / N voxels, so faces between
 //! labels cross about 3 n^2 N^(1/3) cells, and lines where three meet n N^(2/3) of them. Where voxels of different labels touch,
-//! there is a face for each two that do. What a face and a line take is measured: on volumes of 75 to 1000 labels a box, with
-//! and without gaps between them, what is told is 0.9 to 1.3 of what was taken.
+//! there is a face for each two that do. What a face and a line take is measured, on volumes of 75 to 1000 labels a box, with
+//! and without gaps between them; the memory that comes of it was enough for ten other volumes of 40 to 6000 labels.
 
 use crate::grid::{BrickGrid, BrickId, DataSets, Geometry};
 
