@@ -89,8 +89,9 @@ const byName = (state) => new Map(state.layers.map((layer) => [layer.name, layer
 
 // A store that was just begun has nothing to show yet, and nobody is to be asked for a layer then.
 const viewer = setupDefaultViewer({ showLayerDialog: false, resetStateWhenEmpty: false });
+// Who opens a link to a place of the page finds that. Asked before the page writes its own place there.
+const isLink = location.hash.length >= 3;
 const first = withSources(await load("state.json"));
-// Who opens a link to a place of the page finds that.
-if (location.hash.length < 3) open(viewer, first);
-else given = byName(first);
+if (isLink) given = byName(first);
+else open(viewer, first);
 follow(viewer, undefined);
