@@ -5,7 +5,8 @@
 
 Every multiscale in the store is read with zarr-python: its levels must follow from each other (numpy's own mean of each
 block for images, the most frequent value for labels), and so must their scales and translations. The store must pass
-yaozarrs and ome-zarr-models, and ome-zarr-py must read values, scales and translations as they are stored.
+yaozarrs and ome-zarr-models, and ome-zarr-py must read values, scales and translations as they are stored. Stores are of
+OME-Zarr 0.4 or 0.5; all of one store is of the same version.
 
 EXPECT.json says what the finest level must hold, by group ("" is the root), all keys optional:
     {"labels/cells": {"dtype": "uint8", "shape": [z, y, x], "values": "FILE.raw", "scale": [z, y, x],
@@ -40,17 +41,32 @@ def require(condition, message):
 
 
 def metadata_of(folder):
+    """The document of a group or an array, that of OME-Zarr 0.4 in the form of 0.5."""
     path = folder / "zarr.json"
-    require(path.is_file(), f"{folder} has no zarr.json")
-    return json.loads(path.read_text())
+    if path.is_file():
+        return json.loads(path.read_text())
+    kind = next((kind for kind in ("group", "array") if (folder / f".z{kind}").is_file()), None)
+    require(kind, f"{folder} has no zarr.json, .zgroup or .zarray")
+    document = json.loads((folder / f".z{kind}").read_text())
+    attributes = folder / ".zattrs"
+    ome = json.loads(attributes.read_text()) if attributes.is_file() else {}
+    versions = {described.get("version") for described in ome.get("multiscales", [])}
+    return document | {"node_type": kind, "attributes": {"ome": ome | {"version": "".join(versions)}} if ome else {}}
+
+
+def version_of(store):
+    return "0.5" if (store / "zarr.json").is_file() else "0.4"
 
 
 def multiscales_in(store):
     """All groups with a multiscale, as paths relative to the store; checks the groups on the way."""
     found = []
-    for path in sorted(store.rglob("zarr.json")):
-        document = json.loads(path.read_text())
-        require(document["zarr_format"] == 3, f"{path} is not Zarr version 3")
+    version = version_of(store)
+    names = ["zarr.json"] if version == "0.5" else [".zgroup", ".zarray"]
+    for path in sorted(path for name in names for path in store.rglob(name)):
+        document = metadata_of(path.parent)
+        format = 3 if version == "0.5" else 2
+        require(document["zarr_format"] == format, f"{path} is not Zarr version {format}")
         require("_zarrs" not in document.get("attributes", {}), f"{path} carries a library's private attribute")
         relative = path.parent.relative_to(store)
         for parent in relative.parents:
@@ -104,10 +120,14 @@ def same(found, expected):
 
 def check_array(folder, array):
     document = metadata_of(folder)
-    require(document["dimension_names"] == ["z", "y", "x"], f"{folder}: dimension names are not z, y, x")
-    require(array.shards is not None, f"{folder} is not sharded")
-    require(all(s % c == 0 for s, c in zip(array.shards, array.chunks)), f"{folder}: chunks do not fill a shard")
-    leftovers = [path for path in folder.rglob("*") if path.name.startswith(".")]
+    if document["zarr_format"] == 2:
+        require(document["dimension_separator"] == "/", f"{folder}: chunks do not lie in folders")
+    else:
+        require(document["dimension_names"] == ["z", "y", "x"], f"{folder}: dimension names are not z, y, x")
+        require(array.shards is not None, f"{folder} is not sharded")
+        require(all(s % c == 0 for s, c in zip(array.shards, array.chunks)), f"{folder}: chunks do not fill a shard")
+    documents = [".zarray", ".zattrs"]
+    leftovers = [path for path in folder.rglob("*") if path.name.startswith(".") and path.name not in documents]
     require(not leftovers, f"{folder}: unfinished files {leftovers}")
 
 
@@ -149,9 +169,10 @@ def check_label(store, group, ome, values):
 
 
 def check_with_models(store, group):
-    opened = ome_zarr_models.open_ome_zarr(zarr.open_group(store / group, mode="r"), version="0.5")
+    opened = ome_zarr_models.open_ome_zarr(zarr.open_group(store / group, mode="r"), version=version_of(store))
     kind = type(opened).__name__
-    allowed = ["ImageLabel"] if group.startswith("labels/") else ["Image"]
+    is_label = "image-label" in metadata_of(store / group)["attributes"]["ome"]
+    allowed = ["ImageLabel"] if is_label else ["Image"]
     require(kind in allowed, f"{group}: ome-zarr-models takes it for {kind}")
 
 
@@ -197,9 +218,9 @@ def check_store(store, expect=None, folder=None):
     require(not missing, f"no multiscale at {sorted(missing)}")
     for group in groups:
         ome = metadata_of(store / group)["attributes"]["ome"]
-        require(ome["version"] == "0.5", f"{group}: version {ome['version']}")
+        require(ome["version"] == version_of(store), f"{group}: version {ome['version']}")
         levels = check_levels(store, group, ome)
-        if "image-label" in ome:
+        if "image-label" in ome and group:
             check_label(store, group, ome, levels[0])
         check_expected(group, ome, levels[0], (expect or {}).get(group, {}), folder)
         yaozarrs.validate_zarr_store(str(store / group))
@@ -208,8 +229,10 @@ def check_store(store, expect=None, folder=None):
         shapes = " ".join("x".join(map(str, level.shape)) for level in levels)
         print(f"ok  {group or '(root)'}: {levels[0].dtype}, levels [z, y, x] {shapes}")
     if (store / "labels").is_dir():
-        yaozarrs.validate_zarr_store(str(store / "labels"))
-        ome_zarr_models.open_ome_zarr(zarr.open_group(store / "labels", mode="r"), version="0.5")
+        # The list of labels names no version in 0.4, so that alone it could be anything.
+        if version_of(store) == "0.5":
+            yaozarrs.validate_zarr_store(str(store / "labels"))
+        ome_zarr_models.open_ome_zarr(zarr.open_group(store / "labels", mode="r"), version=version_of(store))
 
 
 def main():

@@ -135,7 +135,7 @@ pub mod view;
 pub use error::{Error, ErrorKind, Result};
 pub use exec::{Cancel, Progress, Silent};
 pub use grid::{Box3, Geometry, TriangleMesh};
-pub use io::ome_zarr::Compression;
+pub use io::ome_zarr::{Compression, OmeVersion};
 pub use job::{
     DistanceField, Field, LabelledMesh, MiddleSurface, Reconstruction, Segmentation, SolvedDistance, SolvedMiddle,
     SolvedReconstruction, SolvedSegmentation, Volume,

@@ -66,6 +66,7 @@ fn execute(cli: Cli, typed: &[String]) -> Result<()> {
         Command::Middle(args) => commands::middle::run(&args, typed),
         Command::Reconstruct(args) => commands::reconstruct::run(&args, typed),
         Command::Demo(args) => commands::demo::run(&args, typed),
+        Command::Convert(args) => commands::convert::run(&args),
         Command::Measure(args) => commands::measure::run(&args),
         Command::Info(args) => commands::info::run(&args),
         #[cfg(feature = "viewer")]

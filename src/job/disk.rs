@@ -9,7 +9,7 @@ use crate::exec::Budget;
 use crate::grid::Geometry;
 use crate::grid::digits::{bytes, grouped};
 use crate::pipeline::distance::Needs;
-use crate::pipeline::{reconstruct, segment};
+use crate::pipeline::{convert, reconstruct, segment};
 use crate::store::free_space;
 
 /// What a run puts on disks.
@@ -76,6 +76,21 @@ impl<'a> Disk<'a> {
     ) -> Result<Self> {
         let what = format!("an image with {} voxels near the marks", grouped(needs.near_voxels));
         Self::new(resources, store, what, [needs.held, needs.scratch, needs.output], coarser)
+    }
+
+    /// A volume in another format.
+    ///
+    /// # Errors
+    /// When it does not fit the memory.
+    pub(crate) fn of_copy(
+        resources: &'a Resources,
+        output: &'a Path,
+        geometry: &Geometry,
+        needs: &convert::Needs,
+    ) -> Result<Self> {
+        let what = format!("a volume of {} voxels", grouped(geometry.domain().volume()));
+        let held = needs.footprint.bytes(resources.threads as u64);
+        Self::new(resources, Some(output), what, [held, needs.scratch, needs.written], "a coarser --level")
     }
 
     fn new(

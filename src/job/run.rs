@@ -9,7 +9,7 @@ use super::words::of_builders;
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress, Silent};
 use crate::grid::digits::bytes;
-use crate::io::ome_zarr::{Compression, StoreWriter};
+use crate::io::ome_zarr::{Compression, OmeVersion, StoreWriter};
 
 /// What was said of a run.
 #[derive(Clone)]
@@ -22,6 +22,7 @@ pub(super) struct Run {
     pub(super) store: Option<PathBuf>,
     pub(super) overwrite: bool,
     pub(super) compression: Compression,
+    pub(super) ome: OmeVersion,
 }
 
 impl Default for Run {
@@ -35,6 +36,7 @@ impl Default for Run {
             store: None,
             overwrite: false,
             compression: Compression::default(),
+            ome: OmeVersion::default(),
         }
     }
 }
@@ -66,7 +68,7 @@ impl Run {
 
     /// Begins the store, where one was asked for.
     pub(super) fn begin_store(&self) -> Result<Option<StoreWriter>> {
-        let begin = |path| Ok(StoreWriter::create(path, self.overwrite)?.packed(self.compression));
+        let begin = |path| Ok(StoreWriter::create_as(self.ome, path, self.overwrite)?.packed(self.compression));
         self.store.as_deref().map(begin).transpose()
     }
 
@@ -143,6 +145,12 @@ macro_rules! run_setters {
         /// What is saved in packing the store: time where this is left out.
         pub fn compress(mut self, compression: $crate::io::ome_zarr::Compression) -> Self {
             self.$($run).+.compression = compression;
+            self
+        }
+
+        /// The version of OME-Zarr that the store has: 0.5 where this is left out.
+        pub fn ome(mut self, version: $crate::io::ome_zarr::OmeVersion) -> Self {
+            self.$($run).+.ome = version;
             self
         }
     };

@@ -1,5 +1,6 @@
 //! What is solved, and in which order.
 
+pub mod convert;
 pub mod distance;
 pub mod enclosure;
 pub mod image;

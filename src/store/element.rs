@@ -13,6 +13,12 @@ pub enum ElementType {
     U16,
     /// Unsigned 32 bit.
     U32,
+    /// Signed 8 bit.
+    I8,
+    /// Signed 16 bit.
+    I16,
+    /// Signed 32 bit.
+    I32,
     /// Half precision.
     F16,
     /// Single precision.
@@ -26,9 +32,9 @@ impl ElementType {
     #[must_use]
     pub const fn size(self) -> usize {
         match self {
-            Self::U8 => 1,
-            Self::U16 | Self::F16 => 2,
-            Self::U32 | Self::F32 => 4,
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 | Self::F16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
             Self::F64 => 8,
         }
     }
@@ -40,6 +46,9 @@ impl ElementType {
             Self::U8 => "uint8",
             Self::U16 => "uint16",
             Self::U32 => "uint32",
+            Self::I8 => "int8",
+            Self::I16 => "int16",
+            Self::I32 => "int32",
             Self::F16 => "float16",
             Self::F32 => "float32",
             Self::F64 => "float64",
@@ -101,6 +110,9 @@ macro_rules! element {
 element!(u8, U8, f64::from, |v: f64| v.round() as u8);
 element!(u16, U16, f64::from, |v: f64| v.round() as u16);
 element!(u32, U32, f64::from, |v: f64| v.round() as u32);
+element!(i8, I8, f64::from, |v: f64| v.round() as i8);
+element!(i16, I16, f64::from, |v: f64| v.round() as i16);
+element!(i32, I32, f64::from, |v: f64| v.round() as i32);
 element!(SourceState, U32, |s: SourceState| f64::from(s.bits()), |v: f64| SourceState::from_bits(v.round() as u32));
 element!(f16, F16, f64::from, f16::from_f64);
 element!(f32, F32, f64::from, |v: f64| v as f32);
@@ -184,14 +196,14 @@ pub trait SampleWork {
 }
 
 impl ElementType {
-    /// Does work on samples of this type, as stacks hand them out: half precision as single.
+    /// Does work on samples of this type, as stacks hand them out: what has no type of its own in the smallest that holds it.
     pub fn with_samples<W: SampleWork>(self, work: W) -> W::Output {
         match self {
             Self::U8 => work.on::<u8>(),
             Self::U16 => work.on::<u16>(),
             Self::U32 => work.on::<u32>(),
-            Self::F16 | Self::F32 => work.on::<f32>(),
-            Self::F64 => work.on::<f64>(),
+            Self::I8 | Self::I16 | Self::F16 | Self::F32 => work.on::<f32>(),
+            Self::I32 | Self::F64 => work.on::<f64>(),
         }
     }
 }
@@ -214,6 +226,7 @@ mod tests {
         there_and_back(&[1_u8, 255], &[1, 255]);
         there_and_back(&[0x1234_u16, 1], &[0x34, 0x12, 1, 0]);
         there_and_back(&[0x8000_0001_u32], &[1, 0, 0, 0x80]);
+        there_and_back(&[-2_i16, 5], &[0xfe, 0xff, 5, 0]);
         // 1 and infinity of IEEE 754 binary16, -2 of binary32, 1 of binary64.
         there_and_back(&[f16::ONE, f16::INFINITY], &[0, 0x3c, 0, 0x7c]);
         there_and_back(&[-2.0_f32], &[0, 0, 0, 0xc0]);

@@ -82,7 +82,12 @@ fn write_store(path: &Path, raw: &Path) -> Map<String, Value> {
     let store = StoreWriter::create(path, false).unwrap();
     let mut expected = Map::new();
     let image = |group: &str, geometry: &Geometry, element, window| {
-        store.image(group, &ImageSpec { name: "picture", geometry, element, content: Content::Grey, window }).unwrap()
+        store
+            .image(
+                group,
+                &ImageSpec { name: "picture", geometry, element, content: Content::Grey, window, extremes: window },
+            )
+            .unwrap()
     };
     let stack = geometry([321, 270, 37], [0.25, 0.25, 1.0]);
     let root = image("", &stack, u16::TYPE, Some([100.0, 4000.0]));

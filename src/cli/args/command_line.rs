@@ -3,6 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use super::common::{DemoArgs, InfoArgs, LogArg, MeasureArgs, SegmentArgs};
+use super::convert::ConvertArgs;
 use super::distance::DistanceJobArgs;
 use super::middle::MiddleArgs;
 use super::reconstruct::ReconstructArgs;
@@ -33,6 +34,9 @@ pub(crate) enum Command {
     Reconstruct(Box<ReconstructArgs>),
     /// Segment the built-in stack of a plant embryo
     Demo(DemoArgs),
+    /// Write a volume or a mesh in another format: OME-Zarr 0.4 or 0.5, OME-TIFF, VTI, NRRD; PLY, OBJ, STL, VTP
+    #[command(after_help = HELP_ON_DISTANCE)]
+    Convert(Box<ConvertArgs>),
     /// Measure a triangle mesh: volume, area, pieces, holes, and how far points lie from it
     Measure(MeasureArgs),
     /// Tell what an input or output is: shape, axes, spacing, unit, type

@@ -9,7 +9,7 @@ use super::values::{
     Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
     solvers_help,
 };
-use crate::io::ome_zarr::Compression;
+use crate::io::ome_zarr::{Compression, OmeVersion};
 use crate::pipeline::distance::Method;
 use crate::pipeline::marks::Seed;
 use crate::pipeline::segment::FillGaps;
@@ -188,6 +188,10 @@ pub(crate) struct OutputArgs {
     /// slower), or not at all
     #[arg(long, value_enum, default_value_t = CompressArg::Fast)]
     pub(crate) compress: CompressArg,
+    /// Version of OME-Zarr: 0.5 (Zarr 3, chunks together in shards), or 0.4 (Zarr 2, a file for each chunk) for programs that
+    /// do not read 0.5, such as BDV and older Fiji
+    #[arg(long, value_enum, default_value_t = OmeArg::V05)]
+    pub(crate) ome: OmeArg,
     /// Write the report once more, as a file of its own
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
@@ -350,6 +354,31 @@ pub(crate) enum CompressArg {
     None,
     Fast,
     Small,
+}
+
+/// Which version of OME-Zarr is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OmeArg {
+    #[value(name = "0.4")]
+    V04,
+    #[value(name = "0.5")]
+    V05,
+}
+
+impl OmeArg {
+    /// As it is typed.
+    pub(crate) fn name(self) -> &'static str {
+        OmeVersion::from(self).name()
+    }
+}
+
+impl From<OmeArg> for OmeVersion {
+    fn from(arg: OmeArg) -> Self {
+        match arg {
+            OmeArg::V04 => Self::V04,
+            OmeArg::V05 => Self::V05,
+        }
+    }
 }
 
 impl CompressArg {

@@ -2,6 +2,7 @@
 
 pub(crate) mod command_line;
 pub(crate) mod common;
+pub(crate) mod convert;
 pub(crate) mod distance;
 pub(crate) mod grid;
 pub(crate) mod middle;

@@ -307,6 +307,7 @@ struct Settings {
     cloud: String,
     output: Option<String>,
     compress: &'static str,
+    ome: &'static str,
     method: &'static str,
     #[serde(flatten)]
     motion: Moves,
@@ -321,6 +322,7 @@ impl Settings {
             cloud: job.args.cloud.display().to_string(),
             output: job.args.output.store().map(|path| path.display().to_string()),
             compress: job.args.output.compress.name(),
+            ome: job.args.output.ome.name(),
             method: job.settings.method.name(),
             motion: Moves::new(&job.settings.motion, &found.geometry),
             beta: job.settings.beta,

@@ -259,6 +259,7 @@ impl Job {
             seeds: self.args.seed.iter().map(|s| [s.centre[0], s.centre[1], s.centre[2], s.radius]).collect(),
             output: output.store().map(|path| path.display().to_string()),
             compress: output.compress.name(),
+            ome: output.ome.name(),
             channel: volume.channel,
             axes: volume.pages.axes.map(|axes| axes.to_string()),
             image_index: volume.pages.image_index,

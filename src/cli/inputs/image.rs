@@ -38,9 +38,18 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Opens one channel and time of a stack; `spacing` stands in place of the file's.
 pub(crate) fn open_stack(path: &Path, select: Select, spacing: Option<[f64; 3]>) -> Result<OpenStack> {
+    open_any(path, select, spacing, true)
+}
+
+/// Opens one channel and time of an image that may be flat.
+pub(crate) fn open_volume(path: &Path, select: Select, spacing: Option<[f64; 3]>) -> Result<OpenStack> {
+    open_any(path, select, spacing, false)
+}
+
+fn open_any(path: &Path, select: Select, spacing: Option<[f64; 3]>, is_solid: bool) -> Result<OpenStack> {
     let stack = formats::open_stack(path, select)?;
     let info = stack.info();
-    if let Some(axis) = (0..3).find(|&a| info.shape[a] < 2) {
+    if let Some(axis) = (0..3).find(|&a| is_solid && info.shape[a] < 2) {
         return Err(Error::input(flat(stack.as_ref(), select, axis)).at(path));
     }
     if spacing.is_none() {

@@ -11,8 +11,8 @@ use crate::job::live::Telling;
 /// # Errors
 /// As [`StoreWriter::create`].
 pub(crate) fn begin_store(output: &OutputArgs, engine: &Engine) -> Result<(Option<StoreWriter>, Option<Telling>)> {
-    let create = if output.live { StoreWriter::create_live } else { StoreWriter::create };
-    let begin = |path| Ok(create(path, output.overwrite)?.packed(output.compress.into()));
+    let create = if output.live { StoreWriter::create_live } else { StoreWriter::create_as };
+    let begin = |path| Ok(create(output.ome.into(), path, output.overwrite)?.packed(output.compress.into()));
     let store = output.store().map(begin).transpose()?;
     let telling = store.as_ref().and_then(|store| Telling::of(store, engine));
     Ok((store, telling))

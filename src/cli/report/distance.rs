@@ -61,6 +61,7 @@ pub(crate) struct Settings {
     sources: Vec<String>,
     output: Option<String>,
     compress: &'static str,
+    ome: &'static str,
     method: &'static str,
     schedule: &'static str,
     neighbours: u32,
@@ -94,6 +95,7 @@ impl Settings {
             sources: args.sources.iter().map(|path| path.display().to_string()).collect(),
             output: args.job.output.store().map(|path| path.display().to_string()),
             compress: args.job.output.compress.name(),
+            ome: args.job.output.ome.name(),
             method: settings.method.name(),
             schedule,
             neighbours: match settings.neighbours {

@@ -46,6 +46,7 @@ pub(crate) struct Settings {
     pub(crate) output: Option<String>,
     /// How the store's chunks are packed.
     pub(crate) compress: &'static str,
+    pub(crate) ome: &'static str,
     pub(crate) channel: u32,
     pub(crate) time: u32,
     pub(crate) level: u32,

@@ -31,9 +31,9 @@ pub(super) const REPLACED: &str = "-replaced";
 /// letters and [`REPLACED`].
 pub const LONGEST_ENDING: usize = 1 + 9 + 10 + 1 + 6 + REPLACED.len();
 
-/// Removes what runs that are dead left of the store `name` in a folder. `document` is what every store in the making
-/// holds from the moment on at which it is locked.
-pub(super) fn remove(folder: &Path, name: &str, document: &str) {
+/// Removes what runs that are dead left of the store `name` in a folder. `is_store` tells what every store in the making
+/// is from the moment on at which it is locked.
+pub(super) fn remove(folder: &Path, name: &str, is_store: fn(&Path) -> bool) {
     let prefix = prefix(name);
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
@@ -44,7 +44,7 @@ pub(super) fn remove(folder: &Path, name: &str, document: &str) {
         let ours = process.bytes().all(|b| b.is_ascii_digit()) && letters.bytes().all(|b| b.is_ascii_alphanumeric());
         // A run that died while one store took another's place left both whole: which to keep is not ours to say.
         let whole = folder.join(format!("{found}{REPLACED}")).exists();
-        if !ours || whole || !path.join(document).is_file() {
+        if !ours || whole || !is_store(&path) {
             continue;
         }
         if let Some(_locked) = claim(&path) {
@@ -75,7 +75,7 @@ mod tests {
         let others = [make(".other.zarr.partial-12-abcDEF"), make(".out.zarr.partial-mine"), make("out.zarr")];
         let unlocked_yet = folder.path().join(".out.zarr.partial-14-abcDEF");
         fs::create_dir(&unlocked_yet).unwrap();
-        remove(folder.path(), "out.zarr", "zarr.json");
+        remove(folder.path(), "out.zarr", |path| path.join("zarr.json").exists());
         assert!(!dead.exists());
         assert!([living, half_replaced, replaced, unlocked_yet].iter().chain(&others).all(|path| path.exists()));
     }

@@ -13,7 +13,8 @@
 //! | closest points, f32 | 8.8, 530, 1200: zstd 1 | 11.7, 110, 1500: zstd 9 | 3.1, 310, 760: blosc zstd 1 |
 //!
 //! Blosc groups bytes by significance (shuffle). That helps where neighbours are near each other, and harms where they are
-//! the same: coordinates of closest points are those of a few sources over and over.
+//! the same: coordinates of closest points are those of a few sources over and over. OME-Zarr 0.4 has what the table gives to
+//! zstd alone in Blosc too, which all readers of Zarr 2 unpack.
 
 use std::sync::Arc;
 
@@ -21,6 +22,7 @@ use serde_json::{Value, json};
 use zarrs::array::BytesToBytesCodecTraits;
 use zarrs::array::codec::{BloscCodec, BloscCompressionLevel, BloscCompressor, BloscShuffleMode, ZstdCodec};
 
+use super::version::OmeVersion;
 use crate::error::{Error, Result};
 use crate::store::ElementType;
 
@@ -58,15 +60,21 @@ pub(super) struct Packing {
 
 impl Packing {
     /// How chunks of such voxels are packed.
-    pub(super) fn new(element: ElementType, content: Content, compression: Compression) -> Result<Self> {
+    pub(super) fn new(
+        element: ElementType,
+        content: Content,
+        compression: Compression,
+        version: OmeVersion,
+    ) -> Result<Self> {
         let grouped = element.size() > 1 && content != Content::Repeated;
+        let mode = if grouped { BloscShuffleMode::Shuffle } else { BloscShuffleMode::NoShuffle };
         match (compression, grouped) {
             (Compression::None, _) => Ok(Self { codec: None, description: None }),
-            (Compression::Fast, false) => Ok(Self::zstd(1)),
-            (Compression::Small, false) => Ok(Self::zstd(9)),
-            (Compression::Fast, true) if content == Content::Field => Self::blosc("lz4", 5, element),
-            (Compression::Fast, true) => Self::blosc("zstd", 1, element),
-            (Compression::Small, true) => Self::blosc("zstd", 5, element),
+            (Compression::Fast, false) if version == OmeVersion::V05 => Ok(Self::zstd(1)),
+            (Compression::Small, false) if version == OmeVersion::V05 => Ok(Self::zstd(9)),
+            (Compression::Fast, true) if content == Content::Field => Self::blosc("lz4", 5, element, mode),
+            (Compression::Fast, _) => Self::blosc("zstd", 1, element, mode),
+            (Compression::Small, _) => Self::blosc("zstd", 5, element, mode),
         }
     }
 
@@ -75,17 +83,17 @@ impl Packing {
         Self { codec: Some(Arc::new(ZstdCodec::new(level, false))), description: Some(description) }
     }
 
-    fn blosc(name: &str, level: u8, element: ElementType) -> Result<Self> {
+    fn blosc(name: &str, level: u8, element: ElementType, mode: BloscShuffleMode) -> Result<Self> {
         let size = element.size();
         let compressor = if name == "lz4" { BloscCompressor::LZ4 } else { BloscCompressor::Zstd };
         let clevel = BloscCompressionLevel::try_from(level).map_err(|_| Error::failed("blosc has no such level"))?;
-        let codec =
-            BloscCodec::new(compressor, clevel, None, BloscShuffleMode::Shuffle, Some(size)).map_err(|error| {
-                Error::failed(format!("the blosc compressor is not available: {error}")).caused_by(error)
-            })?;
+        let codec = BloscCodec::new(compressor, clevel, None, mode, Some(size)).map_err(|error| {
+            Error::failed(format!("the blosc compressor is not available: {error}")).caused_by(error)
+        })?;
+        let shuffle = if mode == BloscShuffleMode::Shuffle { "shuffle" } else { "noshuffle" };
         let description = json!({
             "name": "blosc",
-            "configuration": { "cname": name, "clevel": level, "shuffle": "shuffle", "typesize": size, "blocksize": 0 }
+            "configuration": { "cname": name, "clevel": level, "shuffle": shuffle, "typesize": size, "blocksize": 0 }
         });
         Ok(Self { codec: Some(Arc::new(codec)), description: Some(description) })
     }

@@ -7,10 +7,11 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::compression::{Compression, Content};
-use super::files::{write_json, write_whole};
+use super::files::write_whole;
 use super::metadata;
 use super::pyramid::LevelPlan;
 use super::shard::{ChunkCodec, ShardLayout, encode_chunk, write_shard};
+use super::version::OmeVersion;
 use crate::error::Result;
 use crate::grid::{Box3, Geometry};
 use crate::store::{Element, ElementType};
@@ -48,8 +49,8 @@ impl LevelWriter {
         packed: (Content, Compression),
         layout: ShardLayout,
     ) -> Result<Self> {
-        let codec = ChunkCodec::new(element, packed.0, packed.1)?;
-        write_json(&folder.join("zarr.json"), &metadata::array(plan.geometry.shape, element, layout, &codec))?;
+        let codec = ChunkCodec::new(element, packed, layout.version)?;
+        layout.version.write(folder, &metadata::array(plan.geometry.shape, element, layout, &codec))?;
         Ok(Self {
             folder: folder.to_path_buf(),
             store: store.to_path_buf(),
@@ -115,7 +116,7 @@ impl LevelWriter {
         let encoded = encode_chunk(&self.codec, self.layout, chunk, data).map_err(|error| error.at(&self.store))?;
         let (shard, place) = self.layout.place_of(chunk.lo);
         let Some(chunks) = self.enter(shard, place, encoded) else { return Ok(0) };
-        let bytes = write_whole(&self.shard_path(shard), |sink| write_shard(sink, &chunks))
+        let bytes = write_whole(&self.shard_path(shard), |sink| write_shard(sink, chunks, self.layout, &self.codec))
             .map_err(|error| error.at(&self.store))?;
         self.written.fetch_add(u64::from(bytes > 0), Relaxed);
         Ok(bytes)
@@ -164,7 +165,8 @@ impl LevelWriter {
 
     fn shard_path(&self, place: [i64; 3]) -> PathBuf {
         let [x, y, z] = place.map(|v| v.to_string());
-        self.folder.join("c").join(z).join(y).join(x)
+        let folder = if self.layout.version == OmeVersion::V04 { self.folder.clone() } else { self.folder.join("c") };
+        folder.join(z).join(y).join(x)
     }
 }
 
@@ -188,8 +190,9 @@ mod tests {
         packed: (Content, Compression),
     ) -> LevelWriter {
         let geometry = Geometry { shape, spacing: [1.0; 3], origin: [0.0; 3], unit: None };
-        let plan = LevelPlan { geometry, factors: [1; 3] };
-        LevelWriter::create(&folder.join("0"), folder, plan, element, packed, ShardLayout::new(shape, element)).unwrap()
+        let (plan, layout) =
+            (LevelPlan { geometry, factors: [1; 3] }, ShardLayout::new(shape, element, OmeVersion::V05));
+        LevelWriter::create(&folder.join("0"), folder, plan, element, packed, layout).unwrap()
     }
 
     /// The array as the `zarrs` crate reads it, which takes no part in laying out or writing shards.

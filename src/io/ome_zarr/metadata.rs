@@ -25,6 +25,8 @@ pub struct ImageSpec<'a> {
     pub content: Content,
     /// The values that viewers show as black and white at first.
     pub window: Option<[f64; 2]>,
+    /// The smallest and the largest value, how far viewers' sliders go, where they are known.
+    pub extremes: Option<[f64; 2]>,
 }
 
 /// A label image to be written.
@@ -72,8 +74,8 @@ pub(super) fn group_with(ome: Option<Map<String, Value>>, other: Option<(String,
 /// The array of one level.
 pub(super) fn array(shape: [i64; 3], element: ElementType, layout: ShardLayout, codec: &ChunkCodec) -> Value {
     let fill_value = match element {
-        ElementType::U8 | ElementType::U16 | ElementType::U32 => json!(0),
         ElementType::F16 | ElementType::F32 | ElementType::F64 => json!(0.0),
+        _ => json!(0),
     };
     json!({
         "zarr_format": 3,
@@ -100,14 +102,17 @@ pub(super) fn image(spec: &ImageSpec<'_>, levels: &[LevelPlan]) -> Map<String, V
     ome
 }
 
-/// The OME attributes of a label image, two folders below the image it belongs to.
-pub(super) fn labels(spec: &LabelSpec<'_>, levels: &[LevelPlan]) -> Map<String, Value> {
+/// The OME attributes of a label image, two folders below the image it belongs to, or without one.
+pub(super) fn labels(spec: &LabelSpec<'_>, levels: &[LevelPlan], has_image: bool) -> Map<String, Value> {
     let how = "most frequent label of each block of voxels; ties: the smallest label that is not background";
     let colors: Vec<Value> =
         spec.colors.iter().map(|color| json!({ "label-value": color.label, "rgba": color.rgba })).collect();
     let mut ome = Map::new();
     ome.insert("multiscales".into(), multiscales(spec.name, levels, "mode", how));
-    let mut label = json!({ "version": VERSION, "source": { "image": "../../" } });
+    let mut label = json!({ "version": VERSION });
+    if has_image {
+        label["source"] = json!({ "image": "../../" });
+    }
     if !colors.is_empty() {
         label["colors"] = colors.into();
     }
@@ -147,14 +152,15 @@ fn dataset(level: usize, geometry: &Geometry) -> Value {
 }
 
 fn omero(spec: &ImageSpec<'_>, [start, end]: [f64; 2]) -> Value {
-    // How far a viewer's sliders go: all values of a small integer type, else what is shown.
-    let [min, max] = match spec.element {
-        ElementType::U8 => [0.0, 255.0],
-        ElementType::U16 => [0.0, 65535.0],
-        _ => [start, end],
-    };
-    let window = json!({ "start": start, "end": end, "min": min, "max": max });
-    json!({ "channels": [{ "label": spec.name, "color": "FFFFFF", "active": true, "window": window }] })
+    let [low, high] = spec.extremes.filter(|values| values.iter().all(|v| v.is_finite())).unwrap_or([start, end]);
+    let window = json!({ "start": start, "end": end, "min": low.min(start), "max": high.max(end) });
+    let channel = json!({
+        "label": spec.name, "color": "FFFFFF", "active": true, "window": window,
+        "coefficient": 1.0, "family": "linear", "inverted": false
+    });
+    // Opened in its middle slice, as a grey picture.
+    let planes = json!({ "model": "greyscale", "defaultT": 0, "defaultZ": spec.geometry.shape[2] / 2 });
+    json!({ "name": spec.name, "channels": [channel], "rdefs": planes })
 }
 
 #[cfg(test)]
@@ -176,6 +182,7 @@ mod tests {
             element: ElementType::F32,
             content: Content::Field,
             window: None,
+            extremes: None,
         };
         let ome = image(&spec, &plan_levels(&geometry));
         let multiscale = &ome["multiscales"][0];
@@ -196,11 +203,12 @@ mod tests {
                 element: ElementType::F32,
                 content: Content::Field,
                 window: Some(window),
+                extremes: Some([-2.0, 2.0]),
             };
             image(&spec, &plan_levels(&geometry)).remove("omero")
         };
         let found = omero([-1.0, 2.5]).unwrap();
-        assert_eq!(found["channels"][0]["window"], json!({ "start": -1.0, "end": 2.5, "min": -1.0, "max": 2.5 }));
+        assert_eq!(found["channels"][0]["window"], json!({ "start": -1.0, "end": 2.5, "min": -2.0, "max": 2.5 }));
         for window in [[0.0, f64::INFINITY], [f64::NAN, 1.0], [2.0, 2.0]] {
             assert_eq!(omero(window), None);
         }

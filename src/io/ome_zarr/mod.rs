@@ -1,7 +1,7 @@
-//! Writes OME-Zarr 0.5 (Zarr version 3) stores: sharded multiscale images and labels.
+//! Writes OME-Zarr 0.5 (Zarr version 3) stores: sharded multiscale images and labels; or 0.4 (Zarr version 2), unsharded.
 //!
-//! Rests on the OME-Zarr 0.5 specification (`multiscales`, `omero`, `labels`, `image-label`) and the Zarr v3 core,
-//! `sharding_indexed` and `blosc` specifications. Arrays are `z, y, x`; lengths are physical.
+//! Rests on the OME-Zarr 0.4 and 0.5 specifications (`multiscales`, `omero`, `labels`, `image-label`) and the Zarr v3 core,
+//! `sharding_indexed` and `blosc`, and Zarr v2 specifications. Arrays are `z, y, x`; lengths are physical.
 //!
 //! A [`StoreWriter`] builds the store under a hidden name beside its final one and moves it into place when all is
 //! written; a live one stands there from the start. Shards are the unit of writing: each is encoded whole, by one caller, and appears under its name complete.
@@ -17,6 +17,7 @@ mod read;
 mod root;
 mod shard;
 mod store;
+mod version;
 
 pub use abandoned::LONGEST_ENDING;
 pub use compression::{Compression, Content};
@@ -26,5 +27,6 @@ pub use place::is_store;
 pub use pyramid::{LevelPlan, plan_levels};
 pub use read::{ImageReader, StoredLevel};
 pub use root::{Live, LiveState, Root, live};
-pub use shard::shard_bytes;
+pub use shard::{joined_bytes, shard_bytes};
 pub use store::{ImageWriter, StoreWriter};
+pub use version::OmeVersion;

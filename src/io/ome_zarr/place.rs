@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use super::abandoned::{self, REPLACED};
 use super::files::{io_error, sync_tree};
-use super::root::{LiveState, METADATA, Root, live};
+use super::root::{LiveState, Root, live};
 use crate::error::{Error, Result};
 use crate::store::Unfinished;
 
@@ -150,7 +150,7 @@ impl Drop for Standing {
 fn hidden_folder(path: &Path) -> Result<TempDir> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let folder = path.parent().unwrap_or(Path::new("."));
-    abandoned::remove(folder, &name, METADATA);
+    abandoned::remove(folder, &name, is_store);
     tempfile::Builder::new()
         .prefix(&format!("{}{}-", abandoned::prefix(&name), std::process::id()))
         .tempdir_in(folder)
@@ -164,7 +164,7 @@ fn exists(path: &Path) -> bool {
 /// Whether a folder is a Zarr store, of version 2 or 3.
 #[must_use]
 pub fn is_store(path: &Path) -> bool {
-    [METADATA, ".zgroup", ".zattrs", ".zarray"].iter().any(|name| path.join(name).is_file())
+    ["zarr.json", ".zgroup", ".zattrs", ".zarray"].iter().any(|name| path.join(name).is_file())
 }
 
 /// Refuses a place that something is at which may not go.

@@ -7,6 +7,7 @@ use serde_json::Value;
 use zarrs::array::{Array, ArraySubset, ElementOwned};
 use zarrs::filesystem::FilesystemStore;
 
+use super::version::named_type;
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry};
 
@@ -34,16 +35,18 @@ impl ImageReader {
     /// # Errors
     /// When there is none, or not with the axes z, y, x.
     pub fn open(group: &Path) -> Result<Self> {
-        let document = read_json(&group.join("zarr.json"))?;
-        let multiscale = &document["attributes"]["ome"]["multiscales"][0];
+        let is_version_2 = group.join(".zattrs").is_file();
+        let document = read_json(&group.join(if is_version_2 { ".zattrs" } else { "zarr.json" }))?;
+        let ome = if is_version_2 { &document } else { &document["attributes"]["ome"] };
+        let multiscale = &ome["multiscales"][0];
         let read = |multiscale: &Value| {
             let unit = axes(multiscale)?;
             let datasets = multiscale["datasets"].as_array()?;
             datasets.iter().map(|dataset| level(group, dataset, unit.clone())).collect::<Option<Vec<_>>>()
         };
-        let levels = read(multiscale).filter(|levels| !levels.is_empty()).ok_or_else(|| {
-            Error::input("holds no OME-Zarr 0.5 image with the axes z, y, x that can be read").at(group)
-        })?;
+        let levels = read(multiscale)
+            .filter(|levels| !levels.is_empty())
+            .ok_or_else(|| Error::input("holds no OME-Zarr image with the axes z, y, x that can be read").at(group))?;
         Ok(Self { folder: group.to_path_buf(), levels })
     }
 
@@ -105,7 +108,8 @@ fn axes(multiscale: &Value) -> Option<Option<String>> {
 
 fn level(group: &Path, dataset: &Value, unit: Option<String>) -> Option<StoredLevel> {
     let path = dataset["path"].as_str()?.to_owned();
-    let array = read_json(&group.join(&path).join("zarr.json")).ok()?;
+    let document = |name: &str| read_json(&group.join(&path).join(name)).ok();
+    let array = document("zarr.json").or_else(|| document(".zarray"))?;
     let transformations = dataset["coordinateTransformations"].as_array()?;
     let vector = |kind: &str| transformations.iter().find_map(|t| xyz(&t[kind], Value::as_f64));
     let geometry = Geometry {
@@ -114,7 +118,8 @@ fn level(group: &Path, dataset: &Value, unit: Option<String>) -> Option<StoredLe
         origin: vector("translation").unwrap_or([0.0; 3]),
         unit,
     };
-    Some(StoredLevel { path, geometry, element: array["data_type"].as_str()?.to_owned() })
+    let element = array["data_type"].as_str().or_else(|| named_type(array["dtype"].as_str()?))?.to_owned();
+    Some(StoredLevel { path, geometry, element })
 }
 
 /// A list of z, y, x as a triple.
@@ -147,6 +152,7 @@ mod tests {
             element: ElementType::U16,
             content: Content::Grey,
             window: None,
+            extremes: None,
         };
         let image = store.image("", &spec).unwrap();
         for level in image.levels() {

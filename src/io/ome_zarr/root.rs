@@ -7,12 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde_json::{Map, Value, json};
 
 use super::abandoned;
-use super::files::write_json;
 use super::metadata;
+use super::version::OmeVersion;
 use crate::error::Result;
 
-/// What every store has at its root.
-pub(super) const METADATA: &str = "zarr.json";
 /// The attribute of live stores, beside `ome`.
 const ATTRIBUTE: &str = "strandline";
 
@@ -53,7 +51,8 @@ pub struct Live {
 /// The document of one store that is being written.
 #[derive(Debug)]
 pub struct Root {
-    path: PathBuf,
+    folder: PathBuf,
+    version: OmeVersion,
     said: Mutex<Said>,
     written: Arc<AtomicU64>,
 }
@@ -66,8 +65,13 @@ struct Said {
 
 impl Root {
     /// That of a store in `folder`, which says nothing yet.
-    pub(super) fn new(folder: &Path) -> Self {
-        Self { path: folder.join(METADATA), said: Mutex::default(), written: Arc::default() }
+    pub(super) fn new(folder: &Path, version: OmeVersion) -> Self {
+        Self { folder: folder.to_path_buf(), version, said: Mutex::default(), written: Arc::default() }
+    }
+
+    /// The version of the whole store.
+    pub(super) fn version(&self) -> OmeVersion {
+        self.version
     }
 
     /// Counts the shards that were written.
@@ -112,7 +116,7 @@ impl Root {
             let value = json!({ "state": live.state.name(), "done": live.done, "written": live.written });
             (ATTRIBUTE.to_owned(), value)
         });
-        write_json(&self.path, &metadata::group_with(said.ome.clone(), live))
+        self.version.write(&self.folder, &metadata::group_with(said.ome.clone(), live))
     }
 }
 
@@ -120,9 +124,9 @@ impl Root {
 /// lock on its folder goes with the process that writes it, whatever ends that.
 #[must_use]
 pub fn live(folder: &Path) -> Option<Live> {
-    let text = std::fs::read(folder.join(METADATA)).ok()?;
-    let root: Value = serde_json::from_slice(&text).ok()?;
-    let said = root["attributes"].get(ATTRIBUTE)?;
+    let document = |name: &str| serde_json::from_slice::<Value>(&std::fs::read(folder.join(name)).ok()?).ok();
+    let attributes = document("zarr.json").map(|mut root| root["attributes"].take()).or_else(|| document(".zattrs"))?;
+    let said = attributes.get(ATTRIBUTE)?;
     let state = match said["state"].as_str()? {
         "running" if abandoned::is_claimed(folder) => LiveState::Running,
         "complete" => LiveState::Complete,

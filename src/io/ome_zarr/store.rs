@@ -6,13 +6,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use serde_json::{Map, Value};
 
 use super::compression::{Compression, Content};
-use super::files::{create_parent, write_json};
+use super::files::create_parent;
 use super::level::LevelWriter;
 use super::metadata::{self, ImageSpec, LabelSpec};
 use super::place::{Place, check_target};
 use super::pyramid::{LevelPlan, plan_levels};
-use super::root::{METADATA, Root};
+use super::root::Root;
 use super::shard::ShardLayout;
+use super::version::OmeVersion;
 use crate::error::{Error, Result};
 use crate::store::ElementType;
 
@@ -50,10 +51,18 @@ impl StoreWriter {
     /// `Usage` when something is at `path` that may not be replaced, or the folder it is to lie in does not exist;
     /// `Failed` when that folder cannot be written to.
     pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
+        Self::create_as(OmeVersion::default(), path, overwrite)
+    }
+
+    /// The same in a version of OME-Zarr.
+    ///
+    /// # Errors
+    /// As [`StoreWriter::create`].
+    pub fn create_as(version: OmeVersion, path: &Path, overwrite: bool) -> Result<Self> {
         let path = resolve(path)?;
         check_target(&path, overwrite)?;
         let place = Place::hidden(&path)?;
-        let root = Arc::new(Root::new(place.folder()));
+        let root = Arc::new(Root::new(place.folder(), version));
         Self::begin(path, overwrite, root, place)
     }
 
@@ -63,10 +72,10 @@ impl StoreWriter {
     ///
     /// # Errors
     /// As [`StoreWriter::create`].
-    pub fn create_live(path: &Path, overwrite: bool) -> Result<Self> {
+    pub fn create_live(version: OmeVersion, path: &Path, overwrite: bool) -> Result<Self> {
         let path = resolve(path)?;
         check_target(&path, overwrite)?;
-        let root = Arc::new(Root::new(&path));
+        let root = Arc::new(Root::new(&path, version));
         let place = Place::live(&path, root.clone())?;
         Self::begin(path, overwrite, root, place)
     }
@@ -139,6 +148,16 @@ impl StoreWriter {
         self.begin_labels(spec).map_err(|error| error.at(&self.path))
     }
 
+    /// Begins a label image that belongs to no image, at the store's root; labels may be signed.
+    ///
+    /// # Errors
+    /// When the metadata cannot be written.
+    pub fn labels_alone(&self, spec: &LabelSpec<'_>) -> Result<ImageWriter> {
+        let levels = plan_levels(spec.geometry);
+        let attributes = metadata::labels(spec, &levels, false);
+        self.multiscale("", attributes, levels, (spec.element, Content::Repeated)).map_err(|error| error.at(&self.path))
+    }
+
     /// Says how far a live store is, from any thread; nothing where it is not live.
     #[must_use]
     pub fn live(&self) -> Option<Arc<Root>> {
@@ -162,14 +181,14 @@ impl StoreWriter {
         );
         assert_eq!(Path::new(spec.name).components().count(), 1, "a label image lies directly in the group of labels");
         let levels = plan_levels(spec.geometry);
-        let attributes = metadata::labels(spec, &levels);
+        let attributes = metadata::labels(spec, &levels, true);
         let image =
             self.multiscale(&format!("labels/{}", spec.name), attributes, levels, (spec.element, Content::Repeated))?;
         // Listed last, under the lock until it is on disk: the list names what is there, whichever thread comes first.
         let mut names = self.lock();
         names.push(spec.name.to_owned());
         names.sort();
-        write_json(&self.inside("labels").join(METADATA), &metadata::group(Some(metadata::label_list(&names))))?;
+        self.root.version().write(&self.inside("labels"), &metadata::group(Some(metadata::label_list(&names))))?;
         Ok(image)
     }
 
@@ -186,7 +205,7 @@ impl StoreWriter {
         let packed = (content, self.compression);
         let create = |(level, plan): (usize, LevelPlan)| {
             let halved = if self.live().is_some() { level } else { 0 };
-            let layout = ShardLayout::halved(plan.geometry.shape, element, halved);
+            let layout = ShardLayout::halved(plan.geometry.shape, element, self.root.version(), halved);
             let level =
                 LevelWriter::create(&folder.join(level.to_string()), &self.path, plan, element, packed, layout)?;
             Ok(level.counted_by(self.root.counter()))
@@ -200,7 +219,7 @@ impl StoreWriter {
     fn write_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
         match group {
             "" => self.root.describe(attributes),
-            _ => write_json(&self.inside(group).join(METADATA), &metadata::group(Some(attributes))),
+            _ => self.root.version().write(&self.inside(group), &metadata::group(Some(attributes))),
         }
     }
 
@@ -208,9 +227,9 @@ impl StoreWriter {
     fn ensure_groups(&self, group: &Path) -> Result<()> {
         let _alone = self.lock();
         for folder in group.ancestors() {
-            let document = self.place.folder().join(folder).join(METADATA);
-            if !document.exists() {
-                write_json(&document, &metadata::group(None))?;
+            let (folder, version) = (self.place.folder().join(folder), self.root.version());
+            if !version.is_group(&folder) {
+                version.write(&folder, &metadata::group(None))?;
             }
         }
         Ok(())

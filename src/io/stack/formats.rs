@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use super::raw::{nrrd, vti};
 use super::tiff;
 use super::tiff::TiffStack;
 use super::volume::{Select, Stack};
@@ -42,6 +43,18 @@ pub const FORMATS: &[Format] = &[
         open: open_tiff,
     },
     Format { name: "Zarr image", extensions: &[], sniff: is_store, open: open_zarr },
+    Format {
+        name: "NRRD volume",
+        extensions: &["nrrd", "nhdr"],
+        sniff: |path| head(path).is_some_and(|head| head == *b"NRRD"),
+        open: |path, select| nrrd::open(path, without_axes(path, select)?),
+    },
+    Format {
+        name: "VTI volume",
+        extensions: &["vti"],
+        sniff: |path| first_bytes(path).is_some_and(|head| vti::is_vti(&head)),
+        open: |path, select| vti::open(path, without_axes(path, select)?),
+    },
 ];
 
 /// The format of what lies at a path; none when it is no stack, or nothing lies there.
@@ -95,10 +108,15 @@ fn near_miss(path: &Path) -> Option<String> {
 }
 
 fn open_zarr(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
-    if let Some(axes) = select.axes {
-        return Err(Error::usage(format!("names its axes itself; --axes {axes} is for TIFF files")).at(path));
+    Ok(Box::new(ZarrImage::open(path, without_axes(path, select)?)?))
+}
+
+/// Refuses to hear of axes from somebody else.
+fn without_axes(path: &Path, select: Select) -> Result<Select> {
+    match select.axes {
+        Some(axes) => Err(Error::usage(format!("names its axes itself; --axes {axes} is for TIFF files")).at(path)),
+        None => Ok(select),
     }
-    Ok(Box::new(ZarrImage::open(path, select)?))
 }
 
 fn open_tiff(path: &Path, select: Select) -> Result<Box<dyn Stack>> {

@@ -1,10 +1,12 @@
-//! Volumes in files: TIFF stacks and Zarr images.
+//! Volumes in files: TIFF stacks and Zarr images, NRRD and VTI.
 
 pub mod formats;
 pub mod label_volume;
 mod number;
 pub mod page_axes;
+mod raw;
 pub mod tiff;
 pub(super) mod units;
 pub mod volume;
+pub mod write;
 pub mod zarr;

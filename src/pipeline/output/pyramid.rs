@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry};
-use crate::io::ome_zarr::{ImageWriter, LevelWriter, StoreWriter, plan_levels, shard_bytes};
+use crate::io::ome_zarr::{ImageWriter, LevelWriter, StoreWriter, joined_bytes, plan_levels, shard_bytes};
 use crate::kernel::image::filter::downsample;
 use crate::kernel::image::filter::downsample::coarse_box;
 use crate::store::{BoxSource, BrickArray, Element, ElementType};
@@ -206,7 +206,9 @@ pub(crate) fn held(geometry: &Geometry, elements: &[ElementType], threads: u64) 
         let waiting = levels * threads.saturating_mul(shard).min(geometry.domain().volume().saturating_mul(size));
         waiting.saturating_add(threads * 4 * chunk * size)
     };
-    elements.iter().map(bytes).fold(0, u64::saturating_add)
+    // A thread completes one shard at a time.
+    let joined = elements.iter().map(|&element| threads * joined_bytes(geometry.shape, element)).max();
+    elements.iter().map(bytes).fold(joined.unwrap_or(0), u64::saturating_add)
 }
 
 /// Which levels of an image are written first.
@@ -280,7 +282,14 @@ mod tests {
             store
                 .image(
                     group,
-                    &ImageSpec { name: group, geometry: &geometry, element, content: Content::Grey, window: None },
+                    &ImageSpec {
+                        name: group,
+                        geometry: &geometry,
+                        element,
+                        content: Content::Grey,
+                        window: None,
+                        extremes: None,
+                    },
                 )
                 .unwrap()
         };

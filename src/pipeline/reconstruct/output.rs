@@ -103,6 +103,7 @@ impl Reconstruction {
                 element: ElementType::F32,
                 content: Content::Field,
                 window: Some([0.0, high]),
+                extremes: None,
             };
             let stage = engine.stage(&format!("write {name}"), 0);
             stage.voxels(geometry.domain().volume());

@@ -232,8 +232,8 @@ fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>
     let stage = engine.stage("write image", 0);
     stage.voxels(geometry.domain().volume());
     let window = Some([image.range.low, image.range.high]);
-    let written =
-        store.image("", &ImageSpec { name: "image", geometry, element: T::TYPE, content: Content::Grey, window })?;
+    let (element, content, extremes) = (T::TYPE, Content::Grey, Some(image.extremes));
+    let written = store.image("", &ImageSpec { name: "image", geometry, element, content, window, extremes })?;
     write_levels::<T>(&stage, engine, written, &image.bricks, (Reduce::Mean, First::of(store)))?;
     stage.finish();
     Ok(())

@@ -136,8 +136,8 @@ fn boxes(stack: &dyn Stack) -> Result<()> {
         ElementType::U8 => values::<u8>(stack, &part),
         ElementType::U16 => values::<u16>(stack, &part),
         ElementType::U32 => values::<u32>(stack, &part),
-        ElementType::F16 | ElementType::F32 => values::<f32>(stack, &part),
-        ElementType::F64 => values::<f64>(stack, &part),
+        ElementType::I8 | ElementType::I16 | ElementType::F16 | ElementType::F32 => values::<f32>(stack, &part),
+        ElementType::I32 | ElementType::F64 => values::<f64>(stack, &part),
     })
 }
 

@@ -126,7 +126,8 @@ fn written<T: Element>() -> Files {
     let store = StoreWriter::create(&path, false).expect("a new store");
     let geometry =
         Geometry { shape: [5, 4, 3], spacing: [0.5, 0.5, 2.0], origin: [0.0; 3], unit: Some("micrometer".into()) };
-    let spec = ImageSpec { name: "seed", geometry: &geometry, element: T::TYPE, content: Content::Grey, window: None };
+    let (element, content) = (T::TYPE, Content::Grey);
+    let spec = ImageSpec { name: "seed", geometry: &geometry, element, content, window: None, extremes: None };
     let image = store.image("", &spec).expect("an image");
     for level in image.levels() {
         for shard in level.shards() {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::body::{Body, Form, Start};
 use super::{obj, ply, stl, temporary, vtp};
 use crate::error::{Error, Result};
-use crate::grid::Geometry;
+use crate::grid::{Geometry, TriangleMesh};
 use crate::store::{HiddenFile, MeshSink};
 
 /// A file format of surfaces.
@@ -69,12 +69,35 @@ impl MeshFile {
         is_tagged: bool,
         temporary: &Path,
     ) -> Result<Self> {
+        Self::begin(format, path, temporary, &Form::of(geometry, is_tagged))
+    }
+
+    fn begin(format: &Format, path: &Path, temporary: &Path, form: &Form) -> Result<Self> {
         let begin = || -> io::Result<_> {
             let (hidden, file) = HiddenFile::create(path, &format!(".{}", format.extension))?;
-            let body = (format.start)(file, temporary, &Form::of(geometry, is_tagged))?;
+            let body = (format.start)(file, temporary, form)?;
             Ok(Self { body, named: Named { path: path.to_path_buf(), hidden } })
         };
         begin().map_err(|error| unwritable(&error, path))
+    }
+
+    /// Begins the file that will stand at `path`, for a mesh that is there: with positions in double precision where single
+    /// would move one.
+    ///
+    /// # Errors
+    /// As [`MeshFile::create`].
+    pub fn create_for(format: &Format, path: &Path, mesh: &TriangleMesh, temporary: &Path) -> Result<Self> {
+        let is_single = mesh.vertices.iter().flatten().all(|&v| f64::from(v as f32) == v);
+        let anchor = if is_single { [0.0; 3] } else { around(mesh).anchor() };
+        Self::begin(format, path, temporary, &Form { is_double: !is_single, anchor, ..Form::default() })
+    }
+
+    /// Where positions are seen from, in a format that holds f32 alone and cannot have them as they are.
+    #[must_use]
+    pub fn anchor_of(format: &Format, mesh: &TriangleMesh) -> Option<[f64; 3]> {
+        let is_moved = |v: f64| f64::from(v as f32) != v;
+        let moves = format.is_single && mesh.vertices.iter().flatten().any(|&v| is_moved(v));
+        moves.then(|| around(mesh).anchor())
     }
 
     /// Completes the file; it still has no name.
@@ -117,6 +140,16 @@ impl MeshSink for MeshFile {
         self.body.facet(corners, labels).map_err(|error| unwritable(&error, &self.named.path))
     }
 }
+
+/// A grid around a mesh, about as fine as it.
+fn around(mesh: &TriangleMesh) -> Geometry {
+    let (low, high) = mesh.bounds().unwrap_or_default();
+    let extent = (0..3).map(|a| high[a] - low[a]).fold(f64::MIN_POSITIVE, f64::max);
+    Geometry::new([VOXELS as i64; 3], [extent / VOXELS; 3], low)
+}
+
+/// Voxels along the longest side of a grid around a mesh.
+const VOXELS: f64 = 256.0;
 
 fn unwritable(error: &io::Error, path: &Path) -> Error {
     temporary::told(error).unwrap_or_else(|| Error::from_io("the mesh cannot be written", error).at(path))

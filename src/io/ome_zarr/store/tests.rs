@@ -26,6 +26,7 @@ fn write_store(path: &Path, overwrite: bool, value: u8) -> Result<()> {
         element: ElementType::U8,
         content: Content::Grey,
         window: None,
+        extremes: None,
     };
     let image = store.image("", &spec)?;
     let level = &image.levels()[0];
@@ -57,7 +58,7 @@ fn stores_in_the_making_are_left_alone() {
     let first = StoreWriter::create(&path, false).unwrap();
     let dead = folder.path().join(".out.zarr.partial-1-abcdef");
     fs::create_dir(&dead).unwrap();
-    fs::write(dead.join(METADATA), "{}").unwrap();
+    fs::write(dead.join("zarr.json"), "{}").unwrap();
     let second = StoreWriter::create(&path, false).unwrap();
     assert!(first.folder().exists() && second.folder().exists() && !dead.exists());
 }
@@ -139,8 +140,14 @@ fn groups_on_the_way_say_that_they_are_groups() {
     let folder = tempfile::tempdir().unwrap();
     let store = StoreWriter::create(&folder.path().join("out.zarr"), false).unwrap();
     let geometry = geometry();
-    let spec =
-        ImageSpec { name: "u", geometry: &geometry, element: ElementType::F32, content: Content::Field, window: None };
+    let spec = ImageSpec {
+        name: "u",
+        geometry: &geometry,
+        element: ElementType::F32,
+        content: Content::Field,
+        window: None,
+        extremes: None,
+    };
     store.image("levelset/object-1", &spec).unwrap();
     store.image("levelset/object-2", &spec).unwrap();
     for name in ["segmentation", "border"] {
@@ -148,7 +155,7 @@ fn groups_on_the_way_say_that_they_are_groups() {
         store.labels(&spec).unwrap();
     }
     for group in ["", "levelset", "levelset/object-2", "labels", "labels/border"] {
-        assert_eq!(json(&store.folder().join(group).join(METADATA))["node_type"], "group", "{group}");
+        assert_eq!(json(&store.folder().join(group).join("zarr.json"))["node_type"], "group", "{group}");
     }
     let list = json(&store.folder().join("labels/zarr.json"));
     assert_eq!(list["attributes"]["ome"]["labels"], serde_json::json!(["border", "segmentation"]));

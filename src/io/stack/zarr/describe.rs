@@ -137,6 +137,24 @@ pub fn label_images(path: &Path) -> Vec<PathBuf> {
     names.iter().map(|name| folder.join(name)).filter(|group| group.is_dir()).collect()
 }
 
+/// The colours of a label image's numbers, red, green, blue and opacity, where it tells some; none where a group, or the one
+/// that an array lies in, is no label image.
+#[must_use]
+pub fn label_colors(path: &Path) -> Option<Vec<(u32, [u8; 4])>> {
+    let folders = [Some(path), path.parent()];
+    let node = folders
+        .into_iter()
+        .flatten()
+        .find_map(|folder| Node::read(folder).ok().flatten().filter(|n| n.array.is_none()))?;
+    let told = node.ome()["image-label"].as_object()?;
+    let color = |color: &Value| {
+        let part = |n: usize| color["rgba"][n].as_u64().and_then(|part| u8::try_from(part).ok());
+        let rgba = [part(0)?, part(1)?, part(2)?, part(3)?];
+        Some((u32::try_from(color["label-value"].as_u64()?).ok()?, rgba))
+    };
+    Some(told.get("colors").and_then(Value::as_array).into_iter().flatten().filter_map(color).collect())
+}
+
 /// The codecs of the array in a folder, in the order of writing: those of the chunks in shards.
 pub(crate) fn codecs_of(folder: &Path) -> Result<String> {
     let document = Node::read(folder)?.and_then(|node| node.array).unwrap_or_default();

@@ -28,7 +28,7 @@ use multiscale::Placed;
 use node::Node;
 use samples::{Place, Values};
 
-pub use describe::{LevelDescription, ZarrDescription, describe, holds_image, label_images};
+pub use describe::{LevelDescription, ZarrDescription, describe, holds_image, label_colors, label_images};
 
 /// Voxels that are asked for at once, at least: smaller chunks are read several together.
 const AT_ONCE: i64 = 1 << 16;

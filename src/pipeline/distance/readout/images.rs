@@ -140,13 +140,20 @@ impl<'a, P: Precision> Images<'a, P> {
 }
 
 fn distance_spec<P: Element>(geometry: &Geometry, window: Option<[f64; 2]>) -> ImageSpec<'_> {
-    ImageSpec { name: "distance", geometry, element: P::TYPE, content: Content::Field, window }
+    ImageSpec { name: "distance", geometry, element: P::TYPE, content: Content::Field, window, extremes: window }
 }
 
 fn coordinates<T: Element>(engine: &Engine, geometry: &Geometry, store: &StoreWriter) -> Result<[Pyramid<T>; 3]> {
     let image = |name: &str| {
         let group = format!("closest-point/{name}");
-        let spec = ImageSpec { name: &group, geometry, element: T::TYPE, content: Content::Repeated, window: None };
+        let spec = ImageSpec {
+            name: &group,
+            geometry,
+            element: T::TYPE,
+            content: Content::Repeated,
+            window: None,
+            extremes: None,
+        };
         Pyramid::new(engine, store.image(&group, &spec)?, Reduce::Mean)
     };
     Ok([image("x")?, image("y")?, image("z")?])
