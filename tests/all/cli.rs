@@ -48,7 +48,7 @@ fn help_and_version_are_complete() {
         }
         assert!(help.lines().all(|line| line.chars().count() <= 100));
     }
-    for command in ["segment", "distance", "reconstruct", "measure", "demo", "info"] {
+    for command in ["segment", "distance", "reconstruct", "measure", "convert", "demo", "info"] {
         assert!(bench.succeed("help").contains(command) && readme.contains(&format!("\n| `{command}` |")), "{command}");
     }
 }
@@ -63,7 +63,7 @@ fn wrong_usage_is_told_with_code_2() {
         ("segment image.tif -o out/x.zarr", "--points"),
         ("sgment image.tif", "segment"),
         ("segment image.tif --points marks.csv -o out/x.zarr --resume", "--resume"),
-        ("segment image.tif --points marks.csv -o out/x.zarr --ome 0.4", "--ome"),
+        ("segment image.tif --points marks.csv -o out/x.zarr --ome 0.3", "--ome"),
         ("segment image.tif --points marks.csv -o out/x.zarr --theta x", "--theta"),
         ("segment image.tif --points marks.csv -o out/x.zarr --theta nan", "--theta is NaN"),
         ("segment image.tif --points marks.csv -o out/x.zarr --rho -1", "--rho is -1"),

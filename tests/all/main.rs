@@ -46,6 +46,7 @@ mod builders_refused;
 mod citations;
 mod cli;
 mod clouds_cli;
+mod convert;
 mod layering;
 mod outlines;
 #[cfg(target_os = "linux")]

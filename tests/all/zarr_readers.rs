@@ -8,7 +8,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 use strandline::grid::{Box3, Geometry};
-use strandline::io::ome_zarr::{Content, ImageSpec, ImageWriter, LabelColor, LabelSpec, StoreWriter};
+use strandline::io::ome_zarr::{Content, ImageSpec, ImageWriter, LabelColor, LabelSpec, OmeVersion, StoreWriter};
 use strandline::kernel::image::filter::downsample;
 use strandline::kernel::image::picture::palette::label_color;
 use strandline::store::Element;
@@ -78,8 +78,8 @@ fn balls([x, y, z]: [i64; 3]) -> f64 {
 }
 
 /// A store with every kind of image: several shards, extents that are no multiple of anything, anisotropic voxels.
-fn write_store(path: &Path, raw: &Path) -> Map<String, Value> {
-    let store = StoreWriter::create(path, false).unwrap();
+fn write_store(version: OmeVersion, path: &Path, raw: &Path) -> Map<String, Value> {
+    let store = StoreWriter::create_as(version, path, false).unwrap();
     let mut expected = Map::new();
     let image = |group: &str, geometry: &Geometry, element, window| {
         store
@@ -132,10 +132,20 @@ fn write_store(path: &Path, raw: &Path) -> Map<String, Value> {
 
 #[test]
 fn other_programs_read_what_was_written() {
+    check(OmeVersion::V05, "c/0/0/0");
+}
+
+#[test]
+fn other_programs_read_the_older_version() {
+    check(OmeVersion::V04, "0/0/0");
+}
+
+/// Checks a store, and that the check notices a chunk that is not there.
+fn check(version: OmeVersion, first: &str) {
     let Some(interpreter) = python::interpreter() else { return };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.zarr");
-    let expected = write_store(&path, folder.path());
+    let expected = write_store(version, &path, folder.path());
     let groups = expected.len();
     let expect = folder.path().join("expect.json");
     fs::write(&expect, Value::Object(expected).to_string()).unwrap();
@@ -144,11 +154,11 @@ fn other_programs_read_what_was_written() {
     assert_eq!(printed.lines().filter(|line| line.starts_with("ok ")).count(), groups, "{printed}");
 
     // The check itself must notice one wrong voxel of a coarser level and one of the finest.
-    let shard = path.join("labels/segmentation/1/c/0/0/0");
+    let shard = path.join("labels/segmentation/1").join(first);
     fs::remove_file(&shard).unwrap();
     let complaint = python::run_script(interpreter, "check_store.py", &[&path]).unwrap_err();
     assert!(complaint.contains("do not follow from the level before"), "{complaint}");
-    fs::remove_file(path.join("distance/0/c/0/0/0")).unwrap();
+    fs::remove_file(path.join("distance/0").join(first)).unwrap();
     let complaint = python::run_script(interpreter, "check_store.py", &arguments).unwrap_err();
     assert!(complaint.contains("distance"), "{complaint}");
 }

@@ -21,15 +21,17 @@ pub struct Format {
     pub extension: &'static str,
     /// Whether it holds f32 alone: positions far from zero are then written as seen from an anchor.
     pub is_single: bool,
+    /// Whether it is text: the digits of an f32 are then read as another number by who reads f64.
+    pub is_text: bool,
     start: Start,
 }
 
 /// The formats.
 pub const FORMATS: &[Format] = &[
-    Format { name: "PLY", extension: "ply", is_single: false, start: ply::start },
-    Format { name: "OBJ", extension: "obj", is_single: false, start: obj::start },
-    Format { name: "STL", extension: "stl", is_single: true, start: stl::start },
-    Format { name: "VTP", extension: "vtp", is_single: false, start: vtp::start },
+    Format { name: "PLY", extension: "ply", is_single: false, is_text: false, start: ply::start },
+    Format { name: "OBJ", extension: "obj", is_single: false, is_text: true, start: obj::start },
+    Format { name: "STL", extension: "stl", is_single: true, is_text: false, start: stl::start },
+    Format { name: "VTP", extension: "vtp", is_single: false, is_text: false, start: vtp::start },
 ];
 
 impl Format {
@@ -89,7 +91,12 @@ impl MeshFile {
     pub fn create_for(format: &Format, path: &Path, mesh: &TriangleMesh, temporary: &Path) -> Result<Self> {
         let is_single = mesh.vertices.iter().flatten().all(|&v| f64::from(v as f32) == v);
         let anchor = if is_single { [0.0; 3] } else { around(mesh).anchor() };
-        Self::begin(format, path, temporary, &Form { is_double: !is_single, anchor, ..Form::default() })
+        Self::begin(
+            format,
+            path,
+            temporary,
+            &Form { is_double: !is_single || format.is_text, anchor, ..Form::default() },
+        )
     }
 
     /// Where positions are seen from, in a format that holds f32 alone and cannot have them as they are.
