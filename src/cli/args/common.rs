@@ -17,7 +17,7 @@ use crate::pipeline::segment::FillGaps;
 /// Find objects in a 3-D image, guided by border points that were marked on it.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SegmentArgs {
-    /// TIFF stack, a folder with one TIFF file for each slice, or an OME-Zarr image
+    /// TIFF stack, a folder with one TIFF file for each slice, an OME-Zarr image, or an NRRD or VTI volume
     pub(crate) image: PathBuf,
     /// Border points: CSV (x,y,z and optionally object,contour; or tables of napari, Imaris and others), XYZ, PLY,
     /// ROIs (.roi, .zip); - reads standard input. Given several times, the n-th file is object n, and objects named in
@@ -265,7 +265,7 @@ pub(crate) struct MeasureArgs {
 /// Tell what an input or output is.
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// TIFF stack, folder of slices, border points (CSV, XYZ, PLY), OME-Zarr or OUT.zarr
+    /// TIFF stack, folder of slices, NRRD or VTI volume, border points (CSV, XYZ, PLY), OME-Zarr or OUT.zarr
     pub(crate) file: PathBuf,
     #[command(flatten)]
     pub(crate) pages: PagesArgs,

@@ -116,7 +116,7 @@ pub(crate) enum PrecisionArg {
 pub(crate) fn sources_help() -> String {
     let list: Vec<&str> = crate::io::geometry::read::sources::FORMATS.iter().map(|format| format.name).collect();
     format!(
-        "Point clouds and triangle meshes ({}), and label volumes (TIFF, OME-Zarr), told apart by content",
+        "Point clouds and triangle meshes ({}), and label volumes (TIFF, OME-Zarr, NRRD, VTI), told apart by content",
         list.join(", ")
     )
 }

@@ -13,7 +13,7 @@ use strandline::io::stack::volume::Stack;
 use strandline::io::stack::zarr;
 use strandline::store::{ElementType, Sample};
 
-use super::seeds::{images, meshes, pages, rois, slices, tables};
+use super::seeds::{headed, images, in_xml, meshes, pages, rois, slices, tables};
 use crate::common::read_cloud;
 use crate::common::stores;
 
@@ -50,6 +50,8 @@ pub(super) const READERS: &[Reader] = &[
     Reader { name: "rois", endings: &["roi", "zip"], seeds_of: rois, read: sources, blames_input: true },
     Reader { name: "tiff", endings: &["tif", "tiff"], seeds_of: pages, read: pages_of_file, blames_input: true },
     Reader { name: "slices", endings: &[], seeds_of: slices, read: volume, blames_input: true },
+    Reader { name: "nrrd", endings: &["nrrd"], seeds_of: headed, read: pages_of_file, blames_input: true },
+    Reader { name: "vti", endings: &["vti"], seeds_of: in_xml, read: pages_of_file, blames_input: true },
     Reader { name: "zarr", endings: &["zarr"], seeds_of: images, read: image, blames_input: true },
 ];
 

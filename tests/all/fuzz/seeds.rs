@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use strandline::grid::Geometry;
-use strandline::io::ome_zarr::{Content, ImageSpec, StoreWriter};
+use strandline::io::ome_zarr::{Compression, Content, ImageSpec, OmeVersion, StoreWriter};
+use strandline::io::stack::write::formats::{Format as VolumeFormat, VolumeFile, VolumeSpec};
 use strandline::store::Element;
 use zarrs::array::Array;
 use zarrs::filesystem::FilesystemStore;
@@ -61,9 +62,51 @@ pub(super) fn slices() -> Vec<Files> {
     made.iter().map(|(_, bytes)| three(bytes)).collect()
 }
 
+/// NRRD volumes, raw and packed, of either byte order, as others write them and as this program does.
+pub(super) fn headed() -> Vec<Files> {
+    let raw = b"NRRD0005\ntype: short\ndimension: 3\nsizes: 4 3 2\nendian: big\nspacings: 1 1 2\nencoding: raw\n\n";
+    let several = b"NRRD0004\n# a\ntype: uchar\ndimension: 4\nsizes: 2 3 2 2\nbyte skip: -1\nk:=v\nencoding: raw\n\n";
+    let by_hand = [[&raw[..], &[1; 48]].concat(), [&several[..], &[2; 24]].concat()];
+    let files = by_hand.into_iter().chain([Compression::Fast, Compression::None].map(|packed| volume("nrrd", packed)));
+    files.map(|bytes| vec![("input.nrrd".to_owned(), bytes)]).collect()
+}
+
+/// VTI volumes of points and of cells.
+pub(super) fn in_xml() -> Vec<Files> {
+    let points = volume("vti", Compression::None);
+    let place = |bytes: &[u8], part: &[u8]| bytes.windows(part.len()).position(|there| there == part);
+    let end = place(&points, b"<AppendedData").expect("appended data");
+    let cells =
+        String::from_utf8_lossy(&points[..end]).replace("PointData", "CellData").replace("0 4 0 3 0 2", "0 5 0 4 0 3");
+    let short = String::from_utf8_lossy(&points[..end]).replace("UInt64", "UInt32");
+    let all = [
+        points.clone(),
+        [cells.as_bytes(), &points[end..]].concat(),
+        [short.as_bytes(), &points[end..], &[0; 8]].concat(),
+    ];
+    all.map(|bytes| vec![("input.vti".to_owned(), bytes)]).into()
+}
+
+/// A volume of 5 x 4 x 3 voxels as this program writes it.
+fn volume(ending: &str, compression: Compression) -> Vec<u8> {
+    let folder = tempfile::tempdir().expect("room for a file");
+    let path = folder.path().join("seed").with_extension(ending);
+    let geometry = Geometry { unit: Some("micrometer".into()), ..Geometry::new([5, 4, 3], [0.5, 0.5, 2.0], [1.0; 3]) };
+    let spec = VolumeSpec { name: "seed", geometry: &geometry, guessed: [false; 3], element: f32::TYPE, compression };
+    let format = VolumeFormat::of(&path).expect("a format");
+    let mut file = VolumeFile::create(format, &path, &spec).expect("a file");
+    for piece in file.pieces() {
+        let bytes = (0..piece.len()).flat_map(|n| (n as f32).to_le_bytes()).collect();
+        let packed = file.pack(&piece, bytes).expect("a piece");
+        file.append(packed).expect("a piece");
+    }
+    file.finish().expect("a whole file");
+    std::fs::read(&path).expect("a file")
+}
+
 /// Stores that this program writes, and those of plain chunks by hand, of both versions.
 pub(super) fn images() -> Vec<Files> {
-    let mut all = vec![written::<u16>(), written::<u8>(), plain_three(), plain_two()];
+    let mut all = vec![written::<u16>(OmeVersion::V05), written::<u8>(OmeVersion::V04), plain_three(), plain_two()];
     all.extend(codecs().iter().enumerate().map(|(n, codecs)| coded(codecs, n)));
     all
 }
@@ -120,10 +163,10 @@ fn coded(codecs: &Value, number: usize) -> Files {
     files
 }
 
-fn written<T: Element>() -> Files {
+fn written<T: Element>(version: OmeVersion) -> Files {
     let folder = tempfile::tempdir().expect("room for a store");
     let path = folder.path().join("seed.zarr");
-    let store = StoreWriter::create(&path, false).expect("a new store");
+    let store = StoreWriter::create_as(version, &path, false).expect("a new store");
     let geometry =
         Geometry { shape: [5, 4, 3], spacing: [0.5, 0.5, 2.0], origin: [0.0; 3], unit: Some("micrometer".into()) };
     let (element, content) = (T::TYPE, Content::Grey);

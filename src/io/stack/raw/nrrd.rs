@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Seek, SeekFrom};
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 use super::nrrd_fields::{self, Fields};
 use super::planes::{RawVolume, Stored};
@@ -21,14 +21,13 @@ pub(crate) fn open(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
         return Err(Error::usage(what).at(path));
     }
     let (data, start) = voxels(path, &fields).map_err(refuse)?;
-    let (data, start) = (data.as_deref().unwrap_or(path), start);
-    let start = match start {
-        Some(start) => Some(
-            skipped(data, start, &fields)
-                .map_err(|error| Error::input(format!("cannot be read: {error}")).caused_by(error).at(data))?,
-        ),
-        None => None,
-    };
+    let data = data.as_deref().unwrap_or(path);
+    if !data.is_file() {
+        return Err(Error::input("is no file with voxels, as its header has it").at(data));
+    }
+    let unreadable = |error: std::io::Error| Error::input(format!("cannot be read: {error}")).caused_by(error).at(data);
+    let start = start.map(|start| behind_lines(data, start, fields.skip[1])).transpose().map_err(unreadable)?;
+    let bytes = fields.skip[0].max(0).unsigned_abs();
     let volume = fields.sizes[..3].iter().product::<u64>() * u64::from(fields.number.bits() / 8);
     let stored = Stored {
         file: data.to_path_buf(),
@@ -36,7 +35,8 @@ pub(crate) fn open(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
         is_gzip: fields.is_gzip,
         number: fields.number,
         order: fields.order,
-        before: volume * u64::from(select.channel),
+        // Of a packed stream bytes are skipped when it is unpacked.
+        before: (volume * u64::from(select.channel)).saturating_add(bytes),
     };
     Ok(Box::new(RawVolume::new(path, info(&fields, volumes), stored)?))
 }
@@ -58,7 +58,7 @@ fn info(fields: &Fields, volumes: u64) -> StackInfo {
 }
 
 /// The file with the voxels, where it is another one, and the byte at which they begin; none where the file ends with them.
-fn voxels(path: &Path, fields: &Fields) -> std::result::Result<(Option<std::path::PathBuf>, Option<u64>), String> {
+fn voxels(path: &Path, fields: &Fields) -> std::result::Result<(Option<PathBuf>, Option<u64>), String> {
     let start = |first: u64| (fields.skip[0] >= 0).then_some(first);
     let Some(name) = &fields.data_file else { return Ok((None, start(fields.length))) };
     let is_list = name.starts_with("LIST") || name.contains('%') || name.split_whitespace().count() > 1;
@@ -69,10 +69,8 @@ fn voxels(path: &Path, fields: &Fields) -> std::result::Result<(Option<std::path
     Ok((Some(path.with_file_name(name)), start(0)))
 }
 
-/// The place behind the lines and bytes that are to be skipped. Of a stream that is packed, bytes are skipped when it is
-/// unpacked; no more than lines are here.
-fn skipped(path: &Path, start: u64, fields: &Fields) -> std::io::Result<u64> {
-    let [bytes, lines] = fields.skip;
+/// The place behind so many lines.
+fn behind_lines(path: &Path, start: u64, lines: i64) -> std::io::Result<u64> {
     let mut file = BufReader::new(File::open(path)?);
     file.seek(SeekFrom::Start(start))?;
     for _ in 0..lines {
@@ -80,5 +78,5 @@ fn skipped(path: &Path, start: u64, fields: &Fields) -> std::io::Result<u64> {
             break;
         }
     }
-    Ok(file.stream_position()?.saturating_add(bytes.unsigned_abs()))
+    file.stream_position()
 }

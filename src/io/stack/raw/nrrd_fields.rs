@@ -77,6 +77,7 @@ pub(super) fn parse(file: impl BufRead) -> Result<Fields, String> {
 fn lines(file: impl BufRead) -> Result<(BTreeMap<String, String>, u64), String> {
     let mut file = file.take(MOST_BYTES);
     let (mut told, mut length, mut line) = (BTreeMap::new(), 0, Vec::new());
+    let mut is_first = true;
     loop {
         line.clear();
         let read = file.read_until(b'\n', &mut line).map_err(|error| format!("cannot be read: {error}"))?;
@@ -85,6 +86,9 @@ fn lines(file: impl BufRead) -> Result<(BTreeMap<String, String>, u64), String> 
             return Err("has a header of more than 1 MiB".into());
         }
         let text = String::from_utf8_lossy(&line).trim().to_owned();
+        if std::mem::take(&mut is_first) && !text.starts_with("NRRD000") {
+            return Err("does not begin as an NRRD file does, with NRRD and the number of its format".into());
+        }
         if text.is_empty() {
             return Ok((told, length));
         }

@@ -2,7 +2,7 @@
 //! file, as nothing in it can be reached without what comes before.
 
 use std::fs::File;
-use std::io::{BufReader, Seek, SeekFrom};
+use std::io::{BufReader, ErrorKind, Seek, SeekFrom};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -102,7 +102,9 @@ impl RawVolume {
             let what = format!(
                 "cannot be unpacked into a temporary file: {error}; save it raw, or name a roomy folder by TMPDIR"
             );
-            Error::input(what).caused_by_io(&error).at(&self.stored.file)
+            let is_full = [ErrorKind::StorageFull, ErrorKind::QuotaExceeded].contains(&error.kind());
+            let told = if is_full { Error::failed(what) } else { Error::input(what) };
+            told.caused_by_io(&error).at(&self.stored.file)
         })?;
         if held < wanted {
             return Err(
