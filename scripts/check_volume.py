@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Checks volumes written by strandline with other people's programs.
 
-    check_volume.py EXPECT.json FILE...
+    check_volume.py EXPECT.json FILE... [EXPECT.json FILE...]
 
-Each file is read by every reader of its kind that is installed (tifffile, pynrrd, vtk, zarr-python, tensorstore) and must hold
-the same numbers of the same type, as far apart in the same unit, from the same place on:
+Each file, which must hold what the document before it says, is read by every reader of its kind that is installed (tifffile,
+pynrrd, vtk, zarr-python, tensorstore): the same numbers of the same type, as far apart in the same unit, from the same place on.
     {"dtype": "uint16", "shape": [z, y, x], "values": "FILE.raw", "spacing": [x, y, z], "origin": [x, y, z],
      "unit": "micrometer"}
 FILE.raw, relative to EXPECT.json, holds the voxels as little-endian numbers. Keys other than dtype, shape and values are
@@ -131,9 +131,10 @@ def check(path, expected, folder):
 
 
 def main():
-    expect = Path(sys.argv[1])
-    expected = json.loads(expect.read_text())
-    for path in map(Path, sys.argv[2:]):
+    for path in map(Path, sys.argv[1:]):
+        if path.suffix == ".json":
+            expect, expected = path, json.loads(path.read_text())
+            continue
         try:
             for module in check(path, expected, expect.parent):
                 print(f"ok  {path.name}: {module}")

@@ -11,7 +11,7 @@ use crate::job::live::Telling;
 /// # Errors
 /// As [`StoreWriter::create`].
 pub(crate) fn begin_store(output: &OutputArgs, engine: &Engine) -> Result<(Option<StoreWriter>, Option<Telling>)> {
-    let create = if output.live { StoreWriter::create_live } else { StoreWriter::create_as };
+    let create = if output.live { StoreWriter::create_live_as } else { StoreWriter::create_as };
     let begin = |path| Ok(create(output.ome.into(), path, output.overwrite)?.packed(output.compress.into()));
     let store = output.store().map(begin).transpose()?;
     let telling = store.as_ref().and_then(|store| Telling::of(store, engine));

@@ -246,6 +246,26 @@ mod tests {
     }
 
     #[test]
+    fn zarrs_reads_chunks_of_the_older_version_that_were_laid_together() {
+        let shape = [150, 70, 30];
+        let whole: Vec<u16> = (0..150 * 70 * 30).map(|i: u32| (i % 7919) as u16).collect();
+        for packed in [(Content::Grey, Compression::Fast), (Content::Repeated, Compression::Small)] {
+            let folder = tempfile::tempdir().unwrap();
+            let plan = LevelPlan { geometry: Geometry::new(shape, [1.0; 3], [0.0; 3]), factors: [1; 3] };
+            let layout = ShardLayout { chunk: [64, 64, 30], shard: [128, 128, 30], version: OmeVersion::V04 };
+            let path = folder.path().join("0");
+            let level = LevelWriter::create(&path, folder.path(), plan, ElementType::U16, packed, layout).unwrap();
+            let mut values = Vec::new();
+            for shard in level.shards() {
+                Box3::from_shape(shape).cut(&whole, &shard, &mut values);
+                level.write_shard(&shard, &values).unwrap();
+            }
+            assert!(path.join("0/0/1").is_file() && !path.join("0/0/2").exists() && !path.join("0/1").exists());
+            assert!(read_back::<u16>(folder.path()) == whole, "{packed:?}");
+        }
+    }
+
+    #[test]
     fn shards_tile_the_level_once() {
         let folder = tempfile::tempdir().unwrap();
         let level = level(folder.path(), [300, 129, 5], ElementType::F32);

@@ -132,11 +132,15 @@ fn xyz<T: Copy>(list: &Value, number: impl Fn(&Value) -> Option<T>) -> Option<[T
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
+    use crate::io::ome_zarr::{Content, ImageSpec, OmeVersion, StoreWriter};
     use crate::store::ElementType;
 
     #[test]
     fn what_was_written_comes_back() {
+        [OmeVersion::V04, OmeVersion::V05].into_iter().for_each(comes_back);
+    }
+
+    fn comes_back(version: OmeVersion) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.zarr");
         let geometry = Geometry {
@@ -145,7 +149,7 @@ mod tests {
             origin: [1.0, 2.0, 3.0],
             unit: Some("micrometer".into()),
         };
-        let store = StoreWriter::create(&path, false).unwrap();
+        let store = StoreWriter::create_as(version, &path, false).unwrap();
         let spec = ImageSpec {
             name: "image",
             geometry: &geometry,

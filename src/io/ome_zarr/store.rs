@@ -72,7 +72,15 @@ impl StoreWriter {
     ///
     /// # Errors
     /// As [`StoreWriter::create`].
-    pub fn create_live(version: OmeVersion, path: &Path, overwrite: bool) -> Result<Self> {
+    pub fn create_live(path: &Path, overwrite: bool) -> Result<Self> {
+        Self::create_live_as(OmeVersion::default(), path, overwrite)
+    }
+
+    /// The same in a version of OME-Zarr.
+    ///
+    /// # Errors
+    /// As [`StoreWriter::create`].
+    pub fn create_live_as(version: OmeVersion, path: &Path, overwrite: bool) -> Result<Self> {
         let path = resolve(path)?;
         check_target(&path, overwrite)?;
         let root = Arc::new(Root::new(&path, version));

@@ -169,6 +169,7 @@ fn live_image(store: &StoreWriter) -> ImageWriter {
         element: ElementType::U8,
         content: Content::Grey,
         window: None,
+        extremes: None,
     };
     store.image("", &spec).unwrap()
 }
@@ -188,7 +189,7 @@ fn live_stores_stand_there_from_the_start_and_say_what_they_are() {
     let said = || live(&path).unwrap();
     assert_eq!((said().state, said().written), (LiveState::Running, 0));
     let image = live_image(&store);
-    assert_eq!(json(&path.join(METADATA))["attributes"]["ome"]["multiscales"][0]["name"], "image");
+    assert_eq!(json(&path.join("zarr.json"))["attributes"]["ome"]["multiscales"][0]["name"], "image");
     // Nobody else begins it, whatever is allowed.
     for overwrite in [false, true] {
         for create in [StoreWriter::create, StoreWriter::create_live] {
@@ -223,8 +224,8 @@ fn live_stores_that_are_given_up_say_so_or_go() {
     assert_eq!(live(&path).unwrap(), Live { state: LiveState::Interrupted, done: 0.0, written: 1 });
     assert!(path.join("0/c/0/0/0").is_file());
     // Who says running and is gone is interrupted.
-    let document = fs::read_to_string(path.join(METADATA)).unwrap().replace("interrupted", "running");
-    fs::write(path.join(METADATA), document).unwrap();
+    let document = fs::read_to_string(path.join("zarr.json")).unwrap().replace("interrupted", "running");
+    fs::write(path.join("zarr.json"), document).unwrap();
     assert_eq!(live(&path).unwrap().state, LiveState::Interrupted);
     let store = StoreWriter::create_live(&path, true).unwrap();
     write_all(&live_image(&store), 8);
@@ -240,4 +241,26 @@ fn stores_that_are_not_live_say_nothing() {
     write_store(&path, false, 3).unwrap();
     assert_eq!(live(&path), None);
     assert_eq!(live(folder.path()), None);
+}
+
+#[test]
+fn live_stores_of_both_versions_say_how_far_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.zarr");
+    let state = || live(&path).map(|live| live.state);
+    for version in [OmeVersion::V04, OmeVersion::V05] {
+        let store = StoreWriter::create_live_as(version, &path, true).unwrap();
+        assert_eq!(state(), Some(LiveState::Running), "{version:?}");
+        let spec = LabelSpec { name: "a", geometry: &geometry(), element: ElementType::U8, colors: &[] };
+        store.labels(&spec).unwrap();
+        store.finish().unwrap();
+        assert_eq!(state(), Some(LiveState::Complete), "{version:?}");
+        let names: &[&str] = if version == OmeVersion::V04 { &[".zattrs", ".zgroup"] } else { &["zarr.json"] };
+        for folder in ["", "labels", "labels/a"] {
+            let found = entries(&path.join(folder));
+            assert!(names.iter().all(|name| found.iter().any(|found| found == name)), "{folder}: {found:?}");
+        }
+    }
+    let attributes = json(&path.join("labels/a/zarr.json"));
+    assert_eq!(attributes["attributes"]["ome"]["image-label"]["source"]["image"], "../../");
 }
