@@ -8,6 +8,8 @@ Exit code 1 where anything is not as it must be.
 """
 
 import argparse
+import contextlib
+import io
 import os
 import resource
 import subprocess
@@ -17,6 +19,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+
 from check_volume import Failure, check, require
 from interrupting.runs import ball_marks, stack
 
@@ -83,9 +86,12 @@ def check_stores(folder):
     checker = Path(os.environ["STRANDLINE_ROOT"]) / "scripts/check_store.py"
     for version in ("0.4", "0.5"):
         store = folder / f"s{version}.zarr"
-        run("segment", folder / "stack.tif", "--points", folder / "marks.csv", "--image-spacing", "1,1,1", "-q", "-o", store, "--ome", version)
+        inputs = [folder / "stack.tif", "--points", folder / "marks.csv", "--image-spacing", "1,1,1"]
+        run("segment", *inputs, "-q", "--ome", version, "-o", store)
         subprocess.run([sys.executable, checker, store], check=True)
-        layers = napari_get_reader(str(store))(str(store))
+        # It prints the attributes.
+        with contextlib.redirect_stdout(io.StringIO()):
+            layers = napari_get_reader(str(store))(str(store))
         kinds = [layer[2] for layer in layers]
         require(kinds == ["image", "labels"], f"napari's layers are {kinds}")
         (image, told, _), (labels, colored, _) = layers
