@@ -100,7 +100,7 @@ fn volume(ending: &str, compression: Compression) -> Vec<u8> {
         let packed = file.pack(&piece, bytes).expect("a piece");
         file.append(packed).expect("a piece");
     }
-    file.finish().expect("a whole file");
+    file.finish(false).expect("a whole file");
     std::fs::read(&path).expect("a file")
 }
 
