@@ -15,7 +15,7 @@ use strandline::pipeline::distance::{
     Early, Method, Options, Passed, SOLVERS, Schedule, Solved, Sources, solve_watched,
 };
 
-use crate::common::ball::Bench;
+use crate::common::ball::{Ball, Bench, HEADER, write_stack};
 use crate::common::lab::Lab;
 use crate::common::random::Random;
 
@@ -126,6 +126,38 @@ fn live_runs_leave_the_bits_of_others() {
         assert!(plain == live, "{name}");
         let root = fs::read_to_string(bench.path(&format!("{name}-live.zarr/zarr.json"))).unwrap();
         assert!(root.contains("\"complete\""), "{root}");
+    }
+}
+
+/// Two objects, apart and so near that what one is depends on the other, with small shards of labels between them.
+#[test]
+fn live_segmentations_leave_the_bits_of_others() {
+    for (case, between, flags) in [("apart", 24.0, ""), ("near", 11.5, ""), ("shared", 12.5, "--fill-gaps 2")] {
+        let first = Ball::large();
+        let mut geometry = first.geometry.clone();
+        geometry.shape[0] = 500;
+        let ball = |x: f64| Ball { geometry: geometry.clone(), centre: [x, 9.0, 9.5], radius: 6.0 };
+        let balls = [ball(8.0), ball(8.0 + between)];
+        let bench = Bench::bare();
+        let [a, b] = [&balls[0], &balls[1]].map(Ball::voxels);
+        let voxels: Vec<u16> = a.iter().zip(&b).map(|(a, b)| *a.max(b)).collect();
+        write_stack(&bench.path("image.tif"), &geometry, &[&voxels]);
+        bench.write("marks.csv", &format!("{HEADER}{}{}", balls[0].marks(1), balls[1].marks(2)));
+        let command = format!("segment image.tif --points marks.csv --image none {flags} -q --memory 1GiB");
+        bench.succeed(&format!("{command} -o plain.zarr"));
+        bench.succeed(&format!("{command} --live -o live.zarr"));
+        let [plain, live] = ["plain", "live"].map(|name| contents(&bench.path(&format!("{name}.zarr"))));
+        let names = |found: &[(PathBuf, Vec<u8>)]| found.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
+        // Shards of coarser levels are smaller in a live store; the finest ones are the same.
+        let finest = |found: Vec<(PathBuf, Vec<u8>)>| -> Vec<(PathBuf, Vec<u8>)> {
+            found.into_iter().filter(|(path, _)| !path.iter().any(|name| name == "1" || name == "2")).collect()
+        };
+        let [plain, live] = [finest(plain), finest(live)];
+        assert_eq!(names(&plain), names(&live), "{case}");
+        for (plain, live) in plain.iter().zip(&live) {
+            assert!(plain == live, "{case}: {}", plain.0.display());
+        }
+        assert!(!bench.path("live.zarr/growing").exists());
     }
 }
 

@@ -17,6 +17,8 @@ use crate::store::{BoxSource, BrickArray};
 pub const FOLDER: &str = "growing";
 /// Voxels that it is drawn on at most: small enough for any viewer.
 const MOST_VOXELS: u64 = 2 << 20;
+/// Bytes that drawing it takes: the voxels, its patches, what is known of their edges.
+const BYTES: u64 = 32 << 20;
 /// Time between two drawings, and how many times longer than one takes: it is to cost a fiftieth of the run at most.
 const BETWEEN: Duration = Duration::from_millis(500);
 const TIMES_LONGER: u32 = 50;
@@ -48,6 +50,8 @@ impl<'a> Growing<'a> {
         if began < self.due {
             return Ok(());
         }
+        // Where there is no room for it beside what is solved, it is not shown.
+        let Ok(_held) = engine.hold(BYTES) else { return Ok(()) };
         let shape = u.set().grid().shape();
         let step = step_for(shape);
         let quiet = engine.beside();

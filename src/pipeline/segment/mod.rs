@@ -10,6 +10,7 @@ pub(crate) mod begun;
 pub mod checks;
 mod estimate;
 mod kept;
+mod label_image;
 mod labels;
 mod marks_table;
 mod meshes;

@@ -1,6 +1,7 @@
 //! All objects: looked at together, solved each for itself, small ones side by side; their surfaces drawn and checked.
 
 use super::begun::Solution;
+use super::label_image::early::Early;
 use super::meshes::{ObjectMeshes, Surface};
 use super::object::solve;
 use super::object_report::ObjectReport;
@@ -40,6 +41,7 @@ pub(super) fn solve_all<T: Element>(
     guides: &Guides<'_>,
     settings: &SegmentSettings,
     (store, meshes): (Option<&StoreWriter>, Option<&dyn ObjectMeshes>),
+    early: Option<&dyn Early>,
 ) -> Result<Objects> {
     let (objects, mut refused) = (guides.objects, guides.refused.to_vec());
     let several = objects.len() + refused.len() > 1;
@@ -55,6 +57,7 @@ pub(super) fn solve_all<T: Element>(
         let solved = solve(engine, &picture, &local[n], outlined.zip(trusts[n]), settings).and_then(|solution| {
             let solution = solution.moved(origin);
             let mut report = draw(engine, &solution, &objects[n], settings, (store, meshes), several)?;
+            early.map_or(Ok(()), |early| early.rest(engine, n, report.label, &solution))?;
             if let Some(outlined) = outlined.filter(|_| settings.cross_validate) {
                 report.cross_validation = cross_validate(engine, outlined, &grid)?;
             }

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use super::begun::Solution;
 use super::estimate::estimate;
 use super::kept::{Kept, labels_of, objects_of};
+use super::label_image::early::begin_early;
+use super::label_image::write::write_labels;
 use super::labels::Placed;
 use super::marks_table::write_marks;
 use super::meshes::ObjectMeshes;
-use super::neighbours::{Found, Joined};
+use super::neighbours::Found;
 use super::object_report::ObjectReport;
 use super::object_report::Refused;
 use super::objects::{Objects, solve_all};
@@ -16,15 +18,13 @@ use super::picture::{Picture, World};
 use super::settings::{Guides, SegmentSettings};
 use super::tissue::{join_objects, write_faces};
 use crate::error::{Error, Result};
-use crate::exec::{Engine, Stage, Workers};
-use crate::grid::{Box3, BrickGrid, Geometry};
-use crate::io::ome_zarr::{Content, ImageSpec, LabelColor, LabelSpec, StoreWriter};
-use crate::kernel::image::labels;
-use crate::kernel::image::picture::palette::label_color;
+use crate::exec::Engine;
+use crate::grid::{Box3, Geometry};
+use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::Contact;
 use crate::pipeline::image::ingest::{Image, ingest};
 use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
-use crate::store::{BoxSource, Element, ElementType, Sample, SampleWork, VolumeSource};
+use crate::store::{ElementType, Sample, SampleWork, VolumeSource};
 
 /// What a segmentation found.
 #[derive(Clone, Debug)]
@@ -135,9 +135,11 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
         write_image(engine, guides.geometry, &image, store)?;
     }
     let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry, world, shown_in };
-    let Objects { solved, refused } = solve_all(engine, &picture, guides, settings, (store, meshes))?;
+    let early = shown_in.map(|store| begin_early(engine, guides, settings, store)).transpose()?;
+    let early = early.as_deref();
+    let Objects { solved, refused } = solve_all(engine, &picture, guides, settings, (store, meshes), early)?;
     let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
-    let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, store)?;
+    let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, (store, early))?;
     let contacts = match solved.len() {
         0 | 1 => Vec::new(),
         _ => write_faces(engine, guides.geometry, &joined, settings, store)?,
@@ -166,66 +168,6 @@ fn placed(solved: &[(Solution, ObjectReport)]) -> Vec<Placed<'_>> {
         .iter()
         .map(|(s, report)| Placed { label: report.label, window: s.window, u: &s.u, volume: report.measures.volume })
         .collect()
-}
-
-fn write_labels(
-    engine: &Engine,
-    geometry: &Geometry,
-    volume: &Joined<'_>,
-    solved: &[(Solution, ObjectReport)],
-    store: Option<&StoreWriter>,
-) -> Result<BTreeMap<u32, u64>> {
-    let stage = engine.stage("write labels", 0);
-    stage.voxels(geometry.domain().volume());
-    let highest = solved.iter().map(|(_, r)| r.label).max().unwrap_or(0);
-    let counts = match highest {
-        0..=0xff => write_labels_as::<u8>(&stage, engine, geometry, volume, solved, store),
-        0x100..=0xffff => write_labels_as::<u16>(&stage, engine, geometry, volume, solved, store),
-        _ => write_labels_as::<u32>(&stage, engine, geometry, volume, solved, store),
-    }?;
-    stage.finish();
-    Ok(counts)
-}
-
-fn write_labels_as<T: Element>(
-    stage: &Stage<'_>,
-    engine: &Engine,
-    geometry: &Geometry,
-    volume: &Joined<'_>,
-    solved: &[(Solution, ObjectReport)],
-    store: Option<&StoreWriter>,
-) -> Result<BTreeMap<u32, u64>> {
-    if let Some(store) = store {
-        let colors: Vec<LabelColor> = solved
-            .iter()
-            .map(|(_, r)| {
-                let [red, green, blue] = label_color(r.label);
-                LabelColor { label: r.label, rgba: [red, green, blue, 255] }
-            })
-            .collect();
-        let spec = LabelSpec { name: "segmentation", geometry, element: T::TYPE, colors: &colors };
-        let image = store.labels(&spec)?;
-        write_levels::<T>(stage, engine, image, volume, (Reduce::Mode, First::Finest))?;
-    }
-    count_labels(stage, geometry, volume)
-}
-
-/// Voxels of each label.
-fn count_labels(stage: &Stage<'_>, geometry: &Geometry, volume: &Joined<'_>) -> Result<BTreeMap<u32, u64>> {
-    let grid = BrickGrid::new(geometry.shape, 64);
-    let parts: Vec<Box3> = (0..grid.len()).map(|id| grid.brick_box(id)).collect();
-    let counts = stage.run(&parts, &Workers::new(Vec::new), |labels, part| {
-        if BoxSource::<u32>::constant_in(volume, part) == Some(0) {
-            return Ok(BTreeMap::new());
-        }
-        labels.resize(part.len(), 0);
-        volume.read_box(part, labels)?;
-        Ok(labels::count(labels))
-    })?;
-    Ok(counts.into_iter().flatten().fold(BTreeMap::new(), |mut all, (label, n)| {
-        *all.entry(label).or_default() += n;
-        all
-    }))
 }
 
 fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>, store: &StoreWriter) -> Result<()> {

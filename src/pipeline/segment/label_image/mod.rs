@@ -1,0 +1,4 @@
+//! The label volume on its way into a store: while objects are still solved, or at the end.
+
+pub(super) mod early;
+pub(super) mod write;

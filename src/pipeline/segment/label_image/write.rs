@@ -1,0 +1,92 @@
+//! The label volume on its way into a store, and how many voxels each label has.
+
+use std::collections::BTreeMap;
+
+use super::early::Early;
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers};
+use crate::grid::{Box3, BrickGrid, Geometry};
+use crate::io::ome_zarr::{ImageWriter, LabelColor, LabelSpec, StoreWriter};
+use crate::kernel::image::labels;
+use crate::kernel::image::picture::palette::label_color;
+use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
+use crate::pipeline::segment::begun::Solution;
+use crate::pipeline::segment::neighbours::Joined;
+use crate::pipeline::segment::object_report::ObjectReport;
+use crate::store::{BoxSource, Element, ElementType};
+
+/// The smallest type that holds labels up to one.
+pub(super) fn type_for(highest: u32) -> ElementType {
+    match highest {
+        0..=0xff => ElementType::U8,
+        0x100..=0xffff => ElementType::U16,
+        _ => ElementType::U32,
+    }
+}
+
+/// Begins the image of some labels.
+pub(super) fn begin_image<T: Element>(
+    store: &StoreWriter,
+    geometry: &Geometry,
+    labels: impl Iterator<Item = u32>,
+) -> Result<ImageWriter> {
+    let color = |label| {
+        let [red, green, blue] = label_color(label);
+        LabelColor { label, rgba: [red, green, blue, 255] }
+    };
+    let colors: Vec<LabelColor> = labels.map(color).collect();
+    store.labels(&LabelSpec { name: "segmentation", geometry, element: T::TYPE, colors: &colors })
+}
+
+/// Writes what is not written of the labels, and counts their voxels.
+pub(crate) fn write_labels(
+    engine: &Engine,
+    geometry: &Geometry,
+    volume: &Joined<'_>,
+    solved: &[(Solution, ObjectReport)],
+    (store, early): (Option<&StoreWriter>, Option<&dyn Early>),
+) -> Result<BTreeMap<u32, u64>> {
+    let stage = engine.stage("write labels", 0);
+    stage.voxels(geometry.domain().volume());
+    match (store, early) {
+        (_, Some(early)) => early.finish(&stage, engine, volume)?,
+        (Some(store), None) => {
+            let labels = || solved.iter().map(|(_, report)| report.label);
+            match type_for(labels().max().unwrap_or(0)) {
+                ElementType::U8 => {
+                    write_as::<u8>(&stage, engine, begin_image::<u8>(store, geometry, labels())?, volume)
+                }
+                ElementType::U16 => {
+                    write_as::<u16>(&stage, engine, begin_image::<u16>(store, geometry, labels())?, volume)
+                }
+                _ => write_as::<u32>(&stage, engine, begin_image::<u32>(store, geometry, labels())?, volume),
+            }?;
+        }
+        (None, None) => {}
+    }
+    let counts = count_labels(&stage, geometry, volume)?;
+    stage.finish();
+    Ok(counts)
+}
+
+fn write_as<T: Element>(stage: &Stage<'_>, engine: &Engine, image: ImageWriter, volume: &Joined<'_>) -> Result<()> {
+    write_levels::<T>(stage, engine, image, volume, (Reduce::Mode, First::Finest))
+}
+
+/// Voxels of each label.
+fn count_labels(stage: &Stage<'_>, geometry: &Geometry, volume: &Joined<'_>) -> Result<BTreeMap<u32, u64>> {
+    let grid = BrickGrid::new(geometry.shape, 64);
+    let parts: Vec<Box3> = (0..grid.len()).map(|id| grid.brick_box(id)).collect();
+    let counts = stage.run(&parts, &Workers::new(Vec::new), |labels, part| {
+        if BoxSource::<u32>::constant_in(volume, part) == Some(0) {
+            return Ok(BTreeMap::new());
+        }
+        labels.resize(part.len(), 0);
+        volume.read_box(part, labels)?;
+        Ok(labels::count(labels))
+    })?;
+    Ok(counts.into_iter().flatten().fold(BTreeMap::new(), |mut all, (label, n)| {
+        *all.entry(label).or_default() += n;
+        all
+    }))
+}
