@@ -3,40 +3,17 @@
 use std::collections::BTreeMap;
 
 use super::early::Early;
+use super::image::{begin_image, type_for};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, Geometry};
-use crate::io::ome_zarr::{ImageWriter, LabelColor, LabelSpec, StoreWriter};
+use crate::io::ome_zarr::{ImageWriter, StoreWriter};
 use crate::kernel::image::labels;
-use crate::kernel::image::picture::palette::label_color;
 use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
 use crate::pipeline::segment::begun::Solution;
 use crate::pipeline::segment::neighbours::Joined;
 use crate::pipeline::segment::object_report::ObjectReport;
 use crate::store::{BoxSource, Element, ElementType};
-
-/// The smallest type that holds labels up to one.
-pub(super) fn type_for(highest: u32) -> ElementType {
-    match highest {
-        0..=0xff => ElementType::U8,
-        0x100..=0xffff => ElementType::U16,
-        _ => ElementType::U32,
-    }
-}
-
-/// Begins the image of some labels.
-pub(super) fn begin_image<T: Element>(
-    store: &StoreWriter,
-    geometry: &Geometry,
-    labels: impl Iterator<Item = u32>,
-) -> Result<ImageWriter> {
-    let color = |label| {
-        let [red, green, blue] = label_color(label);
-        LabelColor { label, rgba: [red, green, blue, 255] }
-    };
-    let colors: Vec<LabelColor> = labels.map(color).collect();
-    store.labels(&LabelSpec { name: "segmentation", geometry, element: T::TYPE, colors: &colors })
-}
 
 /// Writes what is not written of the labels, and counts their voxels.
 pub(crate) fn write_labels(
