@@ -73,7 +73,7 @@ impl Error {
     /// A run that a signal ended.
     #[must_use]
     pub fn interrupted(signal: i32) -> Self {
-        Self::new(ErrorKind::Interrupted { signal }, "interrupted; nothing was left half-written")
+        Self::new(ErrorKind::Interrupted { signal }, "interrupted; nothing is left that looks complete and is not")
     }
 
     /// An input/output failure of the operating system while doing `what`.

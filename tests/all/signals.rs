@@ -8,7 +8,7 @@ use crate::common::ball::{Ball, Bench};
 use crate::common::held::{Ended, Held};
 
 const RUN: &str = "segment image.tif --points marks.csv -o out/x.zarr -v";
-const SENTENCE: &str = "strandline: interrupted; nothing was left half-written";
+const SENTENCE: &str = "strandline: interrupted; nothing is left that looks complete and is not";
 
 /// True for the line that says how far a slow stage is.
 fn is_progress(line: &str) -> bool {
