@@ -69,6 +69,11 @@ const look = async (browser, store, wanted) => {
     const session = await page.createCDPSession();
     await session.send("Network.enable");
     session.on("Network.loadingFinished", (event) => (bytes += event.encodedDataLength));
+    // Chunks are fetched by workers.
+    page.on("workercreated", (worker) => {
+      worker.client.on("Network.loadingFinished", (event) => (bytes += event.encodedDataLength));
+      worker.client.send("Network.enable").catch(() => {});
+    });
     await page.goto(url);
     await page.waitForFunction(() => window.viewer?.layerManager.managedLayers.length > 0 && window.viewer.isReady(), {
       timeout: 1000 * PATIENCE,
@@ -85,7 +90,7 @@ const look = async (browser, store, wanted) => {
         if (seen < ENOUGH) faults.push(`${what} is not to be seen`);
       }
     }
-    console.log(`${store}: ${(bytes / 1e6).toFixed(2)} MB loaded by the page itself`);
+    console.log(`${store}: ${(bytes / 1e6).toFixed(2)} MB loaded`);
     await page.close();
   } finally {
     server.kill("SIGINT");

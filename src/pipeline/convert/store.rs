@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage};
 use crate::grid::Geometry;
 use crate::io::ome_zarr::{Content, ImageSpec, ImageWriter, LabelColor, LabelSpec, StoreWriter};
-use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
+use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::store::{BoxSource, Element, ElementType};
 
 /// What the voxels of an image are.
@@ -62,6 +62,6 @@ pub(super) struct Writing<'a> {
 
 impl Work for Writing<'_> {
     fn on<T: Element>(self, voxels: &dyn BoxSource<T>) -> Result<()> {
-        write_levels::<T>(self.stage, self.engine, self.image, voxels, (self.reduce, First::Finest))
+        write_levels::<T>(self.stage, self.engine, self.image, voxels, self.reduce)
     }
 }

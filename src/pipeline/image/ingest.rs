@@ -3,6 +3,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::as_read::AsRead;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet};
@@ -21,7 +22,7 @@ pub struct Image<T: Element> {
 }
 
 /// Reads the part `crop` of a volume into bricks, by the boxes in which it is stored; `percentiles` (0..100) of its values
-/// become black and white. `stage` counts those boxes.
+/// become black and white. `stage` counts those boxes; `as_read` is told of each.
 ///
 /// # Errors
 /// When the volume cannot be read, holds a value that is no number, or scratch runs out.
@@ -32,6 +33,7 @@ pub fn ingest<T: Sample>(
     crop: &Box3,
     edge: i64,
     percentiles: [f64; 2],
+    as_read: Option<&AsRead<T>>,
 ) -> Result<Image<T>> {
     let set = Arc::new(BrickSet::dense(BrickGrid::new(crop.shape(), edge)));
     let bricks = BrickArray::<T>::new(engine.scratch(), &set)?;
@@ -41,7 +43,9 @@ pub fn ingest<T: Sample>(
     stage.run(&volume.natural_boxes(crop), &workers, |voxels, part| {
         voxels.resize(part.len(), T::default());
         volume.read_box(part, T::buffer(voxels))?;
-        bricks.write_box(&part.translate(crop.lo.map(|v| -v)), voxels);
+        let own = part.translate(crop.lo.map(|v| -v));
+        bricks.write_box(&own, voxels);
+        as_read.map_or(Ok(()), |as_read| as_read.read(&own, &bricks))?;
         let idle = histograms.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut histogram = idle.unwrap_or_default();
         if let Err(place) = histogram.add(voxels) {

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry};
-use crate::io::ome_zarr::{ImageWriter, LevelWriter, StoreWriter, joined_bytes, plan_levels, shard_bytes};
+use crate::io::ome_zarr::{ImageWriter, LevelWriter, joined_bytes, plan_levels, shard_bytes};
 use crate::kernel::image::filter::downsample;
 use crate::kernel::image::filter::downsample::coarse_box;
 use crate::store::{BoxSource, BrickArray, Element, ElementType};
@@ -108,12 +108,18 @@ impl<T: Element> Pyramid<T> {
     }
 
     /// Takes a chunk of the finest level for that alone.
-    fn put_finest(&self, chunk: &Box3, values: &[T]) -> Result<()> {
+    ///
+    /// # Errors
+    /// When its shard cannot be written.
+    pub(crate) fn put_finest(&self, chunk: &Box3, values: &[T]) -> Result<()> {
         self.finest().write_chunk(chunk, values).map(|_| ())
     }
 
-    /// Takes a chunk of the finest level for the coarser ones.
-    fn put_coarser(&self, chunk: &Box3, values: &[T], buffer: &mut Vec<T>) -> Result<()> {
+    /// Takes a chunk of the finest level for the coarser ones; `buffer` is scratch.
+    ///
+    /// # Errors
+    /// When a shard cannot be written.
+    pub(crate) fn put_coarser(&self, chunk: &Box3, values: &[T], buffer: &mut Vec<T>) -> Result<()> {
         let mut whole = self.reduce_into(1, chunk, values, buffer);
         let mut voxels = Vec::new();
         while let Some((n, shard)) = whole.take() {
@@ -211,25 +217,6 @@ pub(crate) fn held(geometry: &Geometry, elements: &[ElementType], threads: u64) 
     elements.iter().map(bytes).fold(joined.unwrap_or(0), u64::saturating_add)
 }
 
-/// Which levels of an image are written first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum First {
-    /// The finest: its voxels are read once.
-    Finest,
-    /// The coarser ones, for who looks on: its voxels are read twice.
-    Coarser,
-}
-
-impl First {
-    /// What suits a store.
-    pub(crate) fn of(store: &StoreWriter) -> Self {
-        if store.live().is_some() { Self::Coarser } else { Self::Finest }
-    }
-}
-
-/// Takes a chunk: its box, its voxels, scratch.
-type Put<'a, T> = &'a (dyn Fn(&Box3, &[T], &mut Vec<T>) -> Result<()> + Sync);
-
 /// Fills all levels of an image from `source`.
 ///
 /// # Errors
@@ -239,39 +226,30 @@ pub fn write_levels<T: Element>(
     engine: &Engine,
     image: ImageWriter,
     source: &dyn BoxSource<T>,
-    (reduce, first): (Reduce, First),
+    reduce: Reduce,
 ) -> Result<()> {
     let pyramid = Pyramid::new(engine, image, reduce)?;
     let workers = Workers::new(|| (Vec::new(), Vec::new()));
     let visits = visits([pyramid.finest()], engine.threads());
-    let twice = first == First::Coarser && !pyramid.coarser.is_empty();
-    stage.expect(visits.len() as u64 * if twice { 2 } else { 1 });
-    let visit_all = |put: Put<'_, T>| {
-        stage.run(&visits, &workers, |(values, buffer), visit| {
-            visit.iter().try_for_each(|chunk| {
-                values.resize(chunk.len(), T::default());
-                if source.constant_in(chunk) == Some(T::default()) {
-                    values.fill(T::default());
-                } else {
-                    source.read_box(chunk, values)?;
-                }
-                put(chunk, values, buffer)
-            })
+    stage.expect(visits.len() as u64);
+    stage.run(&visits, &workers, |(values, buffer), visit| {
+        visit.iter().try_for_each(|chunk| {
+            values.resize(chunk.len(), T::default());
+            if source.constant_in(chunk) == Some(T::default()) {
+                values.fill(T::default());
+            } else {
+                source.read_box(chunk, values)?;
+            }
+            pyramid.put(chunk, values, buffer)
         })
-    };
-    if twice {
-        visit_all(&|chunk, values, buffer| pyramid.put_coarser(chunk, values, buffer))?;
-        visit_all(&|chunk, values, _| pyramid.put_finest(chunk, values))?;
-    } else {
-        visit_all(&|chunk, values, buffer| pyramid.put(chunk, values, buffer))?;
-    }
+    })?;
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::ome_zarr::{Content, ImageSpec};
+    use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 
     #[test]
     fn visits_take_each_chunk_once_shard_by_shard() {

@@ -17,7 +17,7 @@ use crate::pipeline::level_set::band::Band;
 use crate::pipeline::level_set::growing::Growing;
 use crate::pipeline::level_set::ranks::evolve_on_ranks;
 use crate::pipeline::level_set::time_loop::Evolution;
-use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
+use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 
@@ -107,7 +107,7 @@ impl Reconstruction {
             };
             let stage = engine.stage(&format!("write {name}"), 0);
             stage.voxels(geometry.domain().volume());
-            write_levels::<f32>(&stage, engine, store.image(group, &spec)?, field, (Reduce::Mean, First::Finest))?;
+            write_levels::<f32>(&stage, engine, store.image(group, &spec)?, field, Reduce::Mean)?;
             stage.finish();
         }
         Ok(())

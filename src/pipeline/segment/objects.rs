@@ -20,7 +20,7 @@ use crate::kernel::surface::Hausdorff;
 use crate::pipeline::enclosure::needs::SOLVE_BYTES;
 use crate::pipeline::enclosure::region::voxel_bounds;
 use crate::pipeline::marks::ObjectMarks;
-use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
+use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::{Element, ElementType};
 
@@ -186,7 +186,7 @@ fn write_fields(engine: &Engine, solution: &Solution, label: u32, store: &StoreW
         let group = if several { format!("{name}/object-{label}") } else { name.into() };
         let spec = ImageSpec { name, geometry, element, content, window: Some([0.0, high]), extremes: None };
         let stage = engine.stage(&format!("write {name} {label}"), 0);
-        write_levels::<f32>(&stage, engine, store.image(&group, &spec)?, field, (Reduce::Mean, First::Finest))?;
+        write_levels::<f32>(&stage, engine, store.image(&group, &spec)?, field, Reduce::Mean)?;
         stage.finish();
     }
     Ok(())

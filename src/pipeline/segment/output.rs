@@ -22,8 +22,9 @@ use crate::exec::Engine;
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::Contact;
+use crate::pipeline::image::as_read::AsRead;
 use crate::pipeline::image::ingest::{Image, ingest};
-use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
+use crate::pipeline::output::pyramid::{Reduce, held, write_levels};
 use crate::store::{ElementType, Sample, SampleWork, VolumeSource};
 
 /// What a segmentation found.
@@ -109,7 +110,9 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let needs = estimate(stack, crop, guides, settings, engine.threads() as u64, store.is_some());
     let _held = engine.reserve(needs.footprint)?;
     let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
-    let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles)?;
+    let shown_in = store.filter(|store| store.live().is_some());
+    let as_read = shown_in.map(|store| begin_image::<T>(engine, guides.geometry, store)).transpose()?.flatten();
+    let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles, as_read.as_ref())?;
     stage.finish();
     if settings.uses_image() && image.extremes[0] == image.extremes[1] {
         let value = image.extremes[0];
@@ -127,13 +130,18 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
             None => error,
         });
     }
+    if let Some((store, as_read)) = shown_in.zip(as_read.as_ref()) {
+        let stage = engine.stage("write image", 0);
+        stage.voxels(guides.geometry.domain().volume());
+        store.describe("", &image_spec(guides.geometry, &image))?;
+        as_read.finish(&stage, engine, &image.bricks)?;
+        stage.finish();
+    }
+    let is_written = as_read.is_some();
+    drop(as_read);
     let origin = guides.geometry.position(crop.lo.map(|v| -v));
     let whole = Geometry { shape: stack.shape(), origin, ..guides.geometry.clone() };
     let world = World { whole: &whole, origin: guides.geometry.origin };
-    let shown_in = store.filter(|store| store.live().is_some());
-    if let Some(store) = shown_in {
-        write_image(engine, guides.geometry, &image, store)?;
-    }
     let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry, world, shown_in };
     let early = shown_in.map(|store| begin_early(engine, guides, settings, store)).transpose()?;
     let early = early.as_deref();
@@ -148,7 +156,7 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let labels = keeps.then(|| labels_of(engine, guides.geometry, &joined)).transpose()?;
     drop(joined);
     if let Some(store) = store {
-        if shown_in.is_none() {
+        if !is_written {
             write_image(engine, guides.geometry, &image, store)?;
         }
         write_marks(store, guides.objects)?;
@@ -170,13 +178,25 @@ fn placed(solved: &[(Solution, ObjectReport)]) -> Vec<Placed<'_>> {
         .collect()
 }
 
+fn image_spec<'a, T: Sample>(geometry: &'a Geometry, image: &Image<T>) -> ImageSpec<'a> {
+    let window = Some([image.range.low, image.range.high]);
+    let (element, content, extremes) = (T::TYPE, Content::Grey, Some(image.extremes));
+    ImageSpec { name: "image", geometry, element, content, window, extremes }
+}
+
+/// Begins the image of a live store; nothing where there is no room for it beside what reads it.
+fn begin_image<T: Sample>(engine: &Engine, geometry: &Geometry, store: &StoreWriter) -> Result<Option<AsRead<T>>> {
+    let Ok(held) = engine.hold(held(geometry, &[T::TYPE], engine.threads() as u64)) else { return Ok(None) };
+    let (element, content) = (T::TYPE, Content::Grey);
+    let spec = ImageSpec { name: "image", geometry, element, content, window: None, extremes: None };
+    AsRead::new(engine, store.image("", &spec)?, geometry, held).map(Some)
+}
+
 fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>, store: &StoreWriter) -> Result<()> {
     let stage = engine.stage("write image", 0);
     stage.voxels(geometry.domain().volume());
-    let window = Some([image.range.low, image.range.high]);
-    let (element, content, extremes) = (T::TYPE, Content::Grey, Some(image.extremes));
-    let written = store.image("", &ImageSpec { name: "image", geometry, element, content, window, extremes })?;
-    write_levels::<T>(&stage, engine, written, &image.bricks, (Reduce::Mean, First::of(store)))?;
+    let written = store.image("", &image_spec(geometry, image))?;
+    write_levels::<T>(&stage, engine, written, &image.bricks, Reduce::Mean)?;
     stage.finish();
     Ok(())
 }

@@ -9,7 +9,7 @@ use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, Geometry};
 use crate::io::ome_zarr::{ImageWriter, StoreWriter};
 use crate::kernel::image::labels;
-use crate::pipeline::output::pyramid::{First, Reduce, write_levels};
+use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::segment::begun::Solution;
 use crate::pipeline::segment::neighbours::Joined;
 use crate::pipeline::segment::object_report::ObjectReport;
@@ -47,7 +47,7 @@ pub(crate) fn write_labels(
 }
 
 fn write_as<T: Element>(stage: &Stage<'_>, engine: &Engine, image: ImageWriter, volume: &Joined<'_>) -> Result<()> {
-    write_levels::<T>(stage, engine, image, volume, (Reduce::Mode, First::Finest))
+    write_levels::<T>(stage, engine, image, volume, Reduce::Mode)
 }
 
 /// Voxels of each label.
