@@ -227,7 +227,7 @@ impl SolvedReconstruction {
     /// How the time loop ended.
     #[must_use]
     pub fn evolution(&self) -> Evolution {
-        self.found.evolution
+        self.found.evolution.clone()
     }
 
     /// What should be known of the points, one sentence each.

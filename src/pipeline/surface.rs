@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, Geometry};
 use crate::kernel::surface::{
-    Hausdorff, MarchingCubes, Measures, Patch, SurfaceMeasure, Triangle, Welder, cells_of_brick,
+    Hausdorff, MarchingCubes, Measures, Patch, Spread, SurfaceMeasure, Triangle, Welder, cells_of_brick,
 };
 use crate::store::{BoxSource, BrickArray, MeshSink};
 
@@ -14,12 +14,14 @@ use crate::store::{BoxSource, BrickArray, MeshSink};
 const BATCH: usize = 256;
 
 /// A surface that was drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
     /// What it measures.
     pub measures: Measures,
     /// Distances of the points from it; none without points or surface.
     pub hausdorff: Option<Hausdorff>,
+    /// How many of the points are how far from it.
+    pub spread: Option<Spread>,
     /// Points that are farther from it than the largest spacing.
     pub lost_points: u64,
 }
@@ -38,7 +40,8 @@ pub fn draw(
     let measures = extract(stage, u, geometry, mesh)?;
     let distances = distances_to(stage, u, geometry, points)?;
     let lost_points = distances.iter().flatten().filter(|&&d| d > geometry.max_spacing()).count() as u64;
-    Ok(Drawn { measures, hausdorff: Hausdorff::of(distances.into_iter().flatten()), lost_points })
+    let known = || distances.iter().copied().flatten();
+    Ok(Drawn { measures, hausdorff: Hausdorff::of(known()), spread: Spread::of(known()), lost_points })
 }
 
 /// Sends the closed surface of `u` to `sink` and measures it.

@@ -20,7 +20,7 @@ pub(crate) fn contents(store: &Path) -> Vec<(String, Vec<u8>)> {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 walk(&path, root, found);
-            } else if !path.ends_with("report.json") {
+            } else if !path.ends_with("report.json") && !path.ends_with("report.html") {
                 let name = path.strip_prefix(root).unwrap().to_str().unwrap().to_owned();
                 found.push((name, fs::read(&path).unwrap()));
             }

@@ -17,6 +17,8 @@ use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
+use crate::cli::report::page::evidence::{Evidence, Measure, Root};
+use crate::cli::report::page::written::Written;
 use crate::cli::report::run_report::{Ran, Report};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
@@ -149,7 +151,8 @@ impl Job {
         let file = drawing.finish()?;
         note_anchor(mesh, &self.geometry, &self.console);
         if let Some(store) = store {
-            self.report(engine, &found).write(&store.file("report.json")?, true)?;
+            let written = Written { store: &store, engine, console: self.console.as_ref() };
+            written.write(&self.evidence(), || self.report(engine, &found))?;
             engine.check()?;
             drop(telling);
             store.finish()?;
@@ -262,6 +265,17 @@ impl Job {
             bytes(needs.scratch),
             self.resources.scratch.display()
         )
+    }
+
+    fn evidence(&self) -> Evidence<'_> {
+        let middle = self.geometry.shape.map(|n| n / 2);
+        Evidence {
+            root: Root::Distance,
+            measure: Measure::Thickness,
+            sources: &self.sets,
+            centre: self.geometry.position(middle),
+            points: "points",
+        }
     }
 
     fn report<'a>(&self, engine: &Engine, found: &'a Found) -> Report<Settings, &'a Found> {

@@ -17,14 +17,16 @@ use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
-use crate::cli::report::run_report::{Hausdorff, Hole, Moves, Ran, Report};
+use crate::cli::report::page::evidence::{Evidence, Measure, Root};
+use crate::cli::report::page::written::Written;
+use crate::cli::report::run_report::{Distances, Hausdorff, Hole, Moves, Ran, Report};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Progress};
-use crate::grid::Geometry;
+use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::read::source::Source;
 use crate::job::disk::Disk;
 use crate::job::resources::Resources;
@@ -212,7 +214,20 @@ impl Job {
         self.note_lost(&found);
         note_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
         if let Some(store) = store {
-            self.report(engine, &found).write(&store.file("report.json")?, true)?;
+            // The points once more; pictures go without them where the memory does.
+            let (mut sources, taken) = (DataSets::default(), engine.hold(size_of_val(self.cloud.as_slice()) as u64));
+            if taken.is_ok() {
+                sources.add_cloud(&self.cloud);
+            }
+            let evidence = Evidence {
+                root: Root::LevelSet,
+                measure: Measure::ToMarks,
+                sources: &sources,
+                centre: found.geometry.position(found.geometry.shape.map(|n| n / 2)),
+                points: "points",
+            };
+            let written = Written { store: &store, engine, console: self.console.as_ref() };
+            written.write(&evidence, || self.report(engine, &found))?;
             engine.check()?;
             drop(telling);
             store.finish()?;
@@ -341,6 +356,7 @@ struct Found {
     triangles: u64,
     open_edges: u64,
     hausdorff: Option<Hausdorff>,
+    distances: Option<Distances>,
     cloud_points: u64,
     /// Points farther from the surface than a voxel.
     lost_points: u64,
@@ -354,6 +370,8 @@ struct Found {
     sor_iterations: u64,
     stopped_by: &'static str,
     residual: f64,
+    /// What the rule that ends the motion looked at after each time step.
+    residuals: Vec<f64>,
 }
 
 impl Found {
@@ -366,6 +384,7 @@ impl Found {
             triangles: found.measures.triangles,
             open_edges: found.measures.open_edges,
             hausdorff: found.hausdorff.map(Into::into),
+            distances: found.spread.clone().map(Into::into),
             cloud_points,
             lost_points: found.lost_points,
             sheet_points: found.sheet_points,
@@ -377,6 +396,7 @@ impl Found {
             sor_iterations: found.evolution.sor_iterations,
             stopped_by: found.evolution.stopped_by,
             residual: found.evolution.residual,
+            residuals: found.evolution.residuals.clone(),
         }
     }
 }

@@ -16,6 +16,8 @@ use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
+use crate::cli::report::page::evidence::{Evidence, Measure, Root};
+use crate::cli::report::page::written::Written;
 use crate::cli::report::run_report::{Found, Ran, Report, Settings, Solver, crop_xyz};
 use crate::cli::report::{picture, table};
 use crate::cli::terminal::console::{Console, Voice};
@@ -23,7 +25,7 @@ use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration};
 use crate::error::{Error, Result};
 use crate::exec::{Cancel, Engine, Progress};
-use crate::grid::{Box3, Geometry};
+use crate::grid::{Box3, DataSets, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stack::volume::Stack;
 use crate::job::resources::Resources;
@@ -203,7 +205,16 @@ impl Job {
             if self.names.command == "demo" {
                 picture::draw(store.folder(), self.centre(), &store.file("picture.png")?, true)?;
             }
-            self.report(engine, &outcome).write(&store.file("report.json")?, true)?;
+            let sources = self.marks_by_label();
+            let evidence = Evidence {
+                root: Root::Image,
+                measure: Measure::ToMarks,
+                sources: &sources,
+                centre: self.centre(),
+                points: "marks",
+            };
+            let written = Written { store, engine, console: self.console.as_ref() };
+            written.write(&evidence, || self.report(engine, &outcome))?;
         }
         engine.check()?;
         drop(telling);
@@ -249,6 +260,17 @@ impl Job {
         let seed = self.args.seed.first().map_or([0.0; 3], |seed| seed.centre);
         let (low, high) = self.marks.cloud.bounds().unwrap_or((seed, seed));
         std::array::from_fn(|a| 0.5 * (low[a] + high[a]))
+    }
+
+    /// The marks of each object under its label.
+    fn marks_by_label(&self) -> DataSets {
+        let mut objects: Vec<_> = self.objects.fit.iter().filter(|marks| marks.seed.is_none()).collect();
+        objects.sort_by_key(|marks| marks.object);
+        let mut sets = DataSets::default();
+        for marks in objects {
+            sets.add_labelled(marks.object, &marks.contours.concat());
+        }
+        sets
     }
 
     fn report(&self, engine: &Engine, outcome: &Outcome) -> Report<Settings, Found> {

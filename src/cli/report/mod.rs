@@ -3,6 +3,7 @@
 pub(crate) mod distance;
 pub(crate) mod lines;
 pub(crate) mod neighbours;
+pub(crate) mod page;
 pub(crate) mod picture;
 pub(crate) mod run_report;
 pub(crate) mod table;

@@ -129,6 +129,7 @@ struct Object {
     components: u64,
     triangles: u64,
     hausdorff: Option<Hausdorff>,
+    distances: Option<Distances>,
     cloud_points: u64,
     beta: f64,
     hole: Option<Hole>,
@@ -137,6 +138,8 @@ struct Object {
     sor_iterations: u64,
     stopped_by: &'static str,
     residual: f64,
+    /// What the rule that ends the motion looked at after each time step.
+    residuals: Vec<f64>,
     /// What was taken from the image, and how much marks and image weighed.
     image_model: &'static str,
     theta: f64,
@@ -184,6 +187,19 @@ pub(crate) struct Hausdorff {
 impl From<crate::kernel::surface::Hausdorff> for Hausdorff {
     fn from(found: crate::kernel::surface::Hausdorff) -> Self {
         Self { mean: found.mean, max: found.max }
+    }
+}
+
+/// How many marks are how far from the surface, in bins of one width that start at 0.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Distances {
+    bin_width: f64,
+    counts: Vec<u64>,
+}
+
+impl From<crate::kernel::surface::Spread> for Distances {
+    fn from(found: crate::kernel::surface::Spread) -> Self {
+        Self { bin_width: found.width, counts: found.counts }
     }
 }
 
@@ -305,6 +321,7 @@ impl Object {
             components: object.measures.components,
             triangles: object.measures.triangles,
             hausdorff: object.hausdorff.map(Into::into),
+            distances: object.spread.clone().map(Into::into),
             cloud_points: object.cloud_points,
             beta: object.beta,
             hole: object.hole.map(Into::into),
@@ -313,6 +330,7 @@ impl Object {
             sor_iterations: object.evolution.sor_iterations,
             stopped_by: object.evolution.stopped_by,
             residual: object.evolution.residual,
+            residuals: object.evolution.residuals.clone(),
             image_model: object.image_model,
             theta: object.theta,
             rho: object.rho,

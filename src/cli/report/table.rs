@@ -34,8 +34,13 @@ pub(crate) fn whole_in(store: bool, report: bool, table: &str) -> String {
 
 /// The stages of a run; those of many objects summed up by kind.
 pub(crate) fn stages(reports: &[StageReport]) -> String {
+    rows_of(&summed(reports))
+}
+
+/// The stages of a run where they are few; of many those of a kind as one.
+pub(crate) fn summed(reports: &[StageReport]) -> Vec<StageReport> {
     if reports.len() <= MOST_STAGES {
-        return rows_of(reports);
+        return reports.to_vec();
     }
     let mut kinds: Vec<(String, usize, StageReport)> = Vec::new();
     for stage in reports {
@@ -46,6 +51,8 @@ pub(crate) fn stages(reports: &[StageReport]) -> String {
                 sum.seconds += stage.seconds;
                 sum.voxels += stage.voxels;
                 sum.brick_loads += stage.brick_loads;
+                sum.bytes_read += stage.bytes_read;
+                sum.bytes_written += stage.bytes_written;
                 sum.peak_rss_bytes = sum.peak_rss_bytes.max(stage.peak_rss_bytes);
             }
             None => kinds.push((kind.into(), 1, stage.clone())),
@@ -55,7 +62,7 @@ pub(crate) fn stages(reports: &[StageReport]) -> String {
         let name = if times > 1 { format!("{name}, {times} times") } else { sum.name.clone() };
         StageReport { name, ..sum }
     };
-    rows_of(&kinds.into_iter().map(named).collect::<Vec<_>>())
+    kinds.into_iter().map(named).collect()
 }
 
 fn rows_of(reports: &[StageReport]) -> String {

@@ -14,6 +14,7 @@ pub use mesh::growing::Growing;
 pub use mesh::measure::{Measures, SurfaceMeasure};
 pub use mesh::nearest::{Hausdorff, Nearest, PatchIndex};
 pub use mesh::patch::Patch;
+pub use mesh::spread::Spread;
 pub use mesh::vertex_key::VertexKey;
 pub use mesh::weld::Welder;
 pub use multilabel::contact::{Contact, Contacts};

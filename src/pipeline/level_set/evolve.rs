@@ -138,7 +138,13 @@ pub fn evolve(
 ) -> Result<Evolution> {
     let mut growing = growing;
     let grid = *band.solved.set().grid();
-    let mut done = Evolution { steps: 0, sor_iterations: 0, stopped_by: "max-steps", residual: f64::INFINITY };
+    let mut done = Evolution {
+        steps: 0,
+        sor_iterations: 0,
+        stopped_by: "max-steps",
+        residual: f64::INFINITY,
+        residuals: Vec::new(),
+    };
     let [all, faces] = &[HaloPlan::new(grid, Reach::All), HaloPlan::new(grid, Reach::Faces)];
     let workers = &Workers::new(Worker::new);
     let kept = room_to_keep(engine, band)?;
@@ -179,6 +185,7 @@ pub fn evolve(
         cell_iterations += visits * LOCAL_ITERATIONS as u64;
         let (residual, limit, name) = step.judged_by(settings.stop);
         done.residual = residual;
+        done.residuals.push(residual);
         if residual < limit {
             done.stopped_by = name;
             break;

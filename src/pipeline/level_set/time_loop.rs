@@ -28,7 +28,7 @@ pub struct TimeLoop {
 }
 
 /// How the time loop ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Evolution {
     /// Steps taken.
     pub steps: u32,
@@ -38,4 +38,6 @@ pub struct Evolution {
     pub stopped_by: &'static str,
     /// What the rule looked at when it ended.
     pub residual: f64,
+    /// What it looked at after each step.
+    pub residuals: Vec<f64>,
 }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Engine, Hold, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
-use crate::kernel::surface::{Hausdorff, Measures};
+use crate::kernel::surface::{Hausdorff, Measures, Spread};
 use crate::pipeline::enclosure::search::{Deepest, Enclosure, Found, Hole, Search, Start, enclose, first_reach_for};
 use crate::pipeline::enclosure::sheets::{Company, hold_sheets};
 use crate::pipeline::level_set::band::Band;
@@ -47,6 +47,8 @@ pub struct Reconstruction {
     pub measures: Measures,
     /// Distances of the points from the surface.
     pub hausdorff: Option<Hausdorff>,
+    /// How many points are how far from it.
+    pub spread: Option<Spread>,
     /// Points farther from the surface than the largest spacing.
     pub lost_points: u64,
     /// The solved fields.
@@ -156,7 +158,7 @@ pub fn reconstruct_shown(
     mesh.on_grid(&told)?;
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
-    let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh)?;
+    let Drawn { measures, hausdorff, spread, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh)?;
     stage.finish();
     if measures.triangles == 0 || lost_points == cloud.len() as u64 {
         return Err(vanished(settings, grid, larger_beta));
@@ -171,6 +173,7 @@ pub fn reconstruct_shown(
         evolution,
         measures,
         hausdorff,
+        spread,
         lost_points,
         band,
         window: settings.keeps_grid.then_some(window),
@@ -226,7 +229,8 @@ fn solve(
         sheet.dedup();
         let again = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop, growing)?;
         let (steps, sor_iterations) = (evolution.steps + again.steps, evolution.sor_iterations + again.sor_iterations);
-        evolution = Evolution { steps, sor_iterations, ..again };
+        let residuals = [evolution.residuals, again.residuals.clone()].concat();
+        evolution = Evolution { steps, sor_iterations, residuals, ..again };
     }
     stage.finish();
     Ok(evolution)

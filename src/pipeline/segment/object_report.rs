@@ -1,7 +1,6 @@
 //! What is told of an object when it is solved, or why it was not.
 
-use crate::kernel::surface::Hausdorff;
-use crate::kernel::surface::Measures;
+use crate::kernel::surface::{Hausdorff, Measures, Spread};
 use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::level_set::time_loop::Evolution;
 
@@ -24,6 +23,8 @@ pub struct ObjectReport {
     pub measures: Measures,
     /// Distances of the marks from the surface.
     pub hausdorff: Option<Hausdorff>,
+    /// How many marks are how far from the surface.
+    pub spread: Option<Spread>,
     /// Marks that are farther from it than the largest spacing.
     pub marks_off: u64,
     /// What was taken from the image: `level`, `wall`, `edge`, `none`.

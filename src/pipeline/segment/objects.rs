@@ -152,7 +152,7 @@ fn draw(
         second: meshes.map(|meshes| meshes.begin(label, geometry)).transpose()?,
     };
     let points = marks.contours.concat();
-    let Drawn { measures, hausdorff, lost_points } = surface::draw(&stage, u, geometry, &points, &mut mesh)?;
+    let Drawn { measures, hausdorff, spread, lost_points } = surface::draw(&stage, u, geometry, &points, &mut mesh)?;
     stage.voxels(solution.band_voxels);
     stage.finish();
     check_left(marks, solution, measures.triangles, settings)?;
@@ -167,9 +167,10 @@ fn draw(
         beta: solution.beta,
         hole: solution.hole,
         band_voxels: solution.band_voxels,
-        evolution: solution.evolution,
+        evolution: solution.evolution.clone(),
         measures,
         hausdorff,
+        spread,
         marks_off: lost_points,
         image_model: solution.image_model,
         theta: solution.theta,

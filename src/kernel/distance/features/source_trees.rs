@@ -73,6 +73,13 @@ impl SourceTrees {
         tree.and_then(|tree| self.trees[tree].nearest(here)).map_or(u32::MAX, |(source, _)| source)
     }
 
+    /// The distance from a world position to the nearest source of a label; none where the label has none.
+    #[must_use]
+    pub fn distance(&self, label: u32, here: [f64; 3]) -> Option<f64> {
+        let tree = self.labels.binary_search(&label).ok()?;
+        self.trees[tree].nearest(here).map(|(_, squared)| squared.sqrt())
+    }
+
     /// The sources of a source's label that are nearest to it, itself the first of them; to a triangle's centre.
     #[must_use]
     pub fn beside(&self, sets: &DataSets, source: u32, count: usize) -> Vec<u32> {

@@ -4,8 +4,6 @@
 //! pixels around it, weighted by a Gaussian: outlines are smooth curves close to the labels' edges. Objects too thin
 //! for that keep the edges of their pixels, so that nothing is smoothed away.
 
-use std::collections::BTreeMap;
-
 use super::palette::label_color;
 
 /// A colour picture: rows from the top, red, green and blue of each pixel.
@@ -40,7 +38,7 @@ const OVERSAMPLING: usize = 3;
 const LINE_WIDTH: f64 = 1.7;
 /// How much of its colour an object's inside takes on.
 const TINT: f64 = 0.08;
-const BACKGROUND: [u8; 3] = [16, 17, 20];
+pub(super) const BACKGROUND: [u8; 3] = [16, 17, 20];
 /// Pixels between pictures and around them.
 const MARGIN: usize = 8;
 
@@ -103,7 +101,7 @@ fn window_level(value: f32, [black, white]: [f32; 2]) -> f64 {
 
 impl Slice<'_> {
     /// The middle of sample `at` of a drawing of `size` samples, in pixels of the slice, whole numbers at centres.
-    fn place(&self, at: [usize; 2], size: [usize; 2]) -> [f64; 2] {
+    pub(super) fn place(&self, at: [usize; 2], size: [usize; 2]) -> [f64; 2] {
         let extent = [self.width as f64, self.height as f64];
         std::array::from_fn(|a| (at[a] as f64 + 0.5) * extent[a] / size[a] as f64 - 0.5)
     }
@@ -124,7 +122,7 @@ impl Slice<'_> {
         ]
     }
 
-    fn grey_at(&self, place: [f64; 2]) -> f32 {
+    pub(super) fn grey_at(&self, place: [f64; 2]) -> f32 {
         self.neighbours(place).iter().map(|&(at, share)| f64::from(self.grey[at]) * share).sum::<f64>() as f32
     }
 
@@ -169,14 +167,18 @@ fn keeps_its_label(labels: &[[u32; 5]; 5]) -> bool {
 fn largest_share(labels: &[[u32; 5]; 5], offset: [f64; 2]) -> u32 {
     // Standard deviation 0.9 pixels: steps of one pixel become slopes, and nothing moves further than half a pixel.
     let [across, down] = offset.map(|at| AROUND.map(|step| libm::exp(-(step as f64 - at).powi(2) / (2.0 * 0.9 * 0.9))));
-    let mut shares = BTreeMap::new();
+    let (mut shares, mut count) = ([(0_u32, 0.0_f64); 25], 0);
     for (row, down) in labels.iter().zip(down) {
         for (&label, across) in row.iter().zip(across) {
-            *shares.entry(label).or_insert(0.0) += across * down;
+            let known = shares[..count].iter().position(|(other, _)| *other == label);
+            let at = known.unwrap_or(count);
+            count = count.max(at + 1);
+            shares[at] = (label, shares[at].1 + across * down);
         }
     }
     // Equal shares go to the larger label: the same whatever the order of the pixels.
-    shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(labels[2][2], |(label, _)| label)
+    let larger = |a: &&(u32, f64), b: &&(u32, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
+    shares[..count].iter().max_by(larger).map_or(labels[2][2], |(label, _)| *label)
 }
 
 /// The labels of a slice at the samples of its drawing, and which samples lie on an outline.

@@ -6,5 +6,6 @@ pub(crate) mod growing;
 pub(crate) mod measure;
 pub(crate) mod nearest;
 pub(crate) mod patch;
+pub(crate) mod spread;
 pub(crate) mod vertex_key;
 pub(crate) mod weld;

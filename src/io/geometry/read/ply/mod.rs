@@ -7,6 +7,7 @@
 mod body;
 mod faces;
 mod header;
+pub(crate) mod triangles;
 mod vertices;
 
 use super::input::Input;
