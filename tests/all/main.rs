@@ -51,6 +51,7 @@ mod layering;
 mod outlines;
 #[cfg(target_os = "linux")]
 mod outputs;
+mod report_page;
 mod room_circles;
 #[cfg(target_os = "linux")]
 mod segment_notes;

@@ -7,7 +7,7 @@ use super::evidence::{Evidence, Root};
 use super::picture::Picture;
 use crate::cli::terminal::text::number;
 use crate::error::Result;
-use crate::exec::{Stage, Workers};
+use crate::exec::Stage;
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::{ImageReader, StoredLevel};
 use crate::kernel::image::picture::dots::dot;
@@ -15,7 +15,7 @@ use crate::kernel::image::picture::field::field_panel;
 use crate::kernel::image::picture::panel::{Slice, panel, percentile_window};
 
 /// Slices are taken from the finest level that has no longer side.
-const LONGEST_SIDE: i64 = 640;
+const LONGEST_SIDE: i64 = 600;
 /// Pixels of a picture along its longer side.
 const PIXELS: f64 = 480.0;
 /// Points that are drawn on a slice, at most: of more, some in even steps.
@@ -46,8 +46,10 @@ pub(super) fn slices(stage: &Stage<'_>, folder: &Path, evidence: &Evidence<'_>) 
     let labels = label_image(folder, evidence.root)?;
     let coarsest = image.levels().len().min(labels.as_ref().map_or(usize::MAX, |labels| labels.levels().len())) - 1;
     let small = |level: &StoredLevel| level.geometry.shape.iter().all(|&n| n <= LONGEST_SIDE);
-    let level = image.levels().iter().position(small).unwrap_or(coarsest).min(coarsest);
+    let finest = image.levels().iter().position(small).unwrap_or(coarsest).min(coarsest);
+    let level = (finest..coarsest).find(|&level| stage.hold(taken(&image.levels()[level])).is_ok()).unwrap_or(coarsest);
     let geometry = &image.levels()[level].geometry;
+    let _taken = stage.hold(taken(&image.levels()[level]))?;
     let read = VIEWS
         .into_iter()
         .map(|view| {
@@ -64,7 +66,15 @@ pub(super) fn slices(stage: &Stage<'_>, folder: &Path, evidence: &Evidence<'_>) 
         })
         .collect::<Result<Vec<_>>>()?;
     let shown = Shown::of(&read, evidence.root);
-    stage.run(&read, &Workers::none(), |(), slice| shown.picture(slice, geometry, evidence))
+    read.iter().map(|slice| shown.picture(slice, geometry, evidence)).collect()
+}
+
+/// Bytes that slices of a level take: as they are read and kept, and one of them while it is drawn.
+fn taken(level: &StoredLevel) -> u64 {
+    let [x, y, z] = level.geometry.shape.map(|n| n as u64);
+    let voxels = [x * y, x * z, y * z];
+    let samples = (PIXELS * PIXELS) as u64 * 9;
+    8 * voxels.iter().sum::<u64>() + 16 * voxels.into_iter().fold(0, u64::max) + 6 * samples
 }
 
 fn label_image(folder: &Path, root: Root) -> Result<Option<ImageReader>> {

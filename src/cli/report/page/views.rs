@@ -71,8 +71,9 @@ impl<'a> Viewer<'a> {
     /// Bytes that looking takes at most.
     pub(super) fn bytes(evidence: &Evidence<'_>) -> u64 {
         let sources = if looks_up(evidence) { evidence.sources.len() as u64 * SOURCE_BYTES } else { 0 };
-        // Encoded pictures are smaller than those that they are made of.
-        READING + sources + 3 * FROM.len() as u64 * ZBuffer::bytes(LARGE) / 2
+        // Lengths, colours and the picture, plain and packed.
+        let pixels = (LARGE[0] * LARGE[1]) as u64 * (4 + 4 + 3 + 3 + 6);
+        READING + sources + FROM.len() as u64 * (ZBuffer::bytes(LARGE) + pixels)
     }
 
     pub(super) fn new(folder: &'a Path, evidence: &'a Evidence<'a>, several: bool) -> Self {
@@ -97,7 +98,8 @@ impl<'a> Viewer<'a> {
         let mut pairs = BTreeMap::new();
         let mut count = 0_u64;
         each_triangle(&path, &mut |corners, labels| {
-            let next = pairs.len() as u32;
+            // Beyond these names the last one is shared.
+            let next = u16::try_from(pairs.len()).unwrap_or(u16::MAX);
             let tag = *pairs.entry(labels).or_insert(next);
             for buffer in &mut seen {
                 buffer.add(corners, tag);
@@ -105,7 +107,7 @@ impl<'a> Viewer<'a> {
             count += 1;
             if count.is_multiple_of(1 << 16) { engine.check() } else { Ok(()) }
         })?;
-        let mut labels = vec![[0; 2]; pairs.len()];
+        let mut labels = vec![[0; 2]; pairs.len().min(1 << 16)];
         for (pair, tag) in pairs {
             labels[tag as usize] = pair;
         }
@@ -120,12 +122,12 @@ impl<'a> Viewer<'a> {
         Ok(Some(Views { pictures, legend }))
     }
 
-    fn picture(&self, buffer: &ZBuffer, lengths: &[(Seen, Option<f64>)], label: u32, legend: Option<&Legend>) -> Rgb {
+    fn picture(&self, buffer: &ZBuffer, lengths: &[f32], label: u32, legend: Option<&Legend>) -> Rgb {
         let mut colors = vec![[0; 3]; self.size[0] * self.size[1]];
-        for &(Seen { pixel, tag, .. }, length) in lengths {
-            colors[pixel] = match (legend, length) {
-                (Some(legend), Some(length)) => legend.color(length),
-                _ if label == 0 => label_color(tag + 1),
+        for (Seen { pixel, tag, .. }, &length) in buffer.seen().zip(lengths) {
+            colors[pixel] = match legend {
+                Some(legend) if !length.is_nan() => legend.color(length.into()),
+                _ if label == 0 => label_color(u32::from(tag) + 1),
                 _ => label_color(label),
             };
         }
@@ -136,8 +138,8 @@ impl<'a> Viewer<'a> {
         picture
     }
 
-    /// What is seen, with the length that colours it.
-    fn lengths(&self, buffer: &ZBuffer, label: u32, pairs: &[[u32; 2]]) -> Vec<(Seen, Option<f64>)> {
+    /// The length that colours each pixel that shows the surface; no number where there is none.
+    fn lengths(&self, buffer: &ZBuffer, label: u32, pairs: &[[u32; 2]]) -> Vec<f32> {
         let length = |seen: &Seen| {
             let trees = self.trees.as_ref()?;
             match self.evidence.measure {
@@ -148,13 +150,13 @@ impl<'a> Viewer<'a> {
                 }
             }
         };
-        buffer.seen().map(|seen| (seen, length(&seen))).collect()
+        buffer.seen().map(|seen| length(&seen).map_or(f32::NAN, |length| length as f32)).collect()
     }
 
-    fn legend(&self, lengths: &[Vec<(Seen, Option<f64>)>]) -> Option<Legend> {
-        let mut all: Vec<f64> = lengths.iter().flatten().filter_map(|(_, length)| *length).collect();
-        all.sort_unstable_by(f64::total_cmp);
-        let high = *all.get((all.len() as f64 * SHARE) as usize)?;
+    fn legend(&self, lengths: &[Vec<f32>]) -> Option<Legend> {
+        let mut all: Vec<f32> = lengths.iter().flatten().copied().filter(|length| !length.is_nan()).collect();
+        all.sort_unstable_by(f32::total_cmp);
+        let high = f64::from(*all.get((all.len() as f64 * SHARE) as usize)?);
         let ramp = match self.evidence.measure {
             Measure::ToMarks => Ramp::Alarm,
             Measure::Thickness => Ramp::Size,

@@ -17,8 +17,6 @@ use crate::io::ome_zarr::StoreWriter;
 
 /// Objects whose surfaces are shown, the largest.
 const MOST_SURFACES: usize = 12;
-/// Bytes that slices and the page's text take at most, beside surfaces.
-const SLICES: u64 = 48 << 20;
 
 /// Where a report goes, and who hears of what goes wrong.
 pub(crate) struct Written<'a> {
@@ -67,10 +65,7 @@ impl Written<'_> {
 
     fn figures(&self, stage: &Stage<'_>, evidence: &Evidence<'_>, report: &Value) -> Result<Figures> {
         let folder = self.store.folder();
-        let slices = {
-            let _taken = self.engine.hold(SLICES)?;
-            slices(stage, folder, evidence)?
-        };
+        let slices = slices(stage, folder, evidence)?;
         let all = surfaces(folder, evidence, &report["result"]);
         let mut figures = Figures { slices, surfaces: Vec::new(), more_surfaces: 0, notes: Vec::new() };
         if all.is_empty() {

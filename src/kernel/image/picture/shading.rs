@@ -4,7 +4,7 @@
 
 use super::camera::{dot, unit};
 use super::panel::{BACKGROUND, Rgb};
-use super::z_buffer::{OVERSAMPLING, Sample, ZBuffer, samples_of};
+use super::z_buffer::{OVERSAMPLING, Sample, UNIT, ZBuffer, samples_of};
 
 /// Samples to each side whose normals count.
 const AROUND: i64 = 2;
@@ -42,7 +42,8 @@ pub fn shaded(buffer: &ZBuffer, colors: &[[u8; 3]]) -> Rgb {
 /// How light the surface is at a sample, 0 to 1; none where nothing is seen.
 fn shade(buffer: &ZBuffer, at: usize, light: [f64; 3]) -> Option<f64> {
     let samples = buffer.samples();
-    let Sample { depth, normal: own, .. } = samples[at];
+    let Sample { depth, normal, .. } = samples[at];
+    let own = normal.map(f64::from);
     if !depth.is_finite() {
         return None;
     }
@@ -53,9 +54,9 @@ fn shade(buffer: &ZBuffer, at: usize, light: [f64; 3]) -> Option<f64> {
     for y in (row - AROUND).max(0)..(row + AROUND + 1).min(height) {
         for x in (column - AROUND).max(0)..(column + AROUND + 1).min(width) {
             let beside = &samples[(y * width + x) as usize];
-            let alike = beside.normal[0] * own[0] + beside.normal[1] * own[1] + beside.normal[2] * own[2];
-            if (beside.depth - depth).abs() <= limit && alike > 0.5 {
-                (0..3).for_each(|c| sum[c] += f64::from(beside.normal[c]));
+            let normal = beside.normal.map(f64::from);
+            if (beside.depth - depth).abs() <= limit && dot(normal, own) > 0.5 * UNIT * UNIT {
+                (0..3).for_each(|c| sum[c] += normal[c]);
             }
         }
     }

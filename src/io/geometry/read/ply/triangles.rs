@@ -14,9 +14,9 @@ use crate::io::text::unreadable;
 
 /// Vertices of a block, and blocks that are kept.
 const BLOCK: u64 = 2048;
-const BLOCKS: usize = 512;
+const BLOCKS: usize = 128;
 /// Bytes of the pieces in which triangles are read.
-const PIECE: usize = 1 << 20;
+const PIECE: usize = 1 << 18;
 
 /// Bytes that reading takes at most.
 pub(crate) const READING: u64 = BLOCK * BLOCKS as u64 * 24 + 2 * PIECE as u64;
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn triangles_are_those_that_were_written() {
         let folder = tempfile::tempdir().unwrap();
-        let count = BLOCK as u32 * BLOCKS as u32 / 2 * 3;
+        let count = BLOCK as u32 * BLOCKS as u32 * 3;
         let position = |n: u32| [f64::from(n) * 0.5, f64::from(n % 1000), -f64::from(n)];
         for (origin, is_tagged) in [(0.0, false), (1e9, true)] {
             let path = folder.path().join("m.ply");
