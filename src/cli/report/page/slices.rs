@@ -7,7 +7,7 @@ use super::evidence::{Evidence, Root};
 use super::picture::Picture;
 use crate::cli::terminal::text::number;
 use crate::error::Result;
-use crate::exec::Stage;
+use crate::exec::{Stage, Workers};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::{ImageReader, StoredLevel};
 use crate::kernel::image::picture::dots::dot;
@@ -18,6 +18,8 @@ use crate::kernel::image::picture::panel::{Slice, panel, percentile_window};
 const LONGEST_SIDE: i64 = 600;
 /// Pixels of a picture along its longer side.
 const PIXELS: f64 = 480.0;
+/// Bytes that drawing one takes: labels and lines at three samples along each side of a pixel.
+const DRAWING: u64 = (PIXELS * PIXELS) as u64 * 9 * 6;
 /// Points that are drawn on a slice, at most: of more, some in even steps.
 const MOST_DOTS: usize = 3000;
 /// The yellow of marks, as `strandline view` has it.
@@ -66,15 +68,19 @@ pub(super) fn slices(stage: &Stage<'_>, folder: &Path, evidence: &Evidence<'_>) 
         })
         .collect::<Result<Vec<_>>>()?;
     let shown = Shown::of(&read, evidence.root);
-    read.iter().map(|slice| shown.picture(slice, geometry, evidence)).collect()
+    // Side by side where the memory allows it.
+    let draw = |slice: &Read| shown.picture(slice, geometry, evidence);
+    match stage.hold(2 * DRAWING) {
+        Ok(_taken) => stage.run(&read, &Workers::none(), |(), slice| draw(slice)),
+        Err(_) => read.iter().map(draw).collect(),
+    }
 }
 
 /// Bytes that slices of a level take: as they are read and kept, and one of them while it is drawn.
 fn taken(level: &StoredLevel) -> u64 {
     let [x, y, z] = level.geometry.shape.map(|n| n as u64);
     let voxels = [x * y, x * z, y * z];
-    let samples = (PIXELS * PIXELS) as u64 * 9;
-    8 * voxels.iter().sum::<u64>() + 16 * voxels.into_iter().fold(0, u64::max) + 6 * samples
+    8 * voxels.iter().sum::<u64>() + 16 * voxels.into_iter().fold(0, u64::max) + DRAWING
 }
 
 fn label_image(folder: &Path, root: Root) -> Result<Option<ImageReader>> {

@@ -137,18 +137,25 @@ impl Slice<'_> {
     fn sampled_labels(&self, size: [usize; 2]) -> Vec<u32> {
         let pixels = (0..self.height).flat_map(|y| (0..self.width).map(move |x| [x, y]));
         let keeps: Vec<bool> = pixels.map(|pixel| keeps_its_label(&self.labels_around(pixel))).collect();
-        let samples = (0..size[1]).flat_map(|row| (0..size[0]).map(move |column| [column, row]));
-        let label_at = |sample| {
-            let place = self.place(sample, size);
-            // Half-way places lie in the first and last pixels' halves, which round inside.
-            let pixel = [place[0].round() as usize, place[1].round() as usize];
-            let at = pixel[1] * self.width + pixel[0];
-            if keeps[at] {
-                return self.labels[at];
-            }
-            largest_share(&self.labels_around(pixel), [0, 1].map(|a| place[a] - pixel[a] as f64))
+        // Half-way places lie in the first and last pixels' halves, which round inside.
+        let along = |a: usize, n: usize| {
+            let place = self.place([n, n], size)[a];
+            let pixel = place.round() as usize;
+            (pixel, weights(place - pixel as f64))
         };
-        samples.map(label_at).collect()
+        let columns: Vec<(usize, [f64; 5])> = (0..size[0]).map(|n| along(0, n)).collect();
+        let mut labels = Vec::with_capacity(size[0] * size[1]);
+        for (y, down) in (0..size[1]).map(|n| along(1, n)) {
+            let mut known = (usize::MAX, [[0; 5]; 5]);
+            for (x, across) in &columns {
+                let at = y * self.width + x;
+                if !keeps[at] && known.0 != at {
+                    known = (at, self.labels_around([*x, y]));
+                }
+                labels.push(if keeps[at] { self.labels[at] } else { largest_share(&known.1, across, &down) });
+            }
+        }
+        labels
     }
 }
 
@@ -163,10 +170,14 @@ fn keeps_its_label(labels: &[[u32; 5]; 5]) -> bool {
     alike == 25 || alike < THIN
 }
 
-/// The label of the largest share at a point that lies `offset` from the middle pixel.
-fn largest_share(labels: &[[u32; 5]; 5], offset: [f64; 2]) -> u32 {
+/// How much the pixels around count at a point that lies `offset` from the middle one, along an axis.
+fn weights(offset: f64) -> [f64; 5] {
     // Standard deviation 0.9 pixels: steps of one pixel become slopes, and nothing moves further than half a pixel.
-    let [across, down] = offset.map(|at| AROUND.map(|step| libm::exp(-(step as f64 - at).powi(2) / (2.0 * 0.9 * 0.9))));
+    AROUND.map(|step| libm::exp(-(step as f64 - offset).powi(2) / (2.0 * 0.9 * 0.9)))
+}
+
+/// The label of the largest share where columns and rows count so much.
+fn largest_share(labels: &[[u32; 5]; 5], across: &[f64; 5], down: &[f64; 5]) -> u32 {
     let (mut shares, mut count) = ([(0_u32, 0.0_f64); 25], 0);
     for (row, down) in labels.iter().zip(down) {
         for (&label, across) in row.iter().zip(across) {

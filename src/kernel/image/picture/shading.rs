@@ -6,8 +6,9 @@ use super::camera::{dot, unit};
 use super::panel::{BACKGROUND, Rgb};
 use super::z_buffer::{OVERSAMPLING, Sample, UNIT, ZBuffer, samples_of};
 
-/// Samples to each side whose normals count.
+/// Samples to each side whose normals count, every second of them.
 const AROUND: i64 = 2;
+const STEP: usize = 2;
 /// Samples whose depths lie further apart than so many of them belong to different pieces.
 const APART: f64 = 6.0;
 /// Light that comes from everywhere; the rest comes from one side.
@@ -50,9 +51,9 @@ fn shade(buffer: &ZBuffer, at: usize, light: [f64; 3]) -> Option<f64> {
     let [width, height] = buffer.camera().size().map(|n| (n * OVERSAMPLING) as i64);
     let limit = (APART / (buffer.camera().scale() * OVERSAMPLING as f64)) as f32;
     let (column, row) = (at as i64 % width, at as i64 / width);
-    let mut sum = [0.0; 3];
-    for y in (row - AROUND).max(0)..(row + AROUND + 1).min(height) {
-        for x in (column - AROUND).max(0)..(column + AROUND + 1).min(width) {
+    let mut sum = own;
+    for y in ((row - AROUND).max(0)..(row + AROUND + 1).min(height)).step_by(STEP) {
+        for x in ((column - AROUND).max(0)..(column + AROUND + 1).min(width)).step_by(STEP) {
             let beside = &samples[(y * width + x) as usize];
             let normal = beside.normal.map(f64::from);
             if (beside.depth - depth).abs() <= limit && dot(normal, own) > 0.5 * UNIT * UNIT {
