@@ -27,6 +27,8 @@ use crate::io::ome_zarr::{Live, LiveState};
 
 /// Bytes of a file that are in memory at a time, of each request.
 const PIECE: usize = 64 << 10;
+/// What a page of a store may do.
+const PAGE_POLICY: &str = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'";
 /// Metres where nobody says what a unit of length is: the page takes the numbers as they are.
 const NO_UNIT: f64 = 1.0;
 
@@ -231,6 +233,8 @@ fn part_of(opened: Opened, headers: &HeaderMap) -> Response {
     let own = answer.headers_mut();
     own.insert(header::CONTENT_LENGTH, HeaderValue::from(to - from));
     own.insert(header::ACCEPT_RANGES, HeaderValue::from_static("bytes"));
+    // A page in a store, as its report is, may have come from elsewhere: it shows itself, and neither runs nor asks for anything.
+    own.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(PAGE_POLICY));
     if let Ok(tag) = HeaderValue::from_str(&tag) {
         own.insert(header::ETAG, tag);
     }

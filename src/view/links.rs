@@ -1,5 +1,7 @@
 //! Where and how other programs open what is shown.
 
+use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
+
 use super::shown::{Image, Shown};
 
 /// Links and commands for the server at `origin`, such as `http://127.0.0.1:8000`, a line each.
@@ -10,6 +12,10 @@ pub fn links(shown: &Shown, origin: &str) -> String {
         format!("neuroglancer source  {origin}/data/{}/|{version}:\n", image.path)
     };
     let images: String = shown.images.iter().map(source).collect();
+    let has_report = |folder: &super::folder::Folder| folder.root().join("report.html").is_file();
+    let reports = shown.roots.iter().filter(|(_, folder)| has_report(folder)).map(|(name, _)| {
+        format!("report               {origin}/data/{}/report.html\n", utf8_percent_encode(name, NON_ALPHANUMERIC))
+    });
     let segments = shown.meshes.iter().map(|mesh| {
         format!("neuroglancer mesh    precomputed://{origin}/mesh  (segment {}: {})\n", mesh.segment, mesh.path)
     });
@@ -18,6 +24,6 @@ pub fn links(shown: &Shown, origin: &str) -> String {
         format!("napari               napari --plugin napari-ome-zarr {store}\nFiji (MoBIE, N5)     {store}\n")
     });
     let meshes = shown.meshes.iter().map(|mesh| format!("ParaView             paraview {}\n", mesh.file.display()));
-    let rest: String = segments.chain(stores).chain(meshes).collect();
+    let rest: String = reports.chain(segments).chain(stores).chain(meshes).collect();
     format!("page                 {origin}/\n{images}{rest}")
 }

@@ -225,3 +225,20 @@ fn what_cannot_be_shown_is_refused_and_the_time_ends() {
     bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     assert!(bench.succeed("view a.obj --no-open --for 1s --print-links").contains("precomputed://http://127.0.0.1:"));
 }
+
+#[test]
+fn the_report_of_a_run_is_served_and_asks_for_nothing() {
+    let bench = store();
+    let told = bench.succeed("view out/ball.zarr --no-open --for 1s --print-links");
+    assert!(
+        told.lines().any(|line| line.starts_with("report") && line.ends_with("/data/ball%2Ezarr/report.html")),
+        "{told}"
+    );
+    let served = Served::new(&bench, "out/ball.zarr");
+    for path in ["/data/ball.zarr/report.html", "/data/ball%2Ezarr/report.html"] {
+        let page = served.get(path);
+        assert_eq!((page.code, page.header("content-type")), (200, Some("text/html; charset=utf-8")));
+        assert!(page.header("content-security-policy").unwrap().starts_with("sandbox; default-src 'none'"));
+        assert!(page.body == fs::read(bench.path("out/ball.zarr/report.html")).unwrap());
+    }
+}

@@ -75,7 +75,7 @@ fn farewell(output: &Path) -> String {
     format!(
         "\npicture  {store}/picture.png\n\
          mesh     {store}/meshes/surface.ply\n\
-         report   {store}/report.json\n\n\
+         report   {store}/report.html\n\n\
          Look at it:        pip install \"napari[all]\" napari-ome-zarr; napari --plugin napari-ome-zarr {store}\n\
          Your own stack:    strandline segment STACK.tif --points MARKS.csv -o OUT.zarr\n\n\
          {CITATION}\n"

@@ -73,6 +73,7 @@ impl ImageReader {
             "int8" => self.read::<i8>(level, part),
             "int16" => self.read::<i16>(level, part),
             "int32" => self.read::<i32>(level, part),
+            "float16" => self.read::<half::f16>(level, part),
             "float32" => self.read::<f32>(level, part),
             "float64" => self.read::<f64>(level, part),
             other => Err(Error::input(format!("holds voxels of type {other}, which are not read")).at(&self.folder)),

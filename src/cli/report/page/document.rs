@@ -135,7 +135,7 @@ impl Document<'_> {
         page.element("p", &[("class", "faint")], "The command as it was typed; a click selects it.");
         page.element("pre", &[], &command_line(self.typed));
         let settings = &self.report["settings"];
-        let mut rows = vec![["input", ""].map(String::from).to_vec()];
+        let mut rows = vec![["", ""].map(String::from).to_vec()];
         for (key, name) in INPUTS {
             let value = &settings[key];
             if value.as_array().is_some_and(Vec::is_empty) || value.is_null() {

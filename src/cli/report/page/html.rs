@@ -68,9 +68,11 @@ impl Html {
         let Some((head, body)) = rows.split_first() else { return };
         self.within("div", &[("class", "wide")], |inside| {
             inside.within("table", &[], |table| {
-                table.within("thead", &[], |table| {
-                    table.within("tr", &[], |row| head.iter().for_each(|text| row.element("th", &[], text)));
-                });
+                if head.iter().any(|text| !text.is_empty()) {
+                    table.within("thead", &[], |table| {
+                        table.within("tr", &[], |row| head.iter().for_each(|text| row.element("th", &[], text)));
+                    });
+                }
                 table.within("tbody", &[], |table| body.iter().for_each(|row| table.row(head, row)));
             });
         });

@@ -62,12 +62,12 @@ const OBJECT: [&str; 12] = [
     "area",
     "surface",
     "marks off, mean",
-    "largest",
-    "beyond a voxel",
-    "image",
+    "marks off, largest",
+    "marks off by more than a voxel",
+    "border in the image",
     "weights (marks, image)",
     "steps",
-    "left-out outlines off: mean, nine of ten",
+    "off outlines that are left out: mean, nine of ten within",
     "mark next",
 ];
 
@@ -80,6 +80,7 @@ fn object(object: &Value) -> Vec<String> {
     };
     let check = &object["cross_validation"];
     let next = &check["next_slice"];
+    let unchecked = "not checked (--cross-validate)";
     let or_dash = |is_there: bool, text: String| if is_there { text } else { "-".into() };
     vec![
         told(&object["label"]),
@@ -92,15 +93,18 @@ fn object(object: &Value) -> Vec<String> {
         told(&object["image_model"]),
         format!("{}, {}", told(&object["theta"]), told(&object["rho"])),
         format!("{}, ended by {}", told(&object["time_steps"]), told(&object["stopped_by"])),
-        or_dash(check.is_object(), format!("{}, {}", told(&check["mean"]), told(&check["p90"]))),
+        if check.is_object() { format!("{}, {}", told(&check["mean"]), told(&check["p90"])) } else { unchecked.into() },
         or_dash(next.is_object(), format!("slice {} across {}", told(&next["slice"]), told(&next["axis"]))),
     ]
 }
 
 /// A table with a column for each object.
 fn few(page: &mut Html, objects: &[Vec<String>]) {
+    let name = |o: &Vec<String>| if objects.len() > 1 { format!("object {}", o[0]) } else { String::new() };
+    let mut rows: Vec<Vec<String>> = vec![std::iter::once(String::new()).chain(objects.iter().map(name)).collect()];
     let line = |n: usize| std::iter::once(OBJECT[n].to_owned()).chain(objects.iter().map(|o| o[n].clone())).collect();
-    page.table(&(0..OBJECT.len()).map(line).collect::<Vec<_>>());
+    rows.extend((usize::from(objects.len() > 1)..OBJECT.len()).map(line));
+    page.table(&rows);
 }
 
 fn counted(value: &Value) -> String {
