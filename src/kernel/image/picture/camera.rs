@@ -63,6 +63,7 @@ impl Camera {
 
     /// Where a position is seen: column and row in pixels from the upper left corner, and its depth, a length.
     #[must_use]
+    #[inline]
     pub fn project(&self, position: [f64; 3]) -> [f64; 3] {
         let from: [f64; 3] = std::array::from_fn(|a| position[a] - self.centre[a]);
         let [right, down, depth] = self.axes.map(|axis| dot(axis, from));
@@ -79,14 +80,17 @@ impl Camera {
     }
 }
 
+#[inline]
 pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[inline]
 pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline]
 pub(super) fn unit(v: [f64; 3]) -> [f64; 3] {
     let length = dot(v, v).sqrt();
     v.map(|c| c / length)
