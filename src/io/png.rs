@@ -1,6 +1,5 @@
 //! Writes pictures as PNG: 8 bits of red, green and blue.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
@@ -57,6 +56,8 @@ fn encode(
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+
     use super::*;
 
     #[test]

@@ -118,6 +118,7 @@ fn other_runs_show_what_they_have() {
         ("distance a.xyz b.xyz --spacing 0.25 --labels", [3, 0]),
         ("distance a.xyz --spacing 0.5 --precision f16 --max-distance 1", [3, 0]),
         ("middle a.xyz b.xyz --spacing 0.25", [5, 0]),
+        ("middle a.xyz b.xyz --spacing 0.5 --ome 0.4", [5, 0]),
         ("reconstruct a.xyz", [5, 2]),
     ] {
         bench.succeed(&format!("{run} -o out/x.zarr --overwrite -q"));
