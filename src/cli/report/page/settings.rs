@@ -15,7 +15,7 @@ const REASONS: [(&str, &str, &str); 15] = [
     ("epsilon", "", "a hundredth for each smallest spacing: gradients below count as flat"),
     ("rho", AUTOMATIC, "for each object, from how sure the image and the marks are; see what was found"),
     ("sigma", AUTOMATIC, "for each object, from what the image shows of it"),
-    ("beta", AUTOMATIC, "the smallest distance from the points at which no flood from outside leaks in"),
+    ("beta", AUTOMATIC, "how far from the points the surface starts was found; see what was found"),
     ("image_model", "", "what border the image shows is found from the grey values across each object's marks"),
     ("start", "", "the shape of the outlines where there are any, else a flood from outside"),
     ("crop_xyz", "", "the whole image"),
