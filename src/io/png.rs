@@ -34,7 +34,7 @@ pub fn write_rgb(path: &Path, [width, height]: [u32; 2], pixels: &[u8], replace:
 pub fn rgb_bytes([width, height]: [u32; 2], pixels: &[u8]) -> Result<Vec<u8>> {
     assert_eq!(pixels.len() as u64, 3 * u64::from(width) * u64::from(height), "the pixels do not fit the size");
     let mut bytes = Vec::new();
-    encode(&mut bytes, [width, height], pixels, png::Compression::Balanced)
+    encode(&mut bytes, [width, height], pixels, png::Compression::Fast)
         .map_err(|error| Error::failed(format!("a picture cannot be made: {error}")).caused_by(error))?;
     Ok(bytes)
 }
