@@ -21,6 +21,9 @@ pub struct Image<T: Element> {
     pub extremes: [f64; 2],
 }
 
+/// Boxes for each thread that are read before any later ones, where somebody looks on.
+const TOGETHER: usize = 32;
+
 /// Reads the part `crop` of a volume into bricks, by the boxes in which it is stored; `percentiles` (0..100) of its values
 /// become black and white. `stage` counts those boxes; `as_read` is told of each.
 ///
@@ -40,7 +43,10 @@ pub fn ingest<T: Sample>(
     let workers = Workers::new(Vec::new);
     // Counts add up the same in any order, and a histogram for each thread bounds the memory.
     let histograms = Mutex::new(Vec::<Histogram>::new());
-    stage.run(&volume.natural_boxes(crop), &workers, |voxels, part| {
+    let boxes = volume.natural_boxes(crop);
+    // Who looks on sees the first layers before the last: threads then stay near each other.
+    let together = if as_read.is_some() { TOGETHER * stage.threads() } else { boxes.len() };
+    let read = |voxels: &mut Vec<T>, part: &Box3| {
         voxels.resize(part.len(), T::default());
         volume.read_box(part, T::buffer(voxels))?;
         let own = part.translate(crop.lo.map(|v| -v));
@@ -53,7 +59,10 @@ pub fn ingest<T: Sample>(
         }
         histograms.lock().unwrap_or_else(PoisonError::into_inner).push(histogram);
         Ok(())
-    })?;
+    };
+    for boxes in boxes.chunks(together.max(1)) {
+        stage.run(boxes, &workers, |voxels, part| read(voxels, part))?;
+    }
     let mut all = Histogram::default();
     histograms.into_inner().unwrap_or_else(PoisonError::into_inner).iter().for_each(|counts| all.merge(counts));
     stage.voxels(crop.volume());
