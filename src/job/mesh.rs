@@ -3,8 +3,11 @@
 use std::path::Path;
 
 use crate::error::Result;
+use crate::exec::Engine;
 use crate::grid::{Geometry, TriangleMesh};
 use crate::io::geometry::write::ply::PlyWriter;
+use crate::io::ome_zarr::StoreWriter;
+use crate::pipeline::output::viewer_mesh::{Segments, for_viewers};
 use crate::store::MeshSink;
 
 /// A triangle mesh whose triangles separate two labels each.
@@ -49,9 +52,16 @@ impl<'a> Drawing<'a> {
         Ok(Self { to, file: file.map(|path| create(path, geometry)).transpose()? })
     }
 
-    /// Completes the file.
-    pub(super) fn finish(self) -> Result<()> {
-        self.file.map_or(Ok(()), PlyWriter::finish)
+    /// Completes the file; a store gets what viewers read of it.
+    pub(super) fn finish(
+        self,
+        engine: &Engine,
+        store: Option<&StoreWriter>,
+        geometry: &Geometry,
+        segments: Segments,
+    ) -> Result<()> {
+        let Some((store, file)) = store.zip(self.file) else { return Ok(()) };
+        for_viewers(engine, store, (&file.finish()?, geometry), segments).map(drop)
     }
 }
 

@@ -10,6 +10,7 @@ use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::surface::{Measures, Pair};
 use crate::pipeline::distance::Kept;
 use crate::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, check_sets, middle_kept};
+use crate::pipeline::output::viewer_mesh::Segments;
 use crate::store::MeshSink;
 
 /// The surfaces equally far from two data sets or more.
@@ -101,7 +102,7 @@ impl<'a> MiddleSurface<'a> {
         let mut drawing = Drawing::new(mesh, mesh_file(store.as_ref())?.as_deref(), geometry, true)?;
         let kept = Kept::new(&engine, geometry, true)?;
         let found = middle_kept(&engine, geometry, sets, &settings, (store.as_ref(), Some(&kept)), &mut drawing)?;
-        drawing.finish()?;
+        drawing.finish(&engine, store.as_ref(), geometry, Segments::Pairs)?;
         finish_store(&engine, store)?;
         let MiddleFound { distance, measures, pairs } = found;
         let distance = SolvedDistance::new(ready, distance, kept);

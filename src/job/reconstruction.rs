@@ -17,6 +17,7 @@ use crate::pipeline::distance::Method;
 use crate::pipeline::laying::{check_grid, check_spacing};
 use crate::pipeline::level_set::time_loop::Evolution;
 use crate::pipeline::limits::{ABOVE_ZERO, check_given};
+use crate::pipeline::output::viewer_mesh::Segments;
 use crate::pipeline::reconstruct;
 use crate::pipeline::reconstruct::{
     ReconstructSettings, estimate, grid_for, refuse_too_fine, typical_spacing, without_isolated,
@@ -136,7 +137,7 @@ impl<'a> Reconstruction<'a> {
         let store = self.run.begin_store()?;
         let mut drawing = Drawing::new(mesh, mesh_file(store.as_ref())?.as_deref(), &geometry, false)?;
         let found = reconstruct::reconstruct(&engine, &geometry, &cloud, &self.settings, &mut drawing)?;
-        drawing.finish()?;
+        drawing.finish(&engine, store.as_ref(), &geometry, Segments::Object(1))?;
         if let Some(store) = &store {
             found.write(&engine, store)?;
         }

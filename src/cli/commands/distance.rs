@@ -12,7 +12,7 @@ use crate::cli::inputs::grid;
 use crate::cli::inputs::settings;
 use crate::cli::inputs::sources::{Read, read_sets};
 use crate::cli::outputs::checks::Outputs;
-use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
+use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
@@ -35,6 +35,7 @@ use crate::pipeline::distance::{
     DistanceSettings, Init, Needs, Schedule, Writes, check_iterations, distance, outside_note,
 };
 use crate::pipeline::middle::{MiddleSettings, check_sets, middle};
+use crate::pipeline::output::viewer_mesh::Segments;
 use crate::store::MeshSink;
 
 /// A distance that is ready to be computed: all inputs are read and checked.
@@ -148,7 +149,9 @@ impl Job {
         let has_surface = self.middle.is_some();
         let mut drawing = Drawing::new(store.as_ref().filter(|_| has_surface), to, &self.geometry, true)?;
         let found = self.solve::<P>(engine, store.as_ref(), &mut drawing)?;
-        let file = drawing.finish()?;
+        let (geometry, segments) = (&self.geometry, Segments::Pairs);
+        let (file, copy) = drawing.finish(&ForViewers { engine, store: store.as_ref(), geometry, segments })?;
+        let found = found.with_copy(copy);
         note_anchor(mesh, &self.geometry, &self.console);
         if let Some(store) = store {
             let written = Written { store: &store, engine, console: self.console.as_ref() };

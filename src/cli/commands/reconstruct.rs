@@ -13,13 +13,13 @@ use crate::cli::inputs::grid::asked_grid;
 use crate::cli::inputs::noted::read_told;
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::Outputs;
-use crate::cli::outputs::drawing::{Drawing, Finished, ToFile};
+use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::Written;
-use crate::cli::report::run_report::{Distances, Hausdorff, Hole, Moves, Ran, Report};
+use crate::cli::report::run_report::{Distances, Hausdorff, Hole, Moves, Ran, Report, SimplifiedCopy};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals;
@@ -30,6 +30,7 @@ use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::read::source::Source;
 use crate::job::disk::Disk;
 use crate::job::resources::Resources;
+use crate::pipeline::output::viewer_mesh::{Segments, Simplified};
 use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, plan, reconstruct_shown, refuse_too_fine,
     spacing_memory, typical_spacing, without_isolated,
@@ -207,7 +208,8 @@ impl Job {
         let mut drawing = Drawing::new(store.as_ref(), to, &self.grid, false)?;
         let found = reconstruct_shown(engine, &self.grid, &self.cloud, &self.settings, (&mut drawing, store.as_ref()))
             .map_err(|error| error.at(&self.args.cloud))?;
-        let mesh = drawing.finish()?;
+        let (geometry, segments) = (&self.grid, Segments::Object(1));
+        let (mesh, copy) = drawing.finish(&ForViewers { engine, store: store.as_ref(), geometry, segments })?;
         if let Some(store) = &store {
             found.write(engine, store)?;
         }
@@ -227,7 +229,7 @@ impl Job {
                 points: "points",
             };
             let written = Written { store: &store, engine, console: self.console.as_ref() };
-            written.write(&evidence, || self.report(engine, &found))?;
+            written.write(&evidence, || self.report(engine, &found, copy))?;
             engine.check()?;
             drop(telling);
             store.finish()?;
@@ -235,7 +237,7 @@ impl Job {
         engine.check()?;
         mesh.map_or(Ok(()), Finished::place)?;
         if let Some(path) = &output.report {
-            self.report(engine, &found).write(path, output.overwrite)?;
+            self.report(engine, &found, copy).write(path, output.overwrite)?;
         }
         Ok(found)
     }
@@ -253,7 +255,7 @@ impl Job {
         }
     }
 
-    fn report(&self, engine: &Engine, found: &Reconstruction) -> Report<Settings, Found> {
+    fn report(&self, engine: &Engine, found: &Reconstruction, copy: Option<Simplified>) -> Report<Settings, Found> {
         let ran = Ran {
             command: "reconstruct",
             typed: &self.typed,
@@ -263,7 +265,7 @@ impl Job {
             ranks: engine.ranks(),
             started: self.started,
         };
-        Report::new(&ran, Settings::new(self, found), &found.geometry, Found::new(found, self.cloud.len() as u64))
+        Report::new(&ran, Settings::new(self, found), &found.geometry, Found::new(found, self.cloud.len() as u64, copy))
     }
 }
 
@@ -354,6 +356,8 @@ struct Found {
     closed: bool,
     components: u64,
     triangles: u64,
+    /// The copy of a large surface.
+    simplified: Option<SimplifiedCopy>,
     open_edges: u64,
     hausdorff: Option<Hausdorff>,
     distances: Option<Distances>,
@@ -375,13 +379,14 @@ struct Found {
 }
 
 impl Found {
-    fn new(found: &Reconstruction, cloud_points: u64) -> Self {
+    fn new(found: &Reconstruction, cloud_points: u64, copy: Option<Simplified>) -> Self {
         Self {
             volume: found.measures.volume,
             area: found.measures.area,
             closed: found.measures.is_closed(),
             components: found.measures.components,
             triangles: found.measures.triangles,
+            simplified: copy.map(Into::into),
             open_edges: found.measures.open_edges,
             hausdorff: found.hausdorff.map(Into::into),
             distances: found.spread.clone().map(Into::into),

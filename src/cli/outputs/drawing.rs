@@ -7,10 +7,12 @@ use std::sync::{Mutex, PoisonError};
 use super::checks::numbered;
 use super::files::mesh_format;
 use crate::error::Result;
+use crate::exec::Engine;
 use crate::grid::Geometry;
 use crate::io::geometry::write::formats::{MeshFile, WholeMesh};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
+use crate::pipeline::output::viewer_mesh::{Segments, Simplified, for_viewers};
 use crate::pipeline::segment::{ObjectMesh, ObjectMeshes};
 use crate::store::{BothSinks, MeshSink};
 
@@ -29,6 +31,15 @@ pub(crate) struct ToFile<'a> {
     pub(crate) is_copy: bool,
     /// Whether what has its name may be replaced.
     pub(crate) replace: bool,
+}
+
+/// What the meshes of viewers are made with.
+#[derive(Clone, Copy)]
+pub(crate) struct ForViewers<'a> {
+    pub(crate) engine: &'a Engine,
+    pub(crate) store: Option<&'a StoreWriter>,
+    pub(crate) geometry: &'a Geometry,
+    pub(crate) segments: Segments,
 }
 
 /// The file while it is written; what went wrong with a copy.
@@ -55,10 +66,13 @@ impl Drawing {
         Ok(Self { first: ply, second: to.map(|to| Asked::new(to, geometry)).transpose()? })
     }
 
-    /// Completes the files; that which was asked for gets its name later.
-    pub(crate) fn finish(self) -> Result<Option<Finished>> {
-        self.first.map_or(Ok(()), PlyWriter::finish)?;
-        self.second.map(Asked::finish).transpose()
+    /// Completes the files, that which was asked for gets its name later; makes what a store has of them for viewers, and tells of
+    /// the copy of a large one.
+    pub(crate) fn finish(self, to: &ForViewers<'_>) -> Result<(Option<Finished>, Option<Simplified>)> {
+        let written = self.first.map(PlyWriter::finish).transpose()?;
+        let file = self.second.map(Asked::finish).transpose()?;
+        let Some((store, written)) = to.store.zip(written) else { return Ok((file, None)) };
+        Ok((file, for_viewers(to.engine, store, (&written, to.geometry), to.segments)?))
     }
 }
 
@@ -187,7 +201,7 @@ mod tests {
         let mut copy = Drawing::new(None, Some(to(true)), &geometry, false).unwrap();
         copy.triangle([0, 1, 2]).unwrap();
         copy.vertex([0.0; 3]).unwrap();
-        let finished = copy.finish().unwrap().unwrap();
+        let finished = copy.second.unwrap().finish().unwrap();
         let error = finished.place().unwrap_err().to_string();
         assert!(error.contains("m.stl: the mesh cannot be written"), "{error}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing stays of either");

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::run_report::SimplifiedCopy;
 use super::table::cut;
 use crate::cli::args::distance::MiddleChoice;
 use crate::cli::args::distance::{DistanceJobArgs, PrecisionArg};
@@ -13,6 +14,7 @@ use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::surface::Pair;
 use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Schedule};
 use crate::pipeline::middle::{LabelMode, MiddleFound, SurfaceKind};
+use crate::pipeline::output::viewer_mesh::Simplified;
 
 /// What was found, in some lines; `whole_in` says where all labels are told, `pairs_in` all pairs of them.
 pub(crate) fn describe_found(found: &Found, whole_in: &str, pairs_in: &str) -> String {
@@ -156,6 +158,14 @@ impl Found {
     pub(crate) fn of_middle(found: &MiddleFound, sets: usize) -> Self {
         Self { middle: Some(Middle::new(found, sets)), ..Self::new(&found.distance) }
     }
+
+    /// With the copy of a large surface.
+    pub(crate) fn with_copy(mut self, copy: Option<Simplified>) -> Self {
+        if let Some(middle) = &mut self.middle {
+            middle.simplified = copy.map(Into::into);
+        }
+        self
+    }
 }
 
 /// The surfaces between labels.
@@ -168,6 +178,8 @@ struct Middle {
     closed: Option<bool>,
     components: u64,
     triangles: u64,
+    /// The copy of a large surface.
+    simplified: Option<SimplifiedCopy>,
     pairs: Vec<PairReport>,
 }
 
@@ -200,6 +212,7 @@ impl Middle {
             closed,
             components: measures.components,
             triangles: measures.triangles,
+            simplified: None,
             pairs: found.pairs.iter().map(PairReport::new).collect(),
         }
     }

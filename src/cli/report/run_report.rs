@@ -15,6 +15,7 @@ use crate::job::resources::Resources;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::level_set::motion::Motion;
 use crate::pipeline::level_set::time_loop::Stop;
+use crate::pipeline::output::viewer_mesh::Simplified;
 use crate::pipeline::segment::{ObjectReport, Outcome, Overlap, SegmentSettings};
 
 /// The whole report.
@@ -128,6 +129,8 @@ struct Object {
     closed: bool,
     components: u64,
     triangles: u64,
+    /// The copy of a large surface.
+    simplified: Option<SimplifiedCopy>,
     hausdorff: Option<Hausdorff>,
     distances: Option<Distances>,
     cloud_points: u64,
@@ -200,6 +203,26 @@ pub(crate) struct Distances {
 impl From<crate::kernel::surface::Spread> for Distances {
     fn from(found: crate::kernel::surface::Spread) -> Self {
         Self { bin_width: found.width, counts: found.counts }
+    }
+}
+
+/// The copy of a large surface, with fewer triangles. Lengths physical.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct SimplifiedCopy {
+    triangles: u64,
+    /// Edge of the cubes whose vertices were joined.
+    cube: f64,
+    /// The largest distance from the copy, of the places where it was measured.
+    error: f64,
+    /// A vertex of what stays moved by no more than this.
+    bound: f64,
+    /// Share of the surface in pieces smaller than a cube, which the copy does not have.
+    left_out: f64,
+}
+
+impl From<Simplified> for SimplifiedCopy {
+    fn from(Simplified { triangles, cube, error, bound, left_out }: Simplified) -> Self {
+        Self { triangles, cube, error, bound, left_out }
     }
 }
 
@@ -320,6 +343,7 @@ impl Object {
             closed: object.measures.is_closed(),
             components: object.measures.components,
             triangles: object.measures.triangles,
+            simplified: object.simplified.map(Into::into),
             hausdorff: object.hausdorff.map(Into::into),
             distances: object.spread.clone().map(Into::into),
             cloud_points: object.cloud_points,

@@ -1,4 +1,5 @@
-//! Fields on their way into the store.
+//! Fields and meshes on their way into the store.
 
 pub(crate) mod drawn;
 pub mod pyramid;
+pub mod viewer_mesh;

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::grid::Geometry;
+use crate::io::geometry::write::again::Written;
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::store::{BothSinks, MeshSink};
 
@@ -27,9 +28,10 @@ pub trait ObjectMesh: MeshSink {
 pub(super) type Surface<'a> = BothSinks<PlyWriter, Box<dyn ObjectMesh + 'a>>;
 
 impl Surface<'_> {
-    /// Gives it to all that take it.
-    pub(super) fn keep(self) -> Result<()> {
-        self.first.map_or(Ok(()), PlyWriter::finish)?;
-        self.second.map_or(Ok(()), ObjectMesh::keep)
+    /// Gives it to all that take it; returns what is in the store.
+    pub(super) fn keep(self) -> Result<Option<Written>> {
+        let written = self.first.map(PlyWriter::finish).transpose()?;
+        self.second.map_or(Ok(()), ObjectMesh::keep)?;
+        Ok(written)
     }
 }

@@ -3,6 +3,7 @@
 use crate::kernel::surface::{Hausdorff, Measures, Spread};
 use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::level_set::time_loop::Evolution;
+use crate::pipeline::output::viewer_mesh::Simplified;
 
 /// What is reported of a solved object.
 #[derive(Clone, Debug)]
@@ -35,6 +36,8 @@ pub struct ObjectReport {
     pub rho: f64,
     /// How far outlines that are left out lie from the shape of the others, where that was asked for.
     pub cross_validation: Option<CrossValidation>,
+    /// The copy of a large surface that its store has for viewers.
+    pub simplified: Option<Simplified>,
 }
 
 /// What leaving out each outline in turn tells.

@@ -21,6 +21,7 @@ use crate::pipeline::enclosure::needs::SOLVE_BYTES;
 use crate::pipeline::enclosure::region::voxel_bounds;
 use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::output::pyramid::{Reduce, write_levels};
+use crate::pipeline::output::viewer_mesh::{Segments, for_viewers};
 use crate::pipeline::surface::{self, Drawn};
 use crate::store::{Element, ElementType};
 
@@ -157,8 +158,11 @@ fn draw(
     stage.finish();
     check_left(marks, solution, measures.triangles, settings)?;
     check_surface(marks, geometry, hausdorff)?;
-    mesh.keep()?;
+    let (written, mut simplified) = (mesh.keep()?, None);
     if let Some(store) = store {
+        if let Some(written) = written {
+            simplified = for_viewers(engine, store, (&written, geometry), Segments::Object(label))?;
+        }
         write_fields(engine, solution, label, store, several)?;
     }
     Ok(ObjectReport {
@@ -176,6 +180,7 @@ fn draw(
         theta: solution.theta,
         rho: solution.rho,
         cross_validation: None,
+        simplified,
     })
 }
 

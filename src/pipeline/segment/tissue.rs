@@ -11,6 +11,7 @@ use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::surface::Contact;
 use crate::pipeline::image::ingest::Image;
 use crate::pipeline::image::intensity::Normalised;
+use crate::pipeline::output::viewer_mesh::{Segments, for_viewers};
 use crate::store::{Element, NoMesh};
 
 /// Joins objects; walls between them are looked for in the image where that has a say in them.
@@ -49,7 +50,8 @@ pub(super) fn write_faces(
         Some(store) => {
             let mut mesh = PlyWriter::tagged_on_grid(&store.file("meshes/cells.ply")?, geometry)?;
             let contacts = draw_faces(&stage, geometry, labels, &mut mesh)?;
-            mesh.finish()?;
+            let written = mesh.finish()?;
+            for_viewers(engine, store, (&written, geometry), Segments::None)?;
             let path = store.file("meshes/contacts.csv")?;
             std::fs::write(&path, csv(&contacts))
                 .map_err(|e| Error::from_io("cannot write the table", &e).at(&path))?;

@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use super::again::Written;
 use super::body::{BUFFER, Body, Form};
 use super::temporary::Temporary;
 use crate::error::{Error, Result};
@@ -70,18 +71,20 @@ impl PlyWriter {
         start().map_err(|e| unwritable(&e, path))
     }
 
-    /// Completes the file and puts it under its name, in place of any file that was there.
+    /// Completes the file and puts it under its name, in place of any file that was there; returns what is in it.
     ///
     /// # Errors
     /// When the file cannot be written or renamed.
-    pub fn finish(self) -> Result<()> {
+    pub fn finish(self) -> Result<Written> {
         let Self { path, hidden, body } = self;
+        let written = body.written(&path);
         let finish = || -> io::Result<()> {
             body.end()?;
             hidden.sync()?;
             hidden.place(true)
         };
-        finish().map_err(|e| unwritable(&e, &path))
+        finish().map_err(|e| unwritable(&e, &path))?;
+        Ok(written)
     }
 }
 
@@ -109,6 +112,18 @@ impl Ply {
         file.write_all(&header(&form, u64::MAX, u64::MAX))?;
         let triangles = BufWriter::with_capacity(BUFFER, Temporary::new(folder)?);
         Ok(Self { form, file, triangles, vertex_count: 0, triangle_count: 0 })
+    }
+
+    /// Where things lie in the file when it is complete.
+    fn written(&self, path: &Path) -> Written {
+        Written {
+            path: path.to_path_buf(),
+            start: header(&self.form, u64::MAX, u64::MAX).len() as u64,
+            vertices: self.vertex_count,
+            triangles: self.triangle_count,
+            is_double: self.form.is_double,
+            is_tagged: self.form.is_tagged,
+        }
     }
 
     fn end(self) -> io::Result<()> {
