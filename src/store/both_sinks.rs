@@ -33,6 +33,15 @@ impl<A: MeshSink, B: MeshSink> MeshSink for BothSinks<A, B> {
         self.each(|sink| sink.vertex(position), |sink| sink.vertex(position))
     }
 
+    fn keeps_values(&self) -> bool {
+        self.first.as_ref().is_some_and(MeshSink::keeps_values)
+            || self.second.as_ref().is_some_and(MeshSink::keeps_values)
+    }
+
+    fn valued_vertex(&mut self, position: [f64; 3], value: f64) -> Result<()> {
+        self.each(|sink| sink.valued_vertex(position, value), |sink| sink.valued_vertex(position, value))
+    }
+
     fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
         self.each(|sink| sink.triangle(corners), |sink| sink.triangle(corners))
     }
@@ -49,6 +58,14 @@ impl<S: MeshSink + ?Sized> MeshSink for Box<S> {
 
     fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
         (**self).vertex(position)
+    }
+
+    fn keeps_values(&self) -> bool {
+        (**self).keeps_values()
+    }
+
+    fn valued_vertex(&mut self, position: [f64; 3], value: f64) -> Result<()> {
+        (**self).valued_vertex(position, value)
     }
 
     fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {

@@ -184,6 +184,19 @@ pub trait MeshSink {
     /// When the vertex cannot be written.
     fn vertex(&mut self, position: [f64; 3]) -> Result<()>;
 
+    /// Whether it keeps what [`MeshSink::valued_vertex`] tells beside a vertex's place.
+    fn keeps_values(&self) -> bool {
+        false
+    }
+
+    /// Takes the next vertex, and a number that is told of it, such as a thickness.
+    ///
+    /// # Errors
+    /// When the vertex cannot be written.
+    fn valued_vertex(&mut self, position: [f64; 3], _value: f64) -> Result<()> {
+        self.vertex(position)
+    }
+
     /// Takes a triangle of vertices that came before it, counter-clockwise as seen from outside.
     ///
     /// # Errors

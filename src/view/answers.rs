@@ -21,8 +21,9 @@ use tokio_util::io::ReaderStream;
 
 use super::folder::Opened;
 use super::ranges::{Asked, Part, part};
-use super::shown::{MeshFile, Shown};
+use super::shown::{Drawn, MeshFile, Shown};
 use super::{mesh, page, state};
+use crate::io::geometry::write::precomputed;
 use crate::io::ome_zarr::{Live, LiveState};
 
 /// Bytes of a file that are in memory at a time, of each request.
@@ -81,6 +82,7 @@ pub(super) fn router(shown: Shown) -> Router {
         .route("/state.json", get(page_state))
         .route("/live.json", get(live))
         .route("/mesh/{name}", get(mesh_part))
+        .route("/mesh/segment_properties/info", get(mesh_names))
         .route("/growing/{moved}/{name}", get(growing_part))
         .route("/data/{*path}", get(data))
         .route("/{name}", get(|Path(name): Path<String>, headers: HeaderMap| async move { page_file(&name, &headers) }))
@@ -174,7 +176,7 @@ async fn growing_part(State(site): State<Arc<Site>>, Path((_moved, name)): Path<
 
 async fn part_of_mesh(shown: &Shown, meshes: &[MeshFile], name: &str) -> Response {
     if name == "info" {
-        return of_type("application/json", json!({ "@type": "neuroglancer_legacy_mesh" }).to_string());
+        return of_type("application/json", precomputed::info(&names(meshes)).to_string());
     }
     let numbered = |digits: &str| {
         let segment: u64 = digits.parse().ok()?;
@@ -185,11 +187,25 @@ async fn part_of_mesh(shown: &Shown, meshes: &[MeshFile], name: &str) -> Respons
     }
     let Some(mesh_file) = numbered(name) else { return StatusCode::NOT_FOUND.into_response() };
     let metres = shown.images.iter().flat_map(|image| &image.axes).find_map(|axis| axis.metres).unwrap_or(NO_UNIT);
-    let file = mesh_file.file.clone();
-    match tokio::task::spawn_blocking(move || mesh::fragment(&file, metres)).await {
-        Ok(Ok(bytes)) => of_type("application/octet-stream", bytes),
+    let drawn = mesh_file.drawn.clone();
+    let read = move || match drawn {
+        Drawn::Fragment(file) => std::fs::read(file).ok(),
+        Drawn::Mesh(file) => mesh::fragment(&file, metres).ok(),
+    };
+    match tokio::task::spawn_blocking(read).await {
+        Ok(Some(bytes)) => of_type("application/octet-stream", bytes),
         _ => StatusCode::NOT_FOUND.into_response(),
     }
+}
+
+/// What segments are called that are no objects.
+fn names(meshes: &[MeshFile]) -> Vec<(u64, String)> {
+    meshes.iter().filter_map(|mesh| Some((mesh.segment, mesh.name.clone()?))).collect()
+}
+
+async fn mesh_names(State(site): State<Arc<Site>>) -> Response {
+    let now = looked_at(site).await;
+    of_type("application/json", precomputed::properties(&names(&now.shown.meshes)).to_string())
 }
 
 /// A file of a store, or a part of it.

@@ -17,13 +17,16 @@ pub fn links(shown: &Shown, origin: &str) -> String {
         format!("report               {origin}/data/{}/report.html\n", utf8_percent_encode(name, NON_ALPHANUMERIC))
     });
     let segments = shown.meshes.iter().map(|mesh| {
-        format!("neuroglancer mesh    precomputed://{origin}/mesh  (segment {}: {})\n", mesh.segment, mesh.path)
+        let name = mesh.name.as_ref().map_or(String::new(), |name| format!(", {name}"));
+        format!("neuroglancer mesh    precomputed://{origin}/mesh  (segment {}: {}{name})\n", mesh.segment, mesh.path)
     });
     let stores = shown.roots.iter().map(|(_, folder)| {
         let store = folder.root().display();
         format!("napari               napari --plugin napari-ome-zarr {store}\nFiji (MoBIE, N5)     {store}\n")
     });
-    let meshes = shown.meshes.iter().map(|mesh| format!("ParaView             paraview {}\n", mesh.file.display()));
+    // Parts of one file follow each other.
+    let files = shown.meshes.chunk_by(|a, b| a.file == b.file).map(|parts| &parts[0].file);
+    let meshes = files.map(|file| format!("ParaView             paraview {}\n", file.display()));
     let rest: String = reports.chain(segments).chain(stores).chain(meshes).collect();
     format!("page                 {origin}/\n{images}{rest}")
 }

@@ -1,11 +1,11 @@
-//! Meshes as neuroglancer reads them: "legacy precomputed", one mesh a fragment. The number of vertices, their positions in
-//! nanometres, the corners of triangles; little-endian, 32 bit.
+//! Meshes as neuroglancer reads them, made of files of other formats when they are asked for.
 
 use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::io::geometry::read::source::Source;
 use crate::io::geometry::read::sources::read_source;
+use crate::io::geometry::write::precomputed;
 
 /// The bytes of a mesh file whose unit has so many metres.
 ///
@@ -15,15 +15,8 @@ pub(super) fn fragment(file: &Path, metres: f64) -> Result<Vec<u8>> {
     let Source::Mesh(mesh) = read_source(file)? else {
         return Err(Error::input("holds points and no triangle").at(file));
     };
-    let count =
-        u32::try_from(mesh.vertices.len()).map_err(|_| Error::input("has too many vertices for this view").at(file))?;
-    let mut bytes = Vec::with_capacity(4 + 12 * (mesh.vertices.len() + mesh.triangles.len()));
-    bytes.extend(count.to_le_bytes());
-    for value in mesh.vertices.iter().flatten() {
-        bytes.extend(((value * metres * 1e9) as f32).to_le_bytes());
+    if u32::try_from(mesh.vertices.len()).is_err() {
+        return Err(Error::input("has too many vertices for this view").at(file));
     }
-    for corner in mesh.triangles.iter().flatten() {
-        bytes.extend(corner.to_le_bytes());
-    }
-    Ok(bytes)
+    Ok(precomputed::fragment(&mesh.vertices, &mesh.triangles, metres * 1e9))
 }

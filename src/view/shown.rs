@@ -7,11 +7,13 @@ use std::time::UNIX_EPOCH;
 use serde_json::Value;
 
 use super::folder::Folder;
+use super::ready::Ready;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::point_file::PointFile;
 use crate::io::geometry::read::points::{LengthUnit, read_points};
 use crate::io::ome_zarr::{Live, LiveState, live};
 use crate::pipeline::level_set::growing::FOLDER as GROWING;
+use crate::pipeline::output::viewer_mesh::{PRECOMPUTED, SIMPLIFIED};
 use crate::pipeline::segment::MARKS;
 
 /// Folders below a store that are looked into.
@@ -87,6 +89,19 @@ pub(super) struct MeshFile {
     pub(super) file: PathBuf,
     /// The number that the page knows it by: that of its object, where its name has one.
     pub(super) segment: u64,
+    /// What it is called, where it is a part of a surface.
+    pub(super) name: Option<String>,
+    /// What the page gets of it.
+    pub(super) drawn: Drawn,
+}
+
+/// What is made of a mesh.
+#[derive(Clone, Debug)]
+pub(super) enum Drawn {
+    /// The bytes of a file as they are.
+    Fragment(PathBuf),
+    /// A mesh that has to be read.
+    Mesh(PathBuf),
 }
 
 impl Shown {
@@ -165,16 +180,31 @@ impl Shown {
         let true_path =
             path.canonicalize().map_err(|e| Error::input(format!("cannot be opened: {e}")).caused_by(e).at(path))?;
         let name = file_name(&true_path);
-        self.push_mesh(name, true_path);
+        self.push_mesh(name, true_path, &Ready::default());
         Ok(())
     }
 
-    fn push_mesh(&mut self, path: String, file: PathBuf) {
+    /// Adds a mesh, as what is ready of it.
+    fn push_mesh(&mut self, path: String, file: PathBuf, ready: &Ready) {
+        let fragments = ready.fragments_of(&file);
+        if fragments.is_empty() {
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+            let own = stem.rsplit_once('-').and_then(|(_, number)| number.parse().ok());
+            let drawn = Drawn::Mesh(ready.copy_of(&file));
+            self.meshes.push(MeshFile { path, segment: self.free_segment(own), name: None, drawn, file });
+            return;
+        }
+        for fragment in fragments {
+            let segment = self.free_segment(Some(fragment.segment));
+            let (name, drawn) = (fragment.name, Drawn::Fragment(fragment.file));
+            self.meshes.push(MeshFile { path: path.clone(), file: file.clone(), segment, name, drawn });
+        }
+    }
+
+    /// The number of a mesh: its own, or another where that is taken.
+    fn free_segment(&self, own: Option<u64>) -> u64 {
         let is_free = |segment: &u64| *segment > 0 && self.meshes.iter().all(|mesh| mesh.segment != *segment);
-        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-        let own = stem.rsplit_once('-').and_then(|(_, number)| number.parse().ok()).filter(is_free);
-        let segment = own.or_else(|| (1..=u64::MAX).find(is_free)).unwrap_or(1);
-        self.meshes.push(MeshFile { path, file, segment });
+        own.filter(is_free).or_else(|| (1..=u64::MAX).find(is_free)).unwrap_or(1)
     }
 
     fn push_growing(&mut self, file: PathBuf) {
@@ -183,7 +213,8 @@ impl Shown {
         let since = changed.and_then(|at| at.duration_since(UNIX_EPOCH).ok()).unwrap_or_default();
         *moved = moved.wrapping_mul(31).wrapping_add(since.as_millis() as u64);
         let segment = meshes.len() as u64 + 1;
-        meshes.push(MeshFile { path: file_name(&file), file, segment });
+        let drawn = Drawn::Mesh(file.clone());
+        meshes.push(MeshFile { path: file_name(&file), file, segment, name: None, drawn });
     }
 
     /// Leaves out fields where there are more than somebody would look through.
@@ -212,15 +243,19 @@ impl Shown {
         if let Some(image) = multiscale(folder).and_then(|found| image(path, folder, &found)) {
             self.images.push(image);
         }
+        let ready = if folder.ends_with("meshes") { Ready::of(folder) } else { Ready::default() };
         for file in files(folder) {
             let is_mesh = file.extension().is_some_and(|e| ["ply", "obj", "stl", "off"].map(str::as_ref).contains(&e));
             if is_mesh && folder.ends_with(GROWING) {
                 self.push_growing(file);
             } else if is_mesh && self.meshes.len() < MOST {
-                self.push_mesh(format!("{path}/{}", file_name(&file)), file);
+                self.push_mesh(format!("{path}/{}", file_name(&file)), file, &ready);
             }
         }
-        for below in folders(folder).into_iter().filter(|_| depth > 0) {
+        // Those hold the same meshes once more.
+        let is_looked_into =
+            |below: &PathBuf| depth > 0 && !below.ends_with(PRECOMPUTED) && !below.ends_with(SIMPLIFIED);
+        for below in folders(folder).into_iter().filter(is_looked_into) {
             self.add_group(&format!("{path}/{}", file_name(&below)), &below, depth - 1);
         }
     }

@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::shown::{Axis, Image, Kind, Shown};
+use super::shown::{Axis, Image, Kind, MeshFile, Shown};
 
 /// Colours of meshes without one, evenly around the circle of hues.
 const HUE_STEP: f64 = 0.618_033_988_75;
@@ -99,14 +99,18 @@ fn marks(image: &Image, marks: &[[f64; 3]]) -> Value {
     })
 }
 
-/// All meshes as one layer, those of labels in the labels' colours.
+/// All meshes as one layer: those of labels in the labels' colours, those of pairs of labels in hues apart.
 fn meshes(shown: &Shown) -> Value {
     let labelled =
         |segment: u64| shown.images.iter().flat_map(|image| &image.colors).find(|(label, _)| *label == segment);
-    let color = |segment: u64| labelled(segment).map_or_else(|| hue(segment as f64 * HUE_STEP), |(_, color)| *color);
-    let numbers = || shown.meshes.iter().map(|mesh| mesh.segment);
-    let colors: Map<String, Value> = numbers().map(|n| (n.to_string(), hex(color(n)).into())).collect();
-    let segments: Vec<String> = numbers().map(|n| n.to_string()).collect();
+    let color = |mesh: &MeshFile| {
+        // The number of a pair of labels is that of neither.
+        let label = labelled(mesh.segment).filter(|_| mesh.name.is_none());
+        label.map_or_else(|| hue(mesh.segment as f64 * HUE_STEP), |(_, color)| *color)
+    };
+    let all = || shown.meshes.iter();
+    let colors: Map<String, Value> = all().map(|mesh| (mesh.segment.to_string(), hex(color(mesh)).into())).collect();
+    let segments: Vec<String> = all().map(|mesh| mesh.segment.to_string()).collect();
     json!({
         "type": "segmentation", "name": "surfaces", "source": mesh_source(shown, "mesh"), "segments": segments,
         "segmentColors": colors, "objectAlpha": 0.8,

@@ -27,6 +27,7 @@ use crate::cli::terminal::text::{bytes, duration, grouped, place, triple};
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Engine, Plan, Progress};
 use crate::grid::{DataSets, Geometry};
+use crate::io::geometry::write::formats::Values;
 use crate::io::ome_zarr::StoreWriter;
 use crate::job::disk::Disk;
 use crate::job::resources::Resources;
@@ -145,7 +146,9 @@ impl Job {
         let (store, telling) = begin_store(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
         let replace = output.overwrite;
-        let to = mesh.map(|path| ToFile { path, scratch, is_tagged: true, is_copy, replace });
+        let thickness = Values { name: "thickness", at: None };
+        let values = Some(&thickness);
+        let to = mesh.map(|path| ToFile { path, scratch, is_tagged: true, is_copy, replace, values });
         let has_surface = self.middle.is_some();
         let mut drawing = Drawing::new(store.as_ref().filter(|_| has_surface), to, &self.geometry, true)?;
         let found = self.solve::<P>(engine, store.as_ref(), &mut drawing)?;

@@ -13,7 +13,7 @@ use crate::cli::inputs::grid::asked_grid;
 use crate::cli::inputs::noted::read_told;
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::Outputs;
-use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
+use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile, distance_to_marks};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
@@ -204,7 +204,12 @@ impl Job {
         let (store, telling) = begin_store(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
         let replace = output.overwrite;
-        let to = self.args.mesh.as_deref().map(|path| ToFile { path, scratch, is_tagged: false, is_copy, replace });
+        let points = || self.cloud.clone();
+        let values =
+            self.args.mesh.as_deref().map(|path| distance_to_marks(engine, path, points)).transpose()?.flatten();
+        let values = values.as_ref();
+        let to =
+            self.args.mesh.as_deref().map(|path| ToFile { path, scratch, is_tagged: false, is_copy, replace, values });
         let mut drawing = Drawing::new(store.as_ref(), to, &self.grid, false)?;
         let found = reconstruct_shown(engine, &self.grid, &self.cloud, &self.settings, (&mut drawing, store.as_ref()))
             .map_err(|error| error.at(&self.args.cloud))?;

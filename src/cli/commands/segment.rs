@@ -194,7 +194,7 @@ impl Job {
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
             store => store,
         };
-        let meshes = self.mesh_files();
+        let meshes = self.mesh_files(engine);
         let taken = meshes.as_ref().map(|meshes| meshes as &dyn ObjectMeshes);
         let out = (store.as_ref(), taken);
         let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, out)
@@ -236,12 +236,13 @@ impl Job {
     }
 
     /// The files that surfaces are drawn into, where they were asked for.
-    fn mesh_files(&self) -> Option<ObjectFiles<'_>> {
+    fn mesh_files<'a>(&'a self, engine: &'a Engine) -> Option<ObjectFiles<'a>> {
         let path = self.args.drawn.mesh.as_deref()?;
         let (scratch, output) = (self.resources.scratch.as_path(), &self.args.output);
         let (is_copy, replace) = (output.store().is_some(), output.overwrite);
-        let to = ToFile { path, scratch, is_tagged: false, is_copy, replace };
-        Some(ObjectFiles::new(to, self.objects.numbers().len() > 1, &self.geometry))
+        let to = ToFile { path, scratch, is_tagged: false, is_copy, replace, values: None };
+        let marks = (engine, self.objects.fit.as_slice());
+        Some(ObjectFiles::new(to, self.objects.numbers().len() > 1, &self.geometry, marks))
     }
 
     /// The picture and the report beside the store.

@@ -2,16 +2,18 @@
 //! What goes wrong with a file beside a store is told when the store is complete: it costs a copy, not the result.
 
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::checks::numbered;
 use super::files::mesh_format;
 use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::Geometry;
-use crate::io::geometry::write::formats::{MeshFile, WholeMesh};
+use crate::io::geometry::write::formats::{MeshFile, Values, WholeMesh};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::StoreWriter;
+use crate::kernel::geometry::nearest_point::NearestPoint;
+use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::output::viewer_mesh::{Segments, Simplified, for_viewers};
 use crate::pipeline::segment::{ObjectMesh, ObjectMeshes};
 use crate::store::{BothSinks, MeshSink};
@@ -31,6 +33,8 @@ pub(crate) struct ToFile<'a> {
     pub(crate) is_copy: bool,
     /// Whether what has its name may be replaced.
     pub(crate) replace: bool,
+    /// A number that is told of each vertex.
+    pub(crate) values: Option<&'a Values>,
 }
 
 /// What the meshes of viewers are made with.
@@ -80,6 +84,10 @@ impl Asked {
     fn new(to: ToFile<'_>, geometry: &Geometry) -> Result<Self> {
         let format = mesh_format(to.path)?;
         let file = MeshFile::create(format, to.path, geometry, to.is_tagged, to.scratch)?;
+        let file = match to.values.filter(|_| format.has_values) {
+            Some(values) => file.with_values(values.clone(), to.scratch)?,
+            None => file,
+        };
         Ok(Self { file: Ok(file), is_copy: to.is_copy, replace: to.replace })
     }
 
@@ -116,6 +124,14 @@ impl MeshSink for Asked {
         self.take(|file| file.vertex(position))
     }
 
+    fn keeps_values(&self) -> bool {
+        self.file.as_ref().is_ok_and(MeshSink::keeps_values)
+    }
+
+    fn valued_vertex(&mut self, position: [f64; 3], value: f64) -> Result<()> {
+        self.take(|file| file.valued_vertex(position, value))
+    }
+
     fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {
         self.take(|file| file.triangle(corners))
     }
@@ -125,12 +141,42 @@ impl MeshSink for Asked {
     }
 }
 
+/// The distance to the nearest of some points, for a file whose format holds it, unless there are none or the memory has no room
+/// for what finds it.
+pub(crate) fn distance_to_marks(
+    engine: &Engine,
+    path: &Path,
+    points: impl FnOnce() -> Vec<[f64; 3]>,
+) -> Result<Option<Values>> {
+    let name = "distance_to_marks";
+    if !mesh_format(path)?.has_values {
+        return Ok(None);
+    }
+    let points = points();
+    if points.is_empty() {
+        return Ok(None);
+    }
+    let Ok(held) = engine.hold(NearestPoint::BYTES * points.len() as u64) else {
+        engine.note(&format!(
+            "{}: without {name}: the memory has no room for it; more --memory gives it",
+            path.display()
+        ));
+        return Ok(None);
+    };
+    let nearest = NearestPoint::new(points);
+    // It is held as long as the file is written.
+    let at = move |place| (&held, nearest.distance(place)).1;
+    Ok(Some(Values { name, at: Some(Arc::new(at)) }))
+}
+
 /// The files of several objects, or that of one.
 pub(crate) struct ObjectFiles<'a> {
     to: ToFile<'a>,
     several: bool,
     /// The grid of all objects.
     geometry: &'a Geometry,
+    /// The engine and the marks of objects, for their distance.
+    marks: (&'a Engine, &'a [ObjectMarks]),
     finished: Mutex<Vec<(u32, Finished)>>,
 }
 
@@ -143,8 +189,13 @@ struct ObjectFile<'a> {
 
 impl<'a> ObjectFiles<'a> {
     /// Files by the name that was asked for, numbered where there are several objects.
-    pub(crate) fn new(to: ToFile<'a>, several: bool, geometry: &'a Geometry) -> Self {
-        Self { to, several, geometry, finished: Mutex::default() }
+    pub(crate) fn new(
+        to: ToFile<'a>,
+        several: bool,
+        geometry: &'a Geometry,
+        marks: (&'a Engine, &'a [ObjectMarks]),
+    ) -> Self {
+        Self { to, several, geometry, marks, finished: Mutex::default() }
     }
 
     /// Puts all files under their names.
@@ -159,7 +210,11 @@ impl ObjectMeshes for ObjectFiles<'_> {
     fn begin(&self, label: u32, grid: &Geometry) -> Result<Box<dyn ObjectMesh + '_>> {
         let numbered = numbered(self.to.path, label);
         let path = if self.several { &numbered } else { self.to.path };
-        let mut asked = Asked::new(ToFile { path, ..self.to }, grid)?;
+        let (engine, marks) = self.marks;
+        let points =
+            || marks.iter().filter(|marks| marks.object == label).flat_map(|marks| marks.contours.concat()).collect();
+        let values = distance_to_marks(engine, path, points)?;
+        let mut asked = Asked::new(ToFile { path, values: values.as_ref(), ..self.to }, grid)?;
         // All are seen from one place.
         asked.on_grid(self.geometry)?;
         Ok(Box::new(ObjectFile { of: self, label, asked }))
@@ -194,7 +249,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.stl");
         let geometry = Geometry { shape: [9; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
-        let to = |is_copy| ToFile { path: &path, scratch: folder.path(), is_tagged: false, is_copy, replace: false };
+        let to = |is_copy| ToFile {
+            path: &path,
+            scratch: folder.path(),
+            is_tagged: false,
+            is_copy,
+            replace: false,
+            values: None,
+        };
         let mut alone = Drawing::new(None, Some(to(false)), &geometry, false).unwrap();
         assert!(alone.triangle([0, 1, 2]).is_err());
         drop(alone);

@@ -1,5 +1,6 @@
 //! Triples, triangles and closed meshes: geometry in f64, without a grid.
 
+pub mod nearest_point;
 pub mod solid;
 pub mod triangle;
 pub(crate) mod vector;

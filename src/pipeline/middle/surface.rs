@@ -102,7 +102,8 @@ pub(super) fn draw(
         (batch, left) = left.split_at(drawn.next().min(left.len()));
         let patches = stage.run(batch, &workers, |worker, &id| worker.patch(labelled, &grid.brick_box(id), kind))?;
         for patch in patches.iter().filter(|patch| !patch.patch.triangles.is_empty()) {
-            welder.add(&patch.patch, sink)?;
+            let gaps = if sink.keeps_values() { labelled.gaps(patch, kind) } else { Vec::new() };
+            welder.add_valued(&patch.patch, &gaps, sink)?;
             for (n, (corners, positions)) in welder.triangles_of(&patch.patch).enumerate() {
                 measure.add(corners, positions);
                 let distances = patch.patch.triangles[n].map(|vertex| patch.distances[vertex as usize]);
@@ -118,6 +119,25 @@ pub(super) fn draw(
         })?;
     }
     Ok((measure.measures(), pairs.finish()))
+}
+
+impl Labelled<'_> {
+    /// How wide the gap is at each vertex: its distances to both sets, summed.
+    fn gaps(&self, patch: &TaggedPatch, kind: SurfaceKind) -> Vec<f64> {
+        if kind == SurfaceKind::Exact {
+            return patch.distances.iter().map(|distance| 2.0 * distance).collect();
+        }
+        let gap = |position: &[f64; 3]| {
+            let world = self.world(*position);
+            let distance = |label: u32| self.shapes.distance(world, self.trees.nearest(label, world));
+            self.first_labels.map(distance).iter().sum()
+        };
+        patch.patch.positions.iter().map(gap).collect()
+    }
+
+    fn world(&self, position: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| self.geometry.origin[a] + position[a] * self.geometry.spacing[a])
+    }
 }
 
 impl Worker {
@@ -162,8 +182,7 @@ impl Worker {
     /// The distance of each vertex of a staircase: that of the nearest voxel's source.
     fn distances_of(&self, labelled: &Labelled<'_>, part: &Box3, patch: &TaggedPatch) -> Vec<f64> {
         let distance = |position: &[f64; 3]| {
-            let geometry = labelled.geometry;
-            let world = std::array::from_fn(|a| geometry.origin[a] + position[a] * geometry.spacing[a]);
+            let world = labelled.world(*position);
             let source = self.sources[part.offset_of(position.map(|v| v.round() as i64))];
             labelled.shapes.distance(world, source)
         };

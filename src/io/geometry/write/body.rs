@@ -34,6 +34,16 @@ pub(super) trait Body: Send {
     /// Says where positions are seen from, before the first of them.
     fn anchor(&mut self, _anchor: [f64; 3]) {}
 
+    /// Says, before the first vertex, how the number is called that is told of each; what has to wait lies in a folder.
+    fn carry(&mut self, _name: &'static str, _temporary: &Path) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Takes the number of the last vertex.
+    fn value(&mut self, _value: f64) -> io::Result<()> {
+        Ok(())
+    }
+
     /// Takes the next vertex.
     fn vertex(&mut self, position: [f64; 3]) -> io::Result<()>;
 

@@ -5,6 +5,7 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::body::{Body, Form, Start};
 use super::{obj, ply, stl, temporary, vtp};
@@ -21,6 +22,8 @@ pub struct Format {
     pub extension: &'static str,
     /// Whether it holds f32 alone: positions far from zero are then written as seen from an anchor.
     pub is_single: bool,
+    /// Whether it holds a number for each vertex.
+    pub has_values: bool,
     /// Whether it is text: the digits of an f32 are then read as another number by who reads f64.
     pub is_text: bool,
     start: Start,
@@ -28,10 +31,10 @@ pub struct Format {
 
 /// The formats.
 pub const FORMATS: &[Format] = &[
-    Format { name: "PLY", extension: "ply", is_single: false, is_text: false, start: ply::start },
-    Format { name: "OBJ", extension: "obj", is_single: false, is_text: true, start: obj::start },
-    Format { name: "STL", extension: "stl", is_single: true, is_text: false, start: stl::start },
-    Format { name: "VTP", extension: "vtp", is_single: false, is_text: false, start: vtp::start },
+    Format { name: "PLY", extension: "ply", is_single: false, has_values: false, is_text: false, start: ply::start },
+    Format { name: "OBJ", extension: "obj", is_single: false, has_values: false, is_text: true, start: obj::start },
+    Format { name: "STL", extension: "stl", is_single: true, has_values: false, is_text: false, start: stl::start },
+    Format { name: "VTP", extension: "vtp", is_single: false, has_values: true, is_text: false, start: vtp::start },
 ];
 
 impl Format {
@@ -46,7 +49,17 @@ impl Format {
 /// A file of any format in the making; dropped unfinished it is gone.
 pub struct MeshFile {
     body: Box<dyn Body>,
+    values: Option<Values>,
     named: Named,
+}
+
+/// A number that is told of each vertex in a format that holds it.
+#[derive(Clone)]
+pub struct Values {
+    /// Its name in the file.
+    pub name: &'static str,
+    /// What it is at a place; none where it comes with the vertex, as [`MeshSink::valued_vertex`] has it.
+    pub at: Option<Arc<dyn Fn([f64; 3]) -> f64 + Send + Sync>>,
 }
 
 /// A file that is whole and has no name yet; dropped without one it is gone.
@@ -78,7 +91,7 @@ impl MeshFile {
         let begin = || -> io::Result<_> {
             let (hidden, file) = HiddenFile::create(path, &format!(".{}", format.extension))?;
             let body = (format.start)(file, temporary, form)?;
-            Ok(Self { body, named: Named { path: path.to_path_buf(), hidden } })
+            Ok(Self { body, values: None, named: Named { path: path.to_path_buf(), hidden } })
         };
         begin().map_err(|error| unwritable(&error, path))
     }
@@ -99,6 +112,15 @@ impl MeshFile {
         )
     }
 
+    /// The same with a number for each vertex, in a format that holds it; said before the first of them.
+    ///
+    /// # Errors
+    /// When no file can be made in the folder `temporary`.
+    pub fn with_values(mut self, values: Values, temporary: &Path) -> Result<Self> {
+        self.body.carry(values.name, temporary).map_err(|error| unwritable(&error, &self.named.path))?;
+        Ok(Self { values: Some(values), ..self })
+    }
+
     /// Where positions are seen from, in a format that holds f32 alone and cannot have them as they are.
     #[must_use]
     pub fn anchor_of(format: &Format, mesh: &TriangleMesh) -> Option<[f64; 3]> {
@@ -112,7 +134,7 @@ impl MeshFile {
     /// # Errors
     /// When it cannot be written.
     pub fn complete(self) -> Result<WholeMesh> {
-        let Self { body, named } = self;
+        let Self { body, named, .. } = self;
         body.complete().map_err(|error| unwritable(&error, &named.path))?;
         Ok(WholeMesh(named))
     }
@@ -136,7 +158,21 @@ impl MeshSink for MeshFile {
     }
 
     fn vertex(&mut self, position: [f64; 3]) -> Result<()> {
-        self.body.vertex(position).map_err(|error| unwritable(&error, &self.named.path))
+        let value = self.values.as_ref().map(|values| values.at.as_ref().map_or(f64::NAN, |at| at(position)));
+        let taken = self.body.vertex(position).and_then(|()| value.map_or(Ok(()), |value| self.body.value(value)));
+        taken.map_err(|error| unwritable(&error, &self.named.path))
+    }
+
+    fn keeps_values(&self) -> bool {
+        self.values.as_ref().is_some_and(|values| values.at.is_none())
+    }
+
+    fn valued_vertex(&mut self, position: [f64; 3], value: f64) -> Result<()> {
+        if !self.keeps_values() {
+            return self.vertex(position);
+        }
+        let taken = self.body.vertex(position).and_then(|()| self.body.value(value));
+        taken.map_err(|error| unwritable(&error, &self.named.path))
     }
 
     fn triangle(&mut self, corners: [u32; 3]) -> Result<()> {

@@ -5,7 +5,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::store::HiddenFile;
@@ -49,19 +49,12 @@ impl Precomputed {
     /// # Errors
     /// When a file cannot be written.
     pub fn describe(&self, names: &[(u64, String)]) -> Result<()> {
-        let mut info = json!({ "@type": "neuroglancer_legacy_mesh" });
         if !names.is_empty() {
-            info["segment_properties"] = PROPERTIES.into();
-            let ids: Vec<String> = names.iter().map(|(number, _)| number.to_string()).collect();
-            let values: Vec<&str> = names.iter().map(|(_, name)| name.as_str()).collect();
-            let label = json!({ "id": "label", "type": "label", "values": values });
-            let inline = json!({ "ids": ids, "properties": [label] });
-            let properties = json!({ "@type": "neuroglancer_segment_properties", "inline": inline });
             let folder = self.folder.join(PROPERTIES);
             std::fs::create_dir_all(&folder).map_err(|error| unwritable(&error, &folder))?;
-            self.put(&format!("{PROPERTIES}/info"), properties.to_string().as_bytes())?;
+            self.put(&format!("{PROPERTIES}/info"), properties(names).to_string().as_bytes())?;
         }
-        self.put("info", info.to_string().as_bytes())
+        self.put("info", info(names).to_string().as_bytes())
     }
 
     /// The file is there whole or not at all.
@@ -74,6 +67,24 @@ impl Precomputed {
         };
         put().map_err(|error| unwritable(&error, &path))
     }
+}
+
+/// What a folder of meshes says of itself; `names` are those of segments, where they have any.
+#[must_use]
+pub fn info(names: &[(u64, String)]) -> Value {
+    match names {
+        [] => json!({ "@type": "neuroglancer_legacy_mesh" }),
+        _ => json!({ "@type": "neuroglancer_legacy_mesh", "segment_properties": PROPERTIES }),
+    }
+}
+
+/// What segments are called.
+#[must_use]
+pub fn properties(names: &[(u64, String)]) -> Value {
+    let ids: Vec<String> = names.iter().map(|(number, _)| number.to_string()).collect();
+    let values: Vec<&str> = names.iter().map(|(_, name)| name.as_str()).collect();
+    let label = json!({ "id": "label", "type": "label", "values": values });
+    json!({ "@type": "neuroglancer_segment_properties", "inline": { "ids": ids, "properties": [label] } })
 }
 
 /// The bytes of a mesh in whose unit a length is so many nanometres.

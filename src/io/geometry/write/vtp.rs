@@ -1,6 +1,6 @@
 //! VTP, VTK's XML `PolyData` (file format 1.0), its arrays appended raw: points as Float32 or Float64, connectivity and offsets as
-//! Int64, the two labels of each triangle, where it has any, as `UInt32`; each array preceded by its length in bytes;
-//! little-endian. Before the arrays stands where each of them begins, so all of them wait for the end.
+//! Int64, the two labels of each triangle, where it has any, as `UInt32`, a number of each vertex, where one is told, as Float32;
+//! each array preceded by its length in bytes; little-endian. Before the arrays stands where each of them begins, so all of them wait for the end.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -15,16 +15,27 @@ struct Vtp {
     points: BufWriter<Temporary>,
     vertices: u64,
     triangles: Spool,
+    /// Numbers of vertices, and their name.
+    values: Option<(&'static str, BufWriter<Temporary>)>,
     form: Form,
 }
 
 pub(super) fn start(file: File, folder: &Path, form: &Form) -> io::Result<Box<dyn Body>> {
     let points = BufWriter::with_capacity(BUFFER, Temporary::new(folder)?);
     let triangles = Spool::new(folder, form.is_tagged)?;
-    Ok(Box::new(Vtp { file, points, vertices: 0, triangles, form: form.clone() }))
+    Ok(Box::new(Vtp { file, points, vertices: 0, triangles, values: None, form: form.clone() }))
 }
 
 impl Body for Vtp {
+    fn carry(&mut self, name: &'static str, temporary: &Path) -> io::Result<()> {
+        self.values = Some((name, BufWriter::with_capacity(BUFFER, Temporary::new(temporary)?)));
+        Ok(())
+    }
+
+    fn value(&mut self, value: f64) -> io::Result<()> {
+        self.values.as_mut().map_or(Ok(()), |(_, values)| values.write_all(&(value as f32).to_le_bytes()))
+    }
+
     fn vertex(&mut self, position: [f64; 3]) -> io::Result<()> {
         self.vertices += 1;
         if self.form.is_double {
@@ -38,12 +49,13 @@ impl Body for Vtp {
     }
 
     fn complete(self: Box<Self>) -> io::Result<()> {
-        let Self { mut file, points, vertices, triangles, form } = *self;
+        let Self { mut file, points, vertices, triangles, values, form } = *self;
         let (mut points, mut triangles) =
             (points.into_inner().map_err(io::IntoInnerError::into_error)?, triangles.finish()?);
         let count = triangles.count;
         let lengths = lengths(&form, vertices, count);
-        file.write_all(header(&form, vertices, count).as_bytes())?;
+        let name = values.as_ref().map(|(name, _)| *name);
+        file.write_all(header(&form, name, vertices, count).as_bytes())?;
         file.write_all(&lengths[0].to_le_bytes())?;
         points.seek(SeekFrom::Start(0))?;
         io::copy(&mut points, &mut file)?;
@@ -56,6 +68,12 @@ impl Body for Vtp {
             out.write_all(&(8 * count).to_le_bytes())?;
             triangles.each(|_, labels| out.write_all(labels.map(u32::to_le_bytes).as_flattened()))?;
         }
+        if let Some((_, values)) = values {
+            let mut values = values.into_inner().map_err(io::IntoInnerError::into_error)?;
+            values.seek(SeekFrom::Start(0))?;
+            out.write_all(&(4 * vertices).to_le_bytes())?;
+            io::copy(&mut values, &mut out)?;
+        }
         out.write_all(b"\n</AppendedData></VTKFile>\n")?;
         out.flush()
     }
@@ -66,9 +84,11 @@ fn lengths(form: &Form, vertices: u64, triangles: u64) -> [u64; 3] {
     [12 * vertices * (1 + u64::from(form.is_double)), 24 * triangles, 8 * triangles]
 }
 
-fn header(form: &Form, vertices: u64, triangles: u64) -> String {
+fn header(form: &Form, values: Option<&str>, vertices: u64, triangles: u64) -> String {
     let [points, connectivity, offsets] = lengths(form, vertices, triangles);
-    let at = [0, 8 + points, 16 + points + connectivity, 24 + points + connectivity + offsets];
+    let labels_at = 24 + points + connectivity + offsets;
+    let values_at = labels_at + if form.is_tagged { 8 + 8 * triangles } else { 0 };
+    let at = [0, 8 + points, 16 + points + connectivity, labels_at];
     let array = |what: &str, at: u64| format!("<DataArray {what} format=\"appended\" offset=\"{at}\"/>");
     let number = if form.is_double { "Float64" } else { "Float32" };
     let labels = if form.is_tagged {
@@ -77,11 +97,16 @@ fn header(form: &Form, vertices: u64, triangles: u64) -> String {
     } else {
         String::new()
     };
+    let values = values.map_or(String::new(), |name| {
+        let array = array(&format!("type=\"Float32\" Name=\"{name}\""), values_at);
+        format!("<PointData Scalars=\"{name}\">{array}</PointData>")
+    });
     let lines = [
         "<?xml version=\"1.0\"?>".into(),
         "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">".into(),
         "<PolyData>".into(),
         format!("<Piece NumberOfPoints=\"{vertices}\" NumberOfPolys=\"{triangles}\">"),
+        values,
         format!("<Points>{}</Points>", array(&format!("type=\"{number}\" NumberOfComponents=\"3\""), at[0])),
         format!(
             "<Polys>{}{}</Polys>",

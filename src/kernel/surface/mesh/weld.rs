@@ -67,12 +67,20 @@ impl Welder {
     /// # Errors
     /// When the sink fails, or the mesh passes the 2^32 vertices that 32-bit indices can name.
     pub fn add(&mut self, patch: &Patch, sink: &mut dyn MeshSink) -> Result<()> {
+        self.add_valued(patch, &[], sink)
+    }
+
+    /// The same with a number for each vertex of the patch, or none at all.
+    ///
+    /// # Errors
+    /// As [`Welder::add`].
+    pub fn add_valued(&mut self, patch: &Patch, values: &[f64], sink: &mut dyn MeshSink) -> Result<()> {
         self.enter_layer(patch.cells.lo[2]);
         self.numbers.clear();
         self.world.clear();
-        for (&key, &position) in patch.keys.iter().zip(&patch.positions) {
+        for (n, (&key, &position)) in patch.keys.iter().zip(&patch.positions).enumerate() {
             let world = self.to_world(position);
-            let number = self.number(key, &patch.cells, world, sink)?;
+            let number = self.number(key, &patch.cells, (world, values.get(n).copied()), sink)?;
             self.numbers.push(number);
             self.world.push(world);
         }
@@ -102,7 +110,13 @@ impl Welder {
     }
 
     /// The number of a vertex: the one a former patch gave it, or the next one.
-    fn number(&mut self, key: VertexKey, cells: &Box3, world: [f64; 3], sink: &mut dyn MeshSink) -> Result<u32> {
+    fn number(
+        &mut self,
+        key: VertexKey,
+        cells: &Box3,
+        (world, value): ([f64; 3], Option<f64>),
+        sink: &mut dyn MeshSink,
+    ) -> Result<u32> {
         let is_shared = touches_border(key, cells);
         if is_shared && let Some(&number) = self.shared.get(&key) {
             return Ok(number);
@@ -113,7 +127,10 @@ impl Welder {
             ));
         }
         let number = self.vertices as u32;
-        sink.vertex(world)?;
+        match value {
+            Some(value) => sink.valued_vertex(world, value)?,
+            None => sink.vertex(world)?,
+        }
         self.vertices += 1;
         if is_shared {
             self.shared.insert(key, number);
