@@ -113,6 +113,40 @@ def check_mesh(folder):
     found = [reader.GetOutput().GetNumberOfPoints(), reader.GetOutput().GetNumberOfPolys()]
     require(found == counts, f"vtk reads {found} points and triangles, not {counts}")
     print(f"ok  VTP: vtk, {found[0]} vertices, {found[1]} triangles")
+    check_values(folder)
+
+
+def check_values(folder):
+    """Numbers of vertices, against all marks and points."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
+
+    def read(path):
+        reader = vtkXMLPolyDataReader()
+        reader.SetFileName(str(path))
+        reader.Update()
+        found = reader.GetOutput()
+        values = found.GetPointData().GetScalars()
+        require(found.GetNumberOfPoints() == values.GetNumberOfTuples() > 0, f"{path}: values of all points")
+        return values.GetName(), vtk_to_numpy(found.GetPoints().GetData())[::7], vtk_to_numpy(values)[::7]
+
+    def nearest(places, cloud):
+        return np.array([np.linalg.norm(cloud - place, axis=1).min() for place in places.astype("f8")])
+
+    stack, marks = folder / "stack.tif", folder / "marks.csv"
+    run("segment", stack, "--points", marks, "--image-spacing", "1,1,1", "-q", "-o", "none", "--mesh", folder / "d.vtp")
+    cloud = np.loadtxt(folder / "s0.5.zarr/marks.csv", delimiter=",", skiprows=1)[:, -3:]
+    name, places, values = read(folder / "d.vtp")
+    require(name == "distance_to_marks", f"values are called {name}")
+    require(np.abs(values - nearest(places, cloud)).max() < 1e-4, "distances to the marks")
+    sets = [np.random.default_rng(n).random((50, 3)) + [1.5 * n, 0, 0] for n in range(2)]
+    for n, points in enumerate(sets):
+        np.savetxt(folder / f"set{n}.xyz", points)
+    run("middle", *(folder / f"set{n}.xyz" for n in range(2)), "--spacing", "0.05", "-q", "-o", "none", "--mesh", folder / "t.vtp")
+    name, places, values = read(folder / "t.vtp")
+    require(name == "thickness", f"values are called {name}")
+    require(np.abs(values - nearest(places, sets[0]) - nearest(places, sets[1])).max() < 1e-4, "thickness")
+    print("ok  VTP: vtk, distances to the marks, thickness")
 
 
 def check_large(folder, memory):

@@ -67,6 +67,7 @@ mod tiff_hostile;
 mod tiff_levels;
 mod told;
 mod view;
+mod viewer_meshes;
 mod zarr_input;
 mod zarr_odd;
 mod zarr_readers;

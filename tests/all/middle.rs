@@ -552,7 +552,7 @@ fn a_run_is_told_and_written() {
     );
     assert_eq!(bench.entries("out"), ["x.stl", "x.zarr"]);
     assert_eq!(bench.entries("out/x.zarr/labels"), ["border", "nearest", "zarr.json"]);
-    assert_eq!(bench.entries("out/x.zarr/meshes"), ["pairs.csv", "surface.ply"]);
+    assert_eq!(bench.entries("out/x.zarr/meshes"), ["pairs.csv", "precomputed", "surface.ply"]);
     let report = bench.json("out/x.zarr/report.json");
     assert_eq!((&report["command"], &report["settings"]["surface"]), (&"middle".into(), &"exact".into()));
     let pair = &report["result"]["pairs"][0];
