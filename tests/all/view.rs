@@ -217,6 +217,51 @@ fn meshes_are_those_of_the_store_in_nanometres() {
     }
 }
 
+/// What a store has ready is served as it is; without that the page gets the same of its PLY.
+#[test]
+fn meshes_that_are_ready_are_those_made_on_request() {
+    let bench = store();
+    let ready = bench.path("out/ball.zarr/meshes/precomputed");
+    let served = Served::new(&bench, "out/ball.zarr").get("/mesh/1").body;
+    assert!(served == fs::read(ready.join("1")).unwrap() && served.len() > 10_000);
+    fs::remove_dir_all(ready).unwrap();
+    let made = Served::new(&bench, "out/ball.zarr");
+    assert_eq!(made.json("/mesh/info"), serde_json::json!({ "@type": "neuroglancer_legacy_mesh" }));
+    assert!(made.get("/mesh/1").body == served);
+}
+
+#[test]
+fn pairs_of_labels_are_meshes_in_colours_of_their_own() {
+    let bench = Bench::bare();
+    for (name, x, y) in [("a", 0.0, 0.0), ("b", 1.0, 0.0), ("c", 0.5, 1.0)] {
+        bench.write(&format!("{name}.xyz"), &format!("{x} {y} 0\n{x} {y} 0.1\n"));
+    }
+    bench.succeed("middle a.xyz b.xyz c.xyz --spacing 0.05 --padding 0.4 -q -o out/m.zarr");
+    // A copy with fewer triangles is no surface of its own.
+    fs::create_dir(bench.path("out/m.zarr/meshes/simplified")).unwrap();
+    fs::copy(bench.path("out/m.zarr/meshes/surface.ply"), bench.path("out/m.zarr/meshes/simplified/surface.ply")).unwrap();
+    let served = Served::new(&bench, "out/m.zarr");
+    let state = served.json("/state.json");
+    let layers = state["layers"].as_array().unwrap();
+    let surfaces = layers.iter().find(|layer| layer["name"] == "surfaces").unwrap();
+    assert_eq!(surfaces["segments"], serde_json::json!(["1", "2", "3"]));
+    let labels = layers.iter().find(|layer| layer["name"] == "nearest").unwrap();
+    let colors = |layer: &serde_json::Value| -> Vec<String> {
+        layer["segmentColors"].as_object().unwrap().values().map(ToString::to_string).collect()
+    };
+    let (of_pairs, of_labels) = (colors(surfaces), colors(labels));
+    assert!(of_pairs.len() == 3 && of_pairs.iter().all(|color| !of_labels.contains(color)), "{of_pairs:?} {of_labels:?}");
+    let info = served.json("/mesh/info");
+    let names = served.json(&format!("/mesh/{}/info", info["segment_properties"].as_str().unwrap()));
+    assert_eq!(names["inline"]["properties"][0]["values"], serde_json::json!(["1 | 2", "1 | 3", "2 | 3"]));
+    for segment in 1..=3 {
+        assert_eq!(served.json(&format!("/mesh/{segment}:0"))["fragments"][0], segment.to_string());
+        let ready = fs::read(bench.path(&format!("out/m.zarr/meshes/precomputed/{segment}"))).unwrap();
+        assert!(served.get(&format!("/mesh/{segment}")).body == ready);
+    }
+    assert_eq!(served.get("/mesh/4").code, 404);
+}
+
 #[test]
 fn what_cannot_be_shown_is_refused_and_the_time_ends() {
     let bench = Bench::bare();

@@ -9,7 +9,7 @@ use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::image::labels;
 use crate::kernel::surface::{
-    Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder,
+    Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Pairs, Patch, SurfaceMeasure, TaggedPatch, Welder,
     cells_of_brick,
 };
 use crate::pipeline::output::drawn::{Drawn, STATED, Wave};
@@ -94,16 +94,19 @@ pub(super) fn draw(
         sources: Vec::new(),
         labels: Vec::new(),
     };
-    let workers = Workers::new(make);
+    let (workers, with_gaps) = (Workers::new(make), sink.keeps_values());
     let bricks: Vec<BrickId> = (0..grid.len()).collect();
     let (mut drawn, mut left) = (Drawn::new(stage, stated), bricks.as_slice());
     while !left.is_empty() {
         let batch;
         (batch, left) = left.split_at(drawn.next().min(left.len()));
-        let patches = stage.run(batch, &workers, |worker, &id| worker.patch(labelled, &grid.brick_box(id), kind))?;
-        for patch in patches.iter().filter(|patch| !patch.patch.triangles.is_empty()) {
-            let gaps = if sink.keeps_values() { labelled.gaps(patch, kind) } else { Vec::new() };
-            welder.add_valued(&patch.patch, &gaps, sink)?;
+        let patches = stage.run(batch, &workers, |worker, &id| {
+            let patch = worker.patch(labelled, &grid.brick_box(id), kind)?;
+            let gaps = if with_gaps { labelled.gaps(&patch.patch) } else { Vec::new() };
+            Ok((patch, gaps))
+        })?;
+        for (patch, gaps) in patches.iter().filter(|(patch, _)| !patch.patch.triangles.is_empty()) {
+            welder.add_valued(&patch.patch, gaps, sink)?;
             for (n, (corners, positions)) in welder.triangles_of(&patch.patch).enumerate() {
                 measure.add(corners, positions);
                 let distances = patch.patch.triangles[n].map(|vertex| patch.distances[vertex as usize]);
@@ -111,7 +114,7 @@ pub(super) fn draw(
             }
         }
         drawn.took(&Wave {
-            patches: &patches.iter().map(TaggedPatch::bytes).collect::<Vec<_>>(),
+            patches: &patches.iter().map(|(patch, gaps)| patch.bytes() + 8 * gaps.len() as u64).collect::<Vec<_>>(),
             buffers: &workers.idle(Worker::bytes),
             last: welder.bytes_of_last(),
             tables: &[welder.tables().as_slice(), &measure.tables()].concat(),
@@ -122,17 +125,17 @@ pub(super) fn draw(
 }
 
 impl Labelled<'_> {
-    /// How wide the gap is at each vertex: its distances to both sets, summed.
-    fn gaps(&self, patch: &TaggedPatch, kind: SurfaceKind) -> Vec<f64> {
-        if kind == SurfaceKind::Exact {
-            return patch.distances.iter().map(|distance| 2.0 * distance).collect();
+    /// How wide the gap is at each vertex: its distances to both sets of a triangle that has it, summed.
+    fn gaps(&self, patch: &Patch) -> Vec<f64> {
+        let mut pairs = vec![[0; 2]; patch.positions.len()];
+        for (corners, pair) in patch.triangles.iter().zip(&patch.pairs) {
+            corners.iter().for_each(|&vertex| pairs[vertex as usize] = *pair);
         }
-        let gap = |position: &[f64; 3]| {
+        let gap = |(position, pair): (&[f64; 3], [u32; 2])| {
             let world = self.world(*position);
-            let distance = |label: u32| self.shapes.distance(world, self.trees.nearest(label, world));
-            self.first_labels.map(distance).iter().sum()
+            pair.map(|label| self.shapes.distance(world, self.trees.nearest(label, world))).iter().sum()
         };
-        patch.patch.positions.iter().map(gap).collect()
+        patch.positions.iter().zip(pairs).map(gap).collect()
     }
 
     fn world(&self, position: [f64; 3]) -> [f64; 3] {
