@@ -239,7 +239,8 @@ fn pairs_of_labels_are_meshes_in_colours_of_their_own() {
     bench.succeed("middle a.xyz b.xyz c.xyz --spacing 0.05 --padding 0.4 -q -o out/m.zarr");
     // A copy with fewer triangles is no surface of its own.
     fs::create_dir(bench.path("out/m.zarr/meshes/simplified")).unwrap();
-    fs::copy(bench.path("out/m.zarr/meshes/surface.ply"), bench.path("out/m.zarr/meshes/simplified/surface.ply")).unwrap();
+    fs::copy(bench.path("out/m.zarr/meshes/surface.ply"), bench.path("out/m.zarr/meshes/simplified/surface.ply"))
+        .unwrap();
     let served = Served::new(&bench, "out/m.zarr");
     let state = served.json("/state.json");
     let layers = state["layers"].as_array().unwrap();
@@ -250,7 +251,10 @@ fn pairs_of_labels_are_meshes_in_colours_of_their_own() {
         layer["segmentColors"].as_object().unwrap().values().map(ToString::to_string).collect()
     };
     let (of_pairs, of_labels) = (colors(surfaces), colors(labels));
-    assert!(of_pairs.len() == 3 && of_pairs.iter().all(|color| !of_labels.contains(color)), "{of_pairs:?} {of_labels:?}");
+    assert!(
+        of_pairs.len() == 3 && of_pairs.iter().all(|color| !of_labels.contains(color)),
+        "{of_pairs:?} {of_labels:?}"
+    );
     let info = served.json("/mesh/info");
     let names = served.json(&format!("/mesh/{}/info", info["segment_properties"].as_str().unwrap()));
     assert_eq!(names["inline"]["properties"][0]["values"], serde_json::json!(["1 | 2", "1 | 3", "2 | 3"]));
