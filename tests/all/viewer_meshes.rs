@@ -319,6 +319,12 @@ fn numbers(text: &str, skip: usize) -> Vec<[f64; 3]> {
     text.lines().filter_map(line).collect()
 }
 
+/// Points as text.
+fn lines(points: &[[f64; 3]]) -> String {
+    let line = |[x, y, z]: &[f64; 3]| format!("{x} {y} {z}");
+    points.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
 #[test]
 fn vertices_know_how_far_the_marks_are() {
     let bench = Bench::new(&Ball::small());
@@ -326,7 +332,7 @@ fn vertices_know_how_far_the_marks_are() {
     bench.succeed("segment image.tif --points marks.csv -q -o none --mesh out/a.vtp --max-steps 4");
     let marks = numbers(&marks, 2);
     let cloud: Vec<[f64; 3]> = meshes::sphere([1.0; 3], 3.0, 30, PI).vertices;
-    bench.write("cloud.xyz", &cloud.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect::<String>());
+    bench.write("cloud.xyz", &lines(&cloud));
     bench.succeed("reconstruct cloud.xyz --spacing 0.35 -q -o none --mesh out/b.vtp");
     for (name, marks) in [("out/a.vtp", marks), ("out/b.vtp", cloud)] {
         let (points, values) = read_vtp(&bench.path(name), "distance_to_marks");
@@ -347,7 +353,7 @@ fn vertices_between_two_sets_know_how_wide_the_gap_is() {
     };
     let sets = [set(0.0), set(0.8)];
     for (name, points) in ["a.xyz", "b.xyz"].iter().zip(&sets) {
-        bench.write(name, &points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect::<String>());
+        bench.write(name, &lines(points));
     }
     for (surface, off) in [("exact", 2e-6), ("labels", 2e-6)] {
         bench.succeed(&format!(

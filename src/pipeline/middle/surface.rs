@@ -129,7 +129,9 @@ impl Labelled<'_> {
     fn gaps(&self, patch: &Patch) -> Vec<f64> {
         let mut pairs = vec![[0; 2]; patch.positions.len()];
         for (corners, pair) in patch.triangles.iter().zip(&patch.pairs) {
-            corners.iter().for_each(|&vertex| pairs[vertex as usize] = *pair);
+            for &vertex in corners {
+                pairs[vertex as usize] = *pair;
+            }
         }
         let gap = |(position, pair): (&[f64; 3], [u32; 2])| {
             let world = self.world(*position);

@@ -120,7 +120,6 @@ fn unreadable(error: &io::Error, path: &Path) -> Error {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::grid::Geometry;
     use crate::io::geometry::write::ply::PlyWriter;
     use crate::store::MeshSink;
