@@ -47,6 +47,16 @@ const serve = async (store) => {
   throw new Error(`strandline view ${store} said nothing`);
 };
 
+// Bytes that were loaded when the section in the upper left was first to be seen.
+const firstSeen = async (page, what, bytes) => {
+  const clip = { x: 0, y: 60, width: WIDTH / 2 - 8, height: HEIGHT / 2 - 70 };
+  for (const until = Date.now() + 1000 * PATIENCE; Date.now() < until; await new Promise((after) => setTimeout(after, 100))) {
+    const before = bytes();
+    const pixels = pixelsOf(await page.screenshot({ clip })).map(([x, y, colour]) => [x, y + clip.y, colour]);
+    if (LOOKS[what](pixels) >= ENOUGH / 4) return before;
+  }
+};
+
 const said = (page) => page.evaluate(() => document.getElementById("status").textContent);
 
 // The run has ended, and the page has heard of it and drawn what there is.
@@ -75,6 +85,8 @@ const look = async (browser, store, wanted) => {
       worker.client.send("Network.enable").catch(() => {});
     });
     await page.goto(url);
+    const firstLook = await firstSeen(page, wanted.split(/[/,]/)[0], () => bytes);
+    if (firstLook !== undefined) console.log(`${store}: ${(firstLook / 1e6).toFixed(2)} MB loaded until the middle slice was to be seen`);
     await page.waitForFunction(() => window.viewer?.layerManager.managedLayers.length > 0 && window.viewer.isReady(), {
       timeout: 1000 * PATIENCE,
       polling: 500,

@@ -8,6 +8,9 @@ use super::shown::{Axis, Image, Kind, MeshFile, Shown};
 /// Colours of meshes without one, evenly around the circle of hues.
 const HUE_STEP: f64 = 0.618_033_988_75;
 
+/// Voxels along the longest axis of a large image.
+const LARGE: u64 = 512;
+
 /// The state; sources begin with a slash, for the server that the page came from.
 pub(super) fn state(shown: &Shown) -> Value {
     let mut layers: Vec<Value> = shown.images.iter().map(|image| layer(image, shown)).collect();
@@ -68,6 +71,7 @@ fn layer(image: &Image, shown: &Shown) -> Value {
                 "type": "segmentation", "name": image.name, "source": source, "visible": !image.path.ends_with("/border"),
                 "segmentColors": colors, "segments": segments,
                 "selectedAlpha": 0.35, "notSelectedAlpha": if segments.is_empty() { 0.35 } else { 0.0 },
+                "crossSectionRenderScale": render_scale(image),
             })
         }
         kind => {
@@ -75,10 +79,18 @@ fn layer(image: &Image, shown: &Shown) -> Value {
             let controls = image.window.map(|window| json!({ "normalized": { "range": window } })).unwrap_or(json!({}));
             json!({
                 "type": "image", "name": image.name, "source": source, "visible": visible, "shaderControls": controls,
+                "crossSectionRenderScale": render_scale(image),
                 "shader": "#uicontrol invlerp normalized\nvoid main() {\n  emitGrayscale(normalized());\n}\n",
             })
         }
     }
+}
+
+/// Pixels that a voxel of a section may cover before a finer level is loaded: of large images the finer one would be most of what
+/// a page loads before anything is to be seen. Whoever looks closer gets all of it.
+fn render_scale(image: &Image) -> f64 {
+    let longest = image.axes.iter().map(|axis| axis.voxels).max().unwrap_or(0);
+    if longest > LARGE { 2.0 } else { 1.0 }
 }
 
 /// Marks as points in units of the image.

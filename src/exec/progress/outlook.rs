@@ -106,30 +106,41 @@ impl Outlook {
     /// The seconds that are left, where something is done that tells how fast the run is.
     #[must_use]
     pub fn left(&self) -> Option<f64> {
-        let (now, done) = (Instant::now(), self.done_at(Instant::now()));
-        (done > 0.0).then(|| now.duration_since(self.begun).as_secs_f64() * (1.0 - done) / done)
+        self.left_at(Instant::now())
     }
 
     fn done_at(&self, now: Instant) -> f64 {
+        let gone = now.duration_since(self.begun).as_secs_f64();
+        self.left_at(now).map_or(0.0, |left| gone / (gone + left.max(LEAST_LEFT)))
+    }
+
+    /// Stages under way go on as they went, by their steps or else as all went; those that wait go as all went.
+    fn left_at(&self, now: Instant) -> Option<f64> {
         let stages = self.stages();
-        let all: f64 = stages.iter().map(|stage| stage.seconds).sum();
-        let gone = now.duration_since(self.begun).as_secs_f64().max(f64::MIN_POSITIVE);
-        // Of what took its time and is over: how much of the plan a second does.
-        let over: f64 =
-            stages.iter().filter(|stage| matches!(stage.state, State::Over)).map(|stage| stage.seconds).sum();
+        let seconds = |state: fn(&State) -> bool| -> f64 {
+            stages.iter().filter(|stage| state(&stage.state)).map(|stage| stage.seconds).sum()
+        };
+        let (over, waiting) = (seconds(|s| matches!(s, State::Over)), seconds(|s| matches!(s, State::Waiting)));
         let running = || stages.iter().filter_map(|stage| Some((stage.seconds, stage.running()?)));
-        let since = running().map(|(_, running)| running.since).min().unwrap_or(now);
-        let before = since.duration_since(self.begun).as_secs_f64();
-        let pace = if over > PART * all { over / before.max(f64::MIN_POSITIVE) } else { 1.0 };
-        let under_way: f64 = running()
-            .map(|(seconds, running)| {
-                let elapsed = now.duration_since(running.since).as_secs_f64();
-                let by_time = (elapsed * pace / seconds.max(f64::MIN_POSITIVE)).min(NEARLY);
-                seconds * running.done().unwrap_or(by_time)
-            })
-            .sum();
-        let share = (over + under_way) / all.max(f64::MIN_POSITIVE);
-        if all > 0.0 { share.min(gone / (gone + LEAST_LEFT)) } else { 0.0 }
+        let since = |running: &Running| now.duration_since(running.since).as_secs_f64();
+        // How much longer than planned all takes that is over; and once it counts steps, what is under way.
+        let before = running().map(|(_, running)| since(running)).fold(0.0, f64::max);
+        let gone = now.duration_since(self.begun).as_secs_f64();
+        let counted: Vec<(f64, f64)> =
+            running().filter_map(|(seconds, running)| Some((seconds * running.done()?, since(running)))).collect();
+        let planned = over + counted.iter().map(|(planned, _)| planned).sum::<f64>();
+        let took = gone - if counted.is_empty() { before } else { 0.0 };
+        let all = over + waiting + running().map(|(seconds, _)| seconds).sum::<f64>();
+        let slower = if planned > PART * all { took / planned } else { 1.0 };
+        let under_way = running().map(|(seconds, running)| {
+            let elapsed = since(running);
+            match running.done() {
+                Some(done) => elapsed * (1.0 - done) / done,
+                None => (seconds * slower - elapsed).max((1.0 - NEARLY) * elapsed),
+            }
+        });
+        // What runs at the same time ends with the last.
+        (all > 0.0 && gone > 0.0).then(|| under_way.fold(0.0, f64::max) + waiting * slower)
     }
 
     fn stages(&self) -> MutexGuard<'_, Vec<Planned>> {
@@ -163,13 +174,16 @@ mod tests {
         outlook.expect(vec![("read".into(), 1.0), ("solve".into(), 3.0), ("write".into(), 1.0)]);
         let at = |seconds: f64| outlook.begun + Duration::from_secs_f64(seconds);
         assert_eq!(outlook.done_at(at(0.0)), 0.0);
+        assert_eq!(outlook.left_at(at(0.5)), Some(5.0), "nothing tells that the plan is wrong");
         let read = outlook.begin("read", 0).unwrap();
         outlook.end(&read);
         assert!(outlook.begin("something else", 0).is_none());
         let solve = outlook.begin("solve", 100).unwrap();
-        // A fifth of the plan took two seconds: half as fast as was thought.
         solve.advance(50);
-        assert!((outlook.done_at(at(10.0)) - 2.5 / 5.0).abs() < 1e-9);
+        // Half of the second stage took some ten seconds, and 2.5 seconds of the plan as well: the last takes four.
+        let left = outlook.left_at(at(10.0)).unwrap();
+        assert!((left - 14.0).abs() < 0.01, "{left}");
+        assert!((outlook.done_at(at(10.0)) - 10.0 / 24.0).abs() < 1e-3);
         outlook.end(&solve);
         let write = outlook.begin("write", 0).unwrap();
         assert!(outlook.begin("write", 0).is_none(), "it is planned once");

@@ -98,7 +98,7 @@ pub const fn solvers<P: Precision>() -> [Solver<P>; 4] {
             textbook: Textbook::Sweeps,
             takes_all_neighbours: true,
             brick: 32,
-            seconds: 20e-9,
+            seconds: 30e-9,
             state_bytes: 4,
             source_bytes: 0,
             cost: costs::vector_distance::<P>,
