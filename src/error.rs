@@ -111,6 +111,10 @@ impl Error {
     /// Names the file that the error concerns; the first name given stays.
     #[must_use]
     pub fn at(mut self, path: &Path) -> Self {
+        // A signal concerns the run, whatever it was doing.
+        if matches!(self.kind, ErrorKind::Interrupted { .. }) {
+            return self;
+        }
         self.path.get_or_insert_with(|| path.to_path_buf());
         self
     }

@@ -27,7 +27,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version go to stdout with code 0, complaints to stderr with code 2.
-            let _ = error.print();
+            let code = error.exit_code();
+            if asks_for_json(&arguments) && code != 0 {
+                terminal::log::event("error", serde_json::json!({ "text": error.to_string(), "code": code }));
+            } else {
+                let _ = error.print();
+            }
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
@@ -57,6 +62,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::from(1)
         }
     }
+}
+
+/// Whether events are to be lines of JSON, of a command that is not understood.
+fn asks_for_json(arguments: &[OsString]) -> bool {
+    arguments.iter().any(|argument| argument == "--log=json")
+        || arguments.windows(2).any(|two| two[0] == "--log" && two[1] == "json")
 }
 
 fn execute(cli: Cli, typed: &[String]) -> Result<()> {

@@ -1,6 +1,7 @@
 //! What lies in a store, in a folder of several, or in another program's OME-Zarr, that can be shown: images, label images and
 //! fields by their OME metadata (versions 0.4 and 0.5), and meshes.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
@@ -11,8 +12,7 @@ use super::ready::Ready;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::point_file::PointFile;
 use crate::io::geometry::read::points::{LengthUnit, read_points};
-use crate::io::ome_zarr::{Live, LiveState, live};
-use crate::pipeline::level_set::growing::FOLDER as GROWING;
+use crate::io::ome_zarr::{GROWING, Live, LiveState, live};
 use crate::pipeline::output::viewer_mesh::{PRECOMPUTED, SIMPLIFIED};
 use crate::pipeline::segment::MARKS;
 
@@ -137,6 +137,11 @@ impl Shown {
             }
         }
         shown.thin_fields();
+        let is_interrupted = shown.live().any(|live| live.state == LiveState::Interrupted);
+        if shown.images.is_empty() && shown.meshes.is_empty() && is_interrupted {
+            let what = "was left by a run that was interrupted before there was anything to show; run it again";
+            return Err(Error::input(what).at(path));
+        }
         if shown.images.is_empty() && shown.meshes.is_empty() && !shown.is_live() {
             let what = "holds nothing that can be shown; give an OME-Zarr store, a folder of some, or a PLY mesh";
             return Err(Error::input(what).at(path));
@@ -177,6 +182,11 @@ impl Shown {
     }
 
     fn add_mesh(&mut self, path: &Path) -> Result<()> {
+        if !is_mesh(path) {
+            let what =
+                "is no mesh by its name (PLY, OBJ, STL, OFF); give an OME-Zarr store, a folder of some, or a mesh";
+            return Err(Error::input(what).at(path));
+        }
         let true_path =
             path.canonicalize().map_err(|e| Error::input(format!("cannot be opened: {e}")).caused_by(e).at(path))?;
         let name = file_name(&true_path);
@@ -245,7 +255,7 @@ impl Shown {
         }
         let ready = if folder.ends_with("meshes") { Ready::of(folder) } else { Ready::default() };
         for file in files(folder) {
-            let is_mesh = file.extension().is_some_and(|e| ["ply", "obj", "stl", "off"].map(str::as_ref).contains(&e));
+            let is_mesh = is_mesh(&file);
             if is_mesh && folder.ends_with(GROWING) {
                 self.push_growing(file);
             } else if is_mesh && self.meshes.len() < MOST {
@@ -332,6 +342,11 @@ fn colors(list: &Value) -> Vec<(u64, [u8; 3])> {
         Some((color["label-value"].as_u64()?, [channel(color, 0)?, channel(color, 1)?, channel(color, 2)?]))
     };
     list.as_array().into_iter().flatten().filter_map(color).collect()
+}
+
+fn is_mesh(file: &Path) -> bool {
+    let ending = file.extension().map(OsStr::to_ascii_lowercase);
+    ending.is_some_and(|ending| ["ply", "obj", "stl", "off"].map(str::as_ref).contains(&&*ending))
 }
 
 fn file_name(path: &Path) -> String {

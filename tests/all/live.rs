@@ -11,9 +11,11 @@ use std::time::{Duration, Instant};
 
 use strandline::error::Result;
 use strandline::grid::{Box3, BrickGrid, BrickSet, Geometry, PointBins};
+use strandline::io::ome_zarr::{Content, ImageSpec, LiveState, StoreWriter};
 use strandline::pipeline::distance::{
     Early, Method, Options, Passed, SOLVERS, Schedule, Solved, Sources, solve_watched,
 };
+use strandline::store::ElementType;
 
 use crate::common::ball::{Ball, Bench, HEADER, write_stack};
 use crate::common::lab::Lab;
@@ -190,6 +192,67 @@ fn a_killed_live_run_is_told_by_the_next() {
     assert!(!left.iter().any(|name| name.to_string_lossy().contains(".partial-")), "{left:?}");
 }
 
+/// Many small objects that grow and come to rest at the same time.
+#[test]
+fn many_objects_grow_side_by_side() {
+    let bench = Bench::bare();
+    let geometry = Geometry { shape: [160, 160, 40], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+    write_stack(&bench.path("image.tif"), &geometry, &[&vec![7; 160 * 160 * 40]]);
+    let ball = |n: u32| Ball {
+        geometry: geometry.clone(),
+        centre: [16.0 + 32.0 * f64::from(n % 5), 16.0 + 32.0 * f64::from(n / 5), 20.0],
+        radius: 11.0,
+    };
+    let marks: String = (0..25).map(|n| ball(n).marks(n + 1)).collect();
+    bench.write("marks.csv", &format!("{HEADER}{marks}"));
+    let command = "segment image.tif --points marks.csv --image none --image-spacing 1 --live --threads 4 --log json";
+    bench.succeed(&format!("{command} -o live.zarr"));
+    assert!(!bench.path("live.zarr/growing").exists());
+    assert_eq!(bench.entries("live.zarr/meshes").iter().filter(|name| name.starts_with("object-")).count(), 25);
+}
+
+/// Somebody takes the store away, and puts a folder of their own in its place.
+#[test]
+fn a_live_store_that_is_taken_away_is_no_success() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.zarr");
+    let geometry = Geometry { shape: [8; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+    let (element, content) = (ElementType::U8, Content::Grey);
+    let spec = ImageSpec { name: "image", geometry: &geometry, element, content, window: None, extremes: None };
+    let store = StoreWriter::create_live(&path, false).unwrap();
+    let image = store.image("", &spec).unwrap();
+    fs::rename(&path, folder.path().join("moved.zarr")).unwrap();
+    fs::create_dir(&path).unwrap();
+    fs::write(path.join("mine"), "precious").unwrap();
+    let written = image.levels()[0].write_shard(&geometry.domain(), &[1u8; 512]);
+    let told = store.live().unwrap().tell(LiveState::Running, 0.5);
+    for error in [written.map(|_| ()).unwrap_err(), told.unwrap_err(), store.finish().unwrap_err()] {
+        assert!(error.to_string().contains("removed, moved or replaced"), "{error}");
+    }
+    let left: Vec<_> = fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["mine"]);
+}
+
+/// What is read of a store that is not complete is told.
+#[test]
+fn incomplete_stores_are_no_silent_inputs() {
+    let bench = Bench::bare();
+    let geometry = Geometry { shape: [8; 3], spacing: [1.0; 3], origin: [0.0; 3], unit: None };
+    let (element, content) = (ElementType::U8, Content::Grey);
+    let spec = ImageSpec { name: "image", geometry: &geometry, element, content, window: None, extremes: None };
+    let store = StoreWriter::create_live(&bench.path("in.zarr"), false).unwrap();
+    let image = store.image("", &spec).unwrap();
+    image.levels()[0].write_shard(&geometry.domain(), &[1u8; 512]).unwrap();
+    let told = |name: &str| {
+        let ended = bench.run(&format!("convert in.zarr {name}"));
+        assert!(ended.status.success());
+        String::from_utf8(ended.stderr).unwrap()
+    };
+    assert!(told("a.nrrd").contains("still written by another run"));
+    drop(store);
+    assert!(told("b.nrrd").contains("left by a run that was interrupted"));
+}
+
 /// Each event of a run is an object on a line of its own, the last of which says how it ended.
 #[test]
 fn events_are_lines_of_json() {
@@ -206,5 +269,7 @@ fn events_are_lines_of_json() {
     assert_eq!(events.last().unwrap()["event"], "done");
     let events = told("distance points.xyz --spacing 0.1 --log json -o out.zarr");
     let last = events.last().unwrap();
+    let usage = told("distance points.xyz --log json --spacing nonsense -o other.zarr");
+    assert_eq!((usage.len(), &usage[0]["event"], &usage[0]["code"]), (1, &"error".into(), &2.into()));
     assert_eq!((&last["event"], &last["code"]), (&"error".into(), &2.into()), "{events:?}");
 }

@@ -95,7 +95,9 @@ fn meshes_come_in_the_format_of_their_name() {
     let head = String::from_utf8_lossy(&vtp[..at]).into_owned();
     assert!(head.contains(&format!("NumberOfPoints=\"{}\" NumberOfPolys=\"{triangles}\"", length / 12)), "{head}");
     let tail = vtp.len() - (at + 8 + length);
-    assert_eq!(tail, 8 + 24 * triangles + 8 + 8 * triangles + "\n</AppendedData></VTKFile>\n".len());
+    // Of each point the distance from the cloud, in single precision.
+    let distances = 8 + length / 3;
+    assert_eq!(tail, 8 + 24 * triangles + 8 + 8 * triangles + distances + "\n</AppendedData></VTKFile>\n".len());
 }
 
 #[test]

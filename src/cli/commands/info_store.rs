@@ -52,7 +52,7 @@ pub(crate) fn store(path: &Path, image: Option<u32>) -> Result<(Value, Lines)> {
             Err(_) => {}
         }
     }
-    if images.is_empty() {
+    if images.is_empty() && live.is_none() {
         // Says why the store itself cannot be read.
         describe(path, image)?;
         return Err(Error::input("holds no image that can be read").at(path));

@@ -28,7 +28,7 @@ pub(super) fn prefix(name: &str) -> String {
 pub(super) const REPLACED: &str = "-replaced";
 
 /// A store's name is longer by so much at most while it is made: by the dot, `.partial-`, a number of 32 bits, `-`, six
-/// letters and [`REPLACED`].
+/// letters and `-replaced`.
 pub const LONGEST_ENDING: usize = 1 + 9 + 10 + 1 + 6 + REPLACED.len();
 
 /// Removes what runs that are dead left of the store `name` in a folder. `is_store` tells what every store in the making

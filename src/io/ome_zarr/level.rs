@@ -3,13 +3,13 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::compression::{Compression, Content};
 use super::files::write_whole;
 use super::metadata;
 use super::pyramid::LevelPlan;
+use super::root::Root;
 use super::shard::{ChunkCodec, ShardLayout, encode_chunk, write_shard};
 use super::version::OmeVersion;
 use crate::error::Result;
@@ -26,8 +26,8 @@ pub struct LevelWriter {
     element: ElementType,
     layout: ShardLayout,
     codec: ChunkCodec,
-    /// Counts shards that are written.
-    written: Arc<AtomicU64>,
+    /// Counts shards that are written, and knows whether the store is still there.
+    root: Option<Arc<Root>>,
     /// Shards of which some chunks have come, by their places.
     pending: Mutex<HashMap<[i64; 3], Pending>>,
 }
@@ -58,14 +58,14 @@ impl LevelWriter {
             element,
             layout,
             codec,
-            written: Arc::default(),
+            root: None,
             pending: Mutex::default(),
         })
     }
 
     /// The same level; its shards are counted there.
-    pub(super) fn counted_by(self, written: Arc<AtomicU64>) -> Self {
-        Self { written, ..self }
+    pub(super) fn counted_by(self, root: Arc<Root>) -> Self {
+        Self { root: Some(root), ..self }
     }
 
     /// The level's grid.
@@ -116,9 +116,12 @@ impl LevelWriter {
         let encoded = encode_chunk(&self.codec, self.layout, chunk, data).map_err(|error| error.at(&self.store))?;
         let (shard, place) = self.layout.place_of(chunk.lo);
         let Some(chunks) = self.enter(shard, place, encoded) else { return Ok(0) };
+        if let Some(root) = &self.root {
+            root.check_place().map_err(|error| error.at(&self.store))?;
+        }
         let bytes = write_whole(&self.shard_path(shard), |sink| write_shard(sink, chunks, self.layout, &self.codec))
             .map_err(|error| error.at(&self.store))?;
-        self.written.fetch_add(u64::from(bytes > 0), Relaxed);
+        self.root.iter().filter(|_| bytes > 0).for_each(|root| root.count());
         Ok(bytes)
     }
 

@@ -23,7 +23,7 @@ pub use abandoned::LONGEST_ENDING;
 pub use compression::{Compression, Content};
 pub use level::LevelWriter;
 pub use metadata::{ImageSpec, LabelColor, LabelSpec};
-pub use place::is_store;
+pub use place::{GROWING, is_store};
 pub use pyramid::{LevelPlan, plan_levels};
 pub use read::{ImageReader, StoredLevel};
 pub use root::{Live, LiveState, Root, live};

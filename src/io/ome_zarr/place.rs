@@ -13,6 +13,9 @@ use super::root::{LiveState, Root, live};
 use crate::error::{Error, Result};
 use crate::store::Unfinished;
 
+/// The folder of a live store in which surfaces lie that still move; gone at the end.
+pub const GROWING: &str = "growing";
+
 /// A place for a store.
 #[derive(Debug)]
 pub(super) enum Place {
@@ -67,6 +70,7 @@ impl Place {
             None
         };
         fs::create_dir(path).map_err(fault)?;
+        root.stay();
         let claim = abandoned::claim(path);
         let at_the_end = root.clone();
         let unfinished = Unfinished::settled_by(path, move || at_the_end.interrupt());
@@ -85,6 +89,9 @@ impl Place {
 
     /// Puts what is whole into its place.
     pub(super) fn finish(self, path: &Path, overwrite: bool) -> Result<()> {
+        if let Self::Live(standing) = &self {
+            standing.root.check_place().map_err(|error| error.at(path))?;
+        }
         sync_tree(self.folder()).map_err(|error| error.at(path))?;
         match self {
             Self::Hidden(hidden) => hidden.finish(path, overwrite),
@@ -123,6 +130,7 @@ impl Hidden {
 
 impl Standing {
     fn finish(mut self) -> Result<()> {
+        let _ = fs::remove_dir(self.path.join(GROWING));
         self.root.tell(LiveState::Complete, 1.0).map_err(|error| error.at(&self.path))?;
         self.finished = true;
         Ok(())
@@ -134,6 +142,10 @@ impl Drop for Standing {
         if self.finished {
             return;
         }
+        if self.root.check_place().is_err() {
+            return;
+        }
+        let _ = fs::remove_dir_all(self.path.join(GROWING));
         self.root.interrupt();
         // Where nothing can be seen in it, it is of no use.
         if self.root.written() == 0

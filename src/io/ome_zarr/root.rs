@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use serde_json::{Map, Value, json};
 
 use super::abandoned;
 use super::metadata;
 use super::version::OmeVersion;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// The attribute of live stores, beside `ome`.
 const ATTRIBUTE: &str = "strandline";
@@ -54,7 +54,9 @@ pub struct Root {
     folder: PathBuf,
     version: OmeVersion,
     said: Mutex<Said>,
-    written: Arc<AtomicU64>,
+    written: AtomicU64,
+    /// Device and number of a live store's folder: somebody may put another in its place.
+    identity: OnceLock<(u64, u64)>,
 }
 
 #[derive(Debug, Default)]
@@ -66,7 +68,13 @@ struct Said {
 impl Root {
     /// That of a store in `folder`, which says nothing yet.
     pub(super) fn new(folder: &Path, version: OmeVersion) -> Self {
-        Self { folder: folder.to_path_buf(), version, said: Mutex::default(), written: Arc::default() }
+        Self {
+            folder: folder.to_path_buf(),
+            version,
+            said: Mutex::default(),
+            written: AtomicU64::new(0),
+            identity: OnceLock::new(),
+        }
     }
 
     /// The version of the whole store.
@@ -74,9 +82,30 @@ impl Root {
         self.version
     }
 
-    /// Counts the shards that were written.
-    pub(super) fn counter(&self) -> Arc<AtomicU64> {
-        self.written.clone()
+    /// Counts a shard that was written.
+    pub(super) fn count(&self) {
+        self.written.fetch_add(1, Relaxed);
+    }
+
+    /// From now on the store's folder has to be the one that is there.
+    pub(super) fn stay(&self) {
+        if let Some(folder) = self.folder_now() {
+            let _ = self.identity.set(folder);
+        }
+    }
+
+    /// Refuses to go on in a folder that has taken the place of a live store's.
+    pub(super) fn check_place(&self) -> Result<()> {
+        match self.identity.get() {
+            Some(folder) if self.folder_now() != Some(*folder) => Err(Error::failed(
+                "the live store was removed, moved or replaced while it was written; leave it where it is until the run ends",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn folder_now(&self) -> Option<(u64, u64)> {
+        identity(&self.folder)
     }
 
     /// Shards that were written.
@@ -111,12 +140,28 @@ impl Root {
     fn change(&self, change: impl FnOnce(&mut Said)) -> Result<()> {
         // Written under the lock: what is said last stays.
         let mut said = self.said.lock().unwrap_or_else(PoisonError::into_inner);
+        self.check_place()?;
         change(&mut said);
         let live = said.live.map(|live| {
             let value = json!({ "state": live.state.name(), "done": live.done, "written": live.written });
             (ATTRIBUTE.to_owned(), value)
         });
         self.version.write(&self.folder, &metadata::group_with(said.ome.clone(), live))
+    }
+}
+
+/// What tells a folder from another of its name, where the system has such numbers.
+fn identity(folder: &Path) -> Option<(u64, u64)> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let found = std::fs::symlink_metadata(folder).ok()?;
+        Some((found.dev(), found.ino()))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = folder;
+        None
     }
 }
 

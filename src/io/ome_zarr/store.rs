@@ -216,7 +216,7 @@ impl StoreWriter {
             let layout = ShardLayout::halved(plan.geometry.shape, element, self.root.version(), halved);
             let level =
                 LevelWriter::create(&folder.join(level.to_string()), &self.path, plan, element, packed, layout)?;
-            Ok(level.counted_by(self.root.counter()))
+            Ok(level.counted_by(self.root.clone()))
         };
         let levels = levels.into_iter().enumerate().map(create).collect::<Result<_>>()?;
         self.write_group(group, attributes)?;

@@ -9,12 +9,10 @@ use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry};
 use crate::io::geometry::write::ply::PlyWriter;
-use crate::io::ome_zarr::StoreWriter;
+use crate::io::ome_zarr::{GROWING, StoreWriter};
 use crate::pipeline::surface::extract;
 use crate::store::{BoxSource, BrickArray};
 
-/// The folder of such surfaces, of a store.
-pub const FOLDER: &str = "growing";
 /// Voxels that it is drawn on at most: small enough for any viewer.
 const MOST_VOXELS: u64 = 2 << 20;
 /// Bytes that drawing it takes: the voxels, its patches, what is known of their edges.
@@ -37,19 +35,25 @@ impl<'a> Growing<'a> {
     /// When its folder cannot be made.
     pub(crate) fn of(store: Option<&StoreWriter>, name: &str, geometry: &'a Geometry) -> Result<Option<Self>> {
         let Some(store) = store.filter(|store| store.live().is_some()) else { return Ok(None) };
-        let path = store.file(&format!("{FOLDER}/{name}.ply"))?;
+        let path = store.file(&format!("{GROWING}/{name}.ply"))?;
         Ok(Some(Self { path, geometry, due: Instant::now() }))
     }
 
-    /// Draws the surface of u = 1/2 as it is, where it is time to.
+    /// Draws the surface of u = 1/2 as it is, where it is time to. One that cannot be drawn is not shown: the run goes on.
     ///
     /// # Errors
-    /// When it cannot be written, scratch runs out or the run is interrupted.
+    /// When the run is interrupted.
     pub(crate) fn show(&mut self, engine: &Engine, u: &BrickArray<f32>) -> Result<()> {
         let began = Instant::now();
         if began < self.due {
             return Ok(());
         }
+        let _ = self.draw(engine, u);
+        self.due = Instant::now() + BETWEEN.max(began.elapsed() * TIMES_LONGER);
+        engine.check()
+    }
+
+    fn draw(&self, engine: &Engine, u: &BrickArray<f32>) -> Result<()> {
         // Where there is no room for it beside what is solved, it is not shown.
         let Ok(_held) = engine.hold(BYTES) else { return Ok(()) };
         let shape = u.set().grid().shape();
@@ -65,16 +69,14 @@ impl<'a> Growing<'a> {
         let mut mesh = PlyWriter::on_grid(&self.path, &geometry)?;
         extract(&stage, &sparse, &geometry, &mut mesh)?;
         mesh.finish()?;
-        self.due = Instant::now() + BETWEEN.max(began.elapsed() * TIMES_LONGER);
         Ok(())
     }
 }
 
 impl Drop for Growing<'_> {
     fn drop(&mut self) {
-        // It may never have been drawn; others may still grow in the folder.
+        // It may never have been drawn. The folder, in which others may grow, goes with the end of the run.
         let _ = std::fs::remove_file(&self.path);
-        let _ = self.path.parent().map(std::fs::remove_dir);
     }
 }
 

@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 use super::volume::{Select, Stack, StackInfo};
 use crate::error::{Error, Result};
 use crate::grid::Box3;
+use crate::io::ome_zarr::{LiveState, live};
 use crate::store::{ElementType, SamplesMut, VolumeSource, Whereabouts};
 use array::ChunkedArray;
 use axes::{Axis, Role};
@@ -32,6 +33,18 @@ pub use describe::{LevelDescription, ZarrDescription, describe, holds_image, lab
 
 /// Voxels that are asked for at once, at least: smaller chunks are read several together.
 const AT_ONCE: i64 = 1 << 16;
+
+/// What is to be said of an array in a live store that is not complete.
+fn incomplete(array: &Path) -> Option<String> {
+    // A field lies a few folders below the root of its store.
+    let state = array.ancestors().take(5).find_map(live)?.state;
+    let what = match state {
+        LiveState::Complete => return None,
+        LiveState::Running => "is still written by another run",
+        LiveState::Interrupted => "was left by a run that was interrupted",
+    };
+    Some(format!("the store {what}; what is missing of it is read as zeros"))
+}
 
 /// One channel at one time of a level of an image.
 #[derive(Debug)]
@@ -64,6 +77,7 @@ impl ZarrImage {
             notes.push(format!("the axes are not named; {} is taken", axes::names(&axes)));
         }
         notes.extend(array.note());
+        notes.extend(incomplete(&folder));
         let lengths = lengths(&axes, space, placed.as_ref(), &mut notes);
         let along = |role: Role| (0..axes.len()).find(|&a| axes[a].role == role).map_or(1, |a| array.shape[a]);
         let letters: String = axes.iter().filter_map(|axis| axis.name.chars().next()).collect();
