@@ -228,7 +228,7 @@ fn grids_that_make_no_sense_are_refused() {
         (
             &format!("{exact} 16000,16000,2000 --memory 4GiB"),
             1,
-            &["512 000 000 000 voxels", "TiB of temporary fields", "are free", "--scratch"],
+            &["512 000 000 000 voxels", "TiB of temporary files", "are free", "--scratch"],
         ),
         ("--spacing 1e-12", 2, &["voxels", "--spacing"]),
         (&format!("{exact} 9000000000000000000,9,9"), 2, &["voxels", "--shape"]),

@@ -205,7 +205,8 @@ fn many_objects_grow_side_by_side() {
     };
     let marks: String = (0..25).map(|n| ball(n).marks(n + 1)).collect();
     bench.write("marks.csv", &format!("{HEADER}{marks}"));
-    let command = "segment image.tif --points marks.csv --image none --image-spacing 1 --live --threads 4 --log json";
+    let command =
+        "segment image.tif --points marks.csv --image none --image-spacing 1,1,1 --live --threads 4 --log json";
     bench.succeed(&format!("{command} -o live.zarr"));
     assert!(!bench.path("live.zarr/growing").exists());
     assert_eq!(bench.entries("live.zarr/meshes").iter().filter(|name| name.starts_with("object-")).count(), 25);

@@ -36,11 +36,13 @@ fn every_stage_heeds_signals() {
         "speed 1",
         "level set 1",
         "surface 1",
+        "meshes for viewers",
         "write levelset 1",
         "write distance 1",
         "neighbours",
         "write labels",
         "write image",
+        "report page",
     ];
     assert_eq!(stages, wanted);
     // The line at which a stage ends is said right before the next one begins: that one is interrupted. Before the
