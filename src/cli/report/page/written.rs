@@ -37,8 +37,9 @@ impl Written<'_> {
     ) -> Result<()> {
         let stage = self.engine.stage("report page", 0);
         let made = self.page(&stage, evidence, &report());
-        stage.finish();
+        // A stage that a signal has ended is not told as done.
         self.engine.check()?;
+        stage.finish();
         if let Err(error) = made {
             self.console.note(&format!("report.html is left out: {error}"));
         }
