@@ -23,7 +23,7 @@ pub use exchange::{Exchange, Note};
 pub use fixed_point::{FixedPoint, relax_to_fixed_point};
 pub use halo::{Boundary, HaloPlan, Reach};
 pub use memory::budget::{Budget, machine_memory, peak_resident};
-pub use memory::footprint::{Footprint, Hold};
+pub use memory::footprint::{Footprint, Hold, Lent};
 pub use ownership::Ownership;
 pub use progress::heard::{Progress, Silent};
 pub use progress::outlook::{Outlook, Plan};

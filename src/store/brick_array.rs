@@ -42,9 +42,9 @@ impl Scratch {
         self.window.traffic()
     }
 
-    /// Changes how many bytes may be resident.
-    pub fn set_window(&self, bytes: u64) {
-        self.window.set_limit(bytes);
+    /// Changes how many bytes may be resident: the window, and what is lent to it for a while.
+    pub fn set_window(&self, bytes: u64, lent: u64) {
+        self.window.set_limit(bytes, lent);
     }
 
     /// Says how much scratch the system can hold in its page cache; what goes beyond is written behind.
@@ -52,10 +52,16 @@ impl Scratch {
         self.window.set_page_cache(bytes);
     }
 
-    /// How many bytes may be resident.
+    /// How many bytes may be resident for as long as they are wanted.
     #[must_use]
     pub fn window(&self) -> u64 {
         self.window.limit()
+    }
+
+    /// How many bytes may be resident now, those that are lent among them.
+    #[must_use]
+    pub fn resident_limit(&self) -> u64 {
+        self.window.resident_limit()
     }
 
     /// The folder the files are in.
@@ -355,6 +361,24 @@ mod tests {
             array.read(slot, |b| assert!(b.iter().all(|&v| v == slot as f32)));
         }
         assert!(scratch.traffic().brick_loads >= 16, "the first bricks were dropped and loaded again");
+        drop(array);
+        assert_eq!(scratch.window.resident(), 0);
+    }
+
+    #[test]
+    fn only_what_is_used_of_a_segment_counts() {
+        let dir = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new(dir.path(), 4 << 20);
+        let set = Arc::new(BrickSet::dense(BrickGrid::new([640, 64, 64], 64)));
+        let array = BrickArray::<f32>::new(&scratch, &set).unwrap();
+        for slot in [0, 2, 4, 6] {
+            array.write(slot, |brick| brick.fill(1.0));
+        }
+        assert_eq!(scratch.window.resident(), 4 << 20, "a brick of each of four segments");
+        assert_eq!(scratch.traffic().brick_loads, 4);
+        array.write(1, |brick| brick.fill(1.0));
+        assert!(scratch.window.resident() <= 4 << 20, "the other brick of the first segment");
+        array.read(8, |brick| assert_eq!(brick[0], 0.0));
         drop(array);
         assert_eq!(scratch.window.resident(), 0);
     }

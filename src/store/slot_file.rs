@@ -68,6 +68,9 @@ impl Mapping {
             Error::from_io(&what, &e).at(dir)
         })?;
         let raw = MmapRaw::map_raw(&file).map_err(|e| Error::from_io("cannot map a scratch file", &e).at(dir))?;
+        #[cfg(target_os = "linux")]
+        // A huge page would make resident what nobody used and the window does not count. A refused hint costs memory alone.
+        drop(raw.advise(memmap2::Advice::NoHugePage));
         Ok(Self { raw, file: Some(file) })
     }
 

@@ -3,14 +3,18 @@
 //! Every mapped file is cut into segments of [`SEGMENT_BYTES`]. A segment becomes resident when a brick in it is
 //! used; past the limit the segments that have not been used for longest are written back and dropped (a second
 //! chance first-in-first-out queue). A dropped segment of a shared mapping loses nothing: its next use reads it again.
+//! What counts of a segment are its blocks that were used: of two bricks in it, or the faces of twenty, often one alone is.
 
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// Bytes that are dropped together. The system may map a whole huge page of its page cache at one fault, so segments
 /// are as large as those and aligned to them: else pages would become resident that nobody accounts for.
 pub(super) const SEGMENT_BYTES: usize = 2 << 20;
+/// Bytes that become resident together: the system maps what its page cache has around a fault, within as many bytes.
+const BLOCK_BYTES: usize = 64 << 10;
+const _: () = assert!(SEGMENT_BYTES / BLOCK_BYTES == u32::BITS as usize, "a bit for each block");
 
 const DROPPED: u8 = 0;
 const RESIDENT: u8 = 1;
@@ -26,6 +30,8 @@ pub(super) trait Droppable: Send + Sync {
 /// The residency of one mapped file, cut into segments.
 pub(super) struct Segments {
     states: Vec<AtomicU8>,
+    /// A bit for each block that was used since the segment was dropped.
+    blocks: Vec<AtomicU32>,
     bytes: usize,
     pages: Box<dyn Droppable>,
     window: Arc<Window>,
@@ -37,56 +43,77 @@ impl Segments {
     pub(super) fn new(bytes: usize, pages: Box<dyn Droppable>, window: Arc<Window>, pinned: bool) -> Arc<Self> {
         window.allocated.fetch_add(bytes as u64, Relaxed);
         if pinned {
-            window.resident.fetch_add(bytes as u64, Relaxed);
+            window.resident.fetch_add(bytes as i64, Relaxed);
         }
-        let start = if pinned { REFERENCED } else { DROPPED };
-        let states = (0..bytes.div_ceil(SEGMENT_BYTES)).map(|_| AtomicU8::new(start)).collect();
-        let segments = Arc::new(Self { states, bytes, pages, window, pinned });
+        let (state, used) = if pinned { (REFERENCED, u32::MAX) } else { (DROPPED, 0) };
+        let count = bytes.div_ceil(SEGMENT_BYTES);
+        let states = (0..count).map(|_| AtomicU8::new(state)).collect();
+        let blocks = (0..count).map(|_| AtomicU32::new(used)).collect();
+        let segments = Arc::new(Self { states, blocks, bytes, pages, window, pinned });
         segments.window.shrink();
         segments
     }
 
-    /// Marks a range as in use; what was not resident is counted as loaded.
+    /// Marks a range as in use; whether a segment of it was not resident.
     pub(super) fn touch(self: &Arc<Self>, start: usize, len: usize) -> bool {
         let mut loaded = false;
-        for segment in start / SEGMENT_BYTES..(start + len).div_ceil(SEGMENT_BYTES) {
-            let state = &self.states[segment];
-            if state.load(Relaxed) == REFERENCED {
+        let end = start + len;
+        for segment in start / SEGMENT_BYTES..end.div_ceil(SEGMENT_BYTES) {
+            let first = segment * SEGMENT_BYTES;
+            let used = blocks_of(start.max(first) - first, end.min(first + SEGMENT_BYTES) - first);
+            let (state, blocks) = (&self.states[segment], &self.blocks[segment]);
+            if state.load(Relaxed) == REFERENCED && blocks.load(Relaxed) & used == used {
                 continue;
             }
-            if state.swap(REFERENCED, Relaxed) == DROPPED {
-                loaded = true;
-                self.window.admit(self, segment);
-            }
+            let more = self.bytes_of(segment, used & !blocks.fetch_or(used, Relaxed));
+            let is_new = state.swap(REFERENCED, Relaxed) == DROPPED;
+            loaded |= is_new;
+            self.window.admit(self, segment, more, is_new);
         }
         loaded
+    }
+
+    /// Bytes of some blocks of a segment.
+    fn bytes_of(&self, segment: usize, blocks: u32) -> i64 {
+        let whole = blocks.count_ones() as usize * BLOCK_BYTES;
+        let len = self.segment_len(segment);
+        let last = (len.max(1) - 1) / BLOCK_BYTES;
+        let missing = if blocks >> last & 1 == 1 { (last + 1) * BLOCK_BYTES - len } else { 0 };
+        (whole - missing) as i64
     }
 
     fn segment_len(&self, segment: usize) -> usize {
         (self.bytes - segment * SEGMENT_BYTES).min(SEGMENT_BYTES)
     }
 
-    /// Drops the segment unless it was used since it was last looked at.
-    fn try_drop(&self, segment: usize) -> bool {
+    /// Drops the segment unless it was used since it was last looked at; the bytes that were resident.
+    fn try_drop(&self, segment: usize) -> Option<i64> {
         if self.states[segment].compare_exchange(REFERENCED, RESIDENT, Relaxed, Relaxed).is_ok() {
-            return false;
+            return None;
         }
         self.states[segment].store(DROPPED, Relaxed);
+        let bytes = self.bytes_of(segment, self.blocks[segment].swap(0, Relaxed));
         self.pages.drop_pages(segment * SEGMENT_BYTES, self.segment_len(segment), self.window.writes_behind());
-        true
+        Some(bytes)
     }
 
     fn forget(&self) {
-        let resident: u64 = (0..self.states.len())
-            .filter(|&s| self.states[s].load(Relaxed) != DROPPED)
-            .map(|s| self.segment_len(s) as u64)
-            .sum();
-        self.window.resident.fetch_sub(resident, Relaxed);
         if self.pinned {
             self.window.pinned.fetch_sub(self.bytes as u64, Relaxed);
+            self.window.resident.fetch_sub(self.bytes as i64, Relaxed);
+        } else {
+            let of_segment = |n: usize| self.bytes_of(n, self.blocks[n].load(Relaxed));
+            self.window.resident.fetch_sub((0..self.blocks.len()).map(of_segment).sum(), Relaxed);
         }
         self.window.allocated.fetch_sub(self.bytes as u64, Relaxed);
     }
+}
+
+/// The blocks that a range of a segment lies in.
+fn blocks_of(start: usize, end: usize) -> u32 {
+    let [first, last] = [start / BLOCK_BYTES, end.div_ceil(BLOCK_BYTES)];
+    let below = |block: usize| if block < u32::BITS as usize { (1 << block) - 1 } else { u32::MAX };
+    below(last) & !below(first)
 }
 
 impl Drop for Segments {
@@ -98,7 +125,10 @@ impl Drop for Segments {
 /// The shared account of resident bytes, and the counters that reports are made of.
 pub struct Window {
     limit: AtomicU64,
-    resident: AtomicU64,
+    /// Bytes that may be resident beyond it for a while.
+    lent: AtomicU64,
+    /// What is dropped may be counted before what was admitted: for a moment it can be negative.
+    resident: AtomicI64,
     /// Bytes in plain memory, which count as resident.
     pinned: AtomicU64,
     /// Bytes of all scratch files.
@@ -143,7 +173,8 @@ impl Window {
     pub fn new(limit: u64) -> Arc<Self> {
         Arc::new(Self {
             limit: AtomicU64::new(limit),
-            resident: AtomicU64::new(0),
+            lent: AtomicU64::new(0),
+            resident: AtomicI64::new(0),
             pinned: AtomicU64::new(0),
             allocated: AtomicU64::new(0),
             page_cache: AtomicU64::new(0),
@@ -154,9 +185,10 @@ impl Window {
         })
     }
 
-    /// Changes the limit; takes effect as further bricks are used.
-    pub fn set_limit(&self, limit: u64) {
+    /// Changes the limit, and what is lent beyond it for a while: room for pages that can be dropped again, not for plain memory.
+    pub fn set_limit(&self, limit: u64, lent: u64) {
         self.limit.store(limit, Relaxed);
+        self.lent.store(lent, Relaxed);
         self.shrink();
     }
 
@@ -178,16 +210,22 @@ impl Window {
         self.allocated.load(Relaxed) > self.page_cache.load(Relaxed)
     }
 
-    /// How many bytes may be resident.
+    /// How many bytes may be resident for as long as they are wanted.
     #[must_use]
     pub fn limit(&self) -> u64 {
         self.limit.load(Relaxed)
     }
 
+    /// How many bytes may be resident now, those that are lent among them.
+    #[must_use]
+    pub fn resident_limit(&self) -> u64 {
+        self.limit() + self.lent.load(Relaxed)
+    }
+
     /// Bytes resident now, by the window's own account.
     #[must_use]
     pub fn resident(&self) -> u64 {
-        self.resident.load(Relaxed)
+        u64::try_from(self.resident.load(Relaxed)).unwrap_or(0)
     }
 
     /// What moved so far.
@@ -200,21 +238,23 @@ impl Window {
         }
     }
 
-    fn admit(&self, file: &Arc<Segments>, segment: usize) {
-        self.resident.fetch_add(file.segment_len(segment) as u64, Relaxed);
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner).push_back((Arc::downgrade(file), segment));
+    fn admit(&self, file: &Arc<Segments>, segment: usize, bytes: i64, is_new: bool) {
+        self.resident.fetch_add(bytes, Relaxed);
+        if is_new {
+            self.queue.lock().unwrap_or_else(PoisonError::into_inner).push_back((Arc::downgrade(file), segment));
+        }
         self.shrink();
     }
 
     /// Drops segments until the limit holds. Each is looked at twice at most: in use since, it stays once.
     fn shrink(&self) {
-        while self.resident.load(Relaxed) > self.limit.load(Relaxed) {
+        while self.resident() > self.resident_limit() {
             let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
             let Some((file, segment)) = queue.pop_front() else { return };
             drop(queue);
             let Some(file) = file.upgrade() else { continue };
-            if file.try_drop(segment) {
-                self.resident.fetch_sub(file.segment_len(segment) as u64, Relaxed);
+            if let Some(bytes) = file.try_drop(segment) {
+                self.resident.fetch_sub(bytes, Relaxed);
             } else {
                 let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
                 queue.push_back((Arc::downgrade(&file), segment));

@@ -86,6 +86,8 @@ struct Held {
     growing: u64,
     /// By boxes.
     boxes: u64,
+    /// The part of all that nobody takes yet, which mapped pages have meanwhile.
+    lent: u64,
 }
 
 impl Held {
@@ -102,7 +104,7 @@ impl Account {
 
     /// Takes a job's footprint off the window for as long as the guard lives.
     pub(in crate::exec) fn reserve(self: &Arc<Self>, footprint: Footprint, threads: u64) -> Result<Hold> {
-        let more = Held { reserved: footprint.bytes(threads), growing: footprint.growing, boxes: 0 };
+        let more = Held { reserved: footprint.bytes(threads), growing: footprint.growing, ..Held::default() };
         self.add(more, |held| self.budget.window(held))
     }
 
@@ -117,11 +119,27 @@ impl Account {
             reserved: held.reserved.saturating_add(more.reserved),
             growing: held.growing.saturating_add(more.growing),
             boxes: held.boxes.saturating_add(more.boxes),
+            lent: held.lent,
         };
         let window = window(sum.bytes())?;
         *held = sum;
-        self.scratch.set_window(window.min(self.widest));
+        self.share(sum, window);
         Ok(Hold { account: self.clone(), held: more })
+    }
+
+    /// What is lent may be resident, but not for good: what is put into plain memory has to stay within the window.
+    fn share(&self, held: Held, window: u64) {
+        self.scratch.set_window(window.min(self.widest), held.lent.min(self.widest.saturating_sub(window)));
+    }
+
+    /// What is held now, changed; the window follows.
+    fn change(&self, change: impl FnOnce(&mut Held)) {
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut held);
+        // No change asks for more than fitted before.
+        if let Ok(window) = self.budget.window_under_way(held.bytes()) {
+            self.share(*held, window);
+        }
     }
 }
 
@@ -132,16 +150,34 @@ pub struct Hold {
     held: Held,
 }
 
+impl Hold {
+    /// Lends so many of the held bytes to mapped pages, for a stage that does not take them yet, until the guard goes.
+    pub fn lend(&self, bytes: u64) -> Lent {
+        self.account.change(|held| held.lent += bytes);
+        Lent { account: self.account.clone(), bytes }
+    }
+}
+
 impl Drop for Hold {
     fn drop(&mut self) {
-        let mut held = self.account.held.lock().unwrap_or_else(PoisonError::into_inner);
-        held.reserved -= self.held.reserved;
-        held.growing -= self.held.growing;
-        held.boxes -= self.held.boxes;
-        // More than that fitted before.
-        if let Ok(window) = self.account.budget.window_under_way(held.bytes()) {
-            self.account.scratch.set_window(window.min(self.account.widest));
-        }
+        self.account.change(|held| {
+            held.reserved -= self.held.reserved;
+            held.growing -= self.held.growing;
+            held.boxes -= self.held.boxes;
+        });
+    }
+}
+
+/// Bytes that are held and not taken yet.
+#[must_use]
+pub struct Lent {
+    account: Arc<Account>,
+    bytes: u64,
+}
+
+impl Drop for Lent {
+    fn drop(&mut self) {
+        self.account.change(|held| held.lent -= self.bytes);
     }
 }
 
@@ -192,12 +228,35 @@ mod tests {
     }
 
     #[test]
+    fn what_is_lent_is_pages_until_it_is_taken() {
+        let dir = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new(dir.path(), 1 << 40);
+        let account = Account::new(Budget { total: 256 * MIB }, scratch.clone());
+        let job = account.reserve(Footprint::of_all(100 * MIB), 1).unwrap();
+        let lent = job.lend(60 * MIB);
+        assert_eq!(
+            (scratch.window(), scratch.resident_limit()),
+            (108 * MIB, 168 * MIB),
+            "no more is put into plain memory"
+        );
+        let error = account.hold(100 * MIB).err().unwrap().to_string();
+        assert!(error.contains("give at least --memory 312MiB"), "what is lent is still held: {error}");
+        drop(lent);
+        assert_eq!((scratch.window(), scratch.resident_limit()), (108 * MIB, 108 * MIB));
+        drop(job.lend(60 * MIB));
+        drop(job);
+        assert_eq!((scratch.window(), scratch.resident_limit()), (208 * MIB, 208 * MIB));
+    }
+
+    #[test]
     fn the_window_is_no_wider_than_it_was_made() {
         let dir = tempfile::tempdir().unwrap();
         let scratch = Scratch::new(dir.path(), MIB);
         let account = Account::new(Budget { total: 1 << 30 }, scratch.clone());
         let job = account.reserve(Footprint::of_all(MIB), 1).unwrap();
-        assert_eq!(scratch.window(), MIB);
+        let lent = job.lend(MIB / 2);
+        assert_eq!((scratch.window(), scratch.resident_limit()), (MIB, MIB));
+        drop(lent);
         drop(job);
         assert_eq!(scratch.window(), MIB);
     }

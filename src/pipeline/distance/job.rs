@@ -102,7 +102,8 @@ pub fn distance_kept<P: Precision>(
         None => Writes::Nothing,
     };
     let needs = settings.needs::<P>(geometry, sets, [engine.threads(), engine.ranks()], writes);
-    let _held = engine.reserve(needs.footprint)?;
+    let held = engine.reserve(needs.footprint)?;
+    let lent = held.lend(needs.later);
     let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));
     let wanted = Wanted { labels: settings.labels, borders: false, closest_point: settings.closest_point };
     let read_out = ReadOut { geometry, sets, is_signed: settings.signed, wanted, kept };
@@ -110,6 +111,7 @@ pub fn distance_kept<P: Precision>(
     // Only who watches a store gains by seeing its bricks one by one.
     let early = reads_early(settings, store).then_some(&reading as &dyn Early<P>);
     solve_sets_watched::<P, _>(engine, geometry, sets, trees.as_ref(), (settings, early), |solved, _| {
+        drop(lent);
         reading.finish(&solved)
     })
 }

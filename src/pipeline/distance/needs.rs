@@ -16,6 +16,8 @@ pub struct Needs {
     pub footprint: Footprint,
     /// The same on all threads.
     pub held: u64,
+    /// What of it is not taken before the field is solved.
+    pub later: u64,
     /// Temporary fields.
     pub scratch: u64,
     /// Triangles that wait in a temporary file, where there is a surface and it goes into a mesh file. About.
@@ -93,10 +95,10 @@ impl DistanceSettings {
         writes: Writes,
     ) -> Needs {
         let grid = BrickGrid::new(geometry.shape, self.brick);
-        let footprint = self.footprint::<P>(geometry, sets, [threads, ranks], writes);
+        let (footprint, later) = self.footprint::<P>(geometry, sets, [threads, ranks], writes);
         let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
         let held = footprint.bytes(threads as u64);
-        Needs { footprint, held, scratch: self.scratch::<P>(&grid, ranks), waiting: 0, seconds }
+        Needs { footprint, held, later, scratch: self.scratch::<P>(&grid, ranks), waiting: 0, seconds }
     }
 
     /// The stages of a distance, and what each will probably take.
@@ -128,14 +130,14 @@ impl DistanceSettings {
         geometry.domain().volume().saturating_mul(element + labels + places).saturating_mul(8) / 7
     }
 
-    /// What is in memory at one time beside bricks.
+    /// What is in memory at one time beside bricks, and what of it is not before the read-out.
     fn footprint<P: Precision>(
         &self,
         geometry: &Geometry,
         sets: &DataSets,
         [threads, ranks]: [usize; 2],
         writes: Writes,
-    ) -> Footprint {
+    ) -> (Footprint, u64) {
         let solving = self.solving::<P>(geometry);
         // Where ranks outnumber threads each has one of its own all the same.
         let more = solving.per_thread.saturating_mul(ranks.saturating_sub(threads) as u64);
@@ -143,7 +145,12 @@ impl DistanceSettings {
         let reading = self.reading::<P>(geometry, sets, threads, writes);
         let at_once =
             if writes == Writes::FieldsMeanwhile { solving.and(reading) } else { solving.or(reading, threads as u64) };
-        self.tables::<P>(geometry, sets, ranks).and(at_once)
+        let later = if writes == Writes::FieldsMeanwhile {
+            0
+        } else {
+            at_once.bytes(threads as u64) - solving.bytes(threads as u64)
+        };
+        (self.tables::<P>(geometry, sets, ranks).and(at_once), later)
     }
 
     /// What is kept from the start to the end.

@@ -60,11 +60,13 @@ pub fn middle_kept<P: Precision>(
 ) -> Result<MiddleFound> {
     check_sets(sets, settings.surface)?;
     let needs = settings.needs::<P>(geometry, sets, engine.threads(), engine.ranks(), store.is_some());
-    let _held = engine.reserve(needs.footprint)?;
+    let held = engine.reserve(needs.footprint)?;
+    let lent = held.lend(needs.later);
     let Drawing { stated, .. } = Drawing::new(geometry, sets, engine.threads());
     let distance = DistanceSettings { labels: true, ..settings.distance };
     let trees = SourceTrees::new(sets);
     solve_sets::<P, _>(engine, geometry, sets, Some(&trees), &distance, |mut solved, set| {
+        drop(lent);
         let shapes = LabelledShapes::new(sets);
         if settings.labels == LabelMode::Exact {
             let stage = engine.stage("exact labels", 0);

@@ -54,9 +54,10 @@ impl MiddleSettings {
         let shapes = (sets.mesh.len() * size_of::<Triangle>()) as u64;
         let drawing = Drawing::new(geometry, sets, threads);
         let footprint = needs.footprint.and(Footprint::of_all(trees + shapes)).and(drawing.footprint());
+        let later = needs.later + drawing.footprint().bytes(threads as u64);
         let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
         let held = footprint.bytes(threads as u64);
-        Needs { footprint, held, waiting: drawing.waiting, seconds, ..needs }
+        Needs { footprint, held, later, waiting: drawing.waiting, seconds, ..needs }
     }
 
     /// The stages of the job, and what each will probably take.
