@@ -153,6 +153,11 @@ impl<T: Element> BrickArray<T> {
         (!blank.written[slot as usize].load(Relaxed)).then_some(blank.value)
     }
 
+    /// Values of a brick, all layers together.
+    pub(super) fn values_of_brick(&self) -> usize {
+        self.brick_len
+    }
+
     /// The bricks that are stored.
     #[must_use]
     pub fn set(&self) -> &Arc<BrickSet> {

@@ -3,6 +3,7 @@
 
 mod both_sinks;
 mod brick_array;
+pub mod checkpoint;
 mod element;
 mod free_space;
 mod hidden;

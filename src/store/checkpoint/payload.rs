@@ -1,0 +1,202 @@
+//! The bricks of a field in a file: a head, then of each stored brick that was written its slot, the CRC-32C of slot and values, and
+//! its values, little-endian, as they lie in it.
+
+use std::io::{self, Read, Write};
+
+use crate::grid::{BrickSet, Slot};
+use crate::store::{BrickArray, Element};
+
+/// What the files begin with.
+const MAGIC: [u8; 8] = *b"slbricks";
+/// Magic, digest of the bricks that are stored, name of the type, values of a brick, bricks in the file, checksum.
+const HEAD: usize = 8 + 4 + 8 + 8 + 8 + 4;
+/// Slot and checksum.
+const BRICK_HEAD: usize = 4 + 4;
+
+/// A field that can be put into a checkpoint.
+pub trait SavedField: Sync {
+    /// Bytes of its file.
+    fn saved_bytes(&self) -> u64;
+
+    /// Writes it; `goes_on` is asked between bricks.
+    ///
+    /// # Errors
+    /// When it cannot be written, or is not to go on.
+    fn save(&self, out: &mut dyn Write, goes_on: &dyn Fn() -> io::Result<()>) -> io::Result<()>;
+}
+
+impl<T: Element> SavedField for BrickArray<T> {
+    fn saved_bytes(&self) -> u64 {
+        let brick = BRICK_HEAD + self.values_of_brick() * size_of::<T>();
+        (HEAD + written(self).count() * brick) as u64
+    }
+
+    fn save(&self, out: &mut dyn Write, goes_on: &dyn Fn() -> io::Result<()>) -> io::Result<()> {
+        out.write_all(&head(self, written(self).count() as u64))?;
+        let mut bytes = Vec::with_capacity(self.values_of_brick() * size_of::<T>());
+        for slot in written(self) {
+            goes_on()?;
+            bytes.clear();
+            self.read(slot, |values| T::append_bytes(values, &mut bytes));
+            out.write_all(&slot.to_le_bytes())?;
+            out.write_all(&checksum(slot, &bytes).to_le_bytes())?;
+            out.write_all(&bytes)?;
+        }
+        Ok(())
+    }
+}
+
+/// The bricks that hold more than the value they began with.
+fn written<T: Element>(field: &BrickArray<T>) -> impl Iterator<Item = Slot> + '_ {
+    field.set().owned().filter(|&slot| field.unwritten(slot).is_none())
+}
+
+fn checksum(slot: Slot, bytes: &[u8]) -> u32 {
+    crc32c::crc32c_append(crc32c::crc32c(&slot.to_le_bytes()), bytes)
+}
+
+fn head<T: Element>(field: &BrickArray<T>, count: u64) -> Vec<u8> {
+    let mut name = [0_u8; 8];
+    let told = T::TYPE.name().as_bytes();
+    name[..told.len().min(8)].copy_from_slice(&told[..told.len().min(8)]);
+    let mut head = MAGIC.to_vec();
+    head.extend(digest(field.set()).to_le_bytes());
+    head.extend(name);
+    head.extend((field.values_of_brick() as u64).to_le_bytes());
+    head.extend(count.to_le_bytes());
+    head.extend(crc32c::crc32c(&head).to_le_bytes());
+    head
+}
+
+/// What tells one set of bricks from others.
+fn digest(set: &BrickSet) -> u32 {
+    let grid = set.grid();
+    let numbers =
+        grid.shape().into_iter().chain([grid.edge(), i64::from(set.owned().start), i64::from(set.owned().end)]);
+    let start = numbers.fold(0, |sum, number| crc32c::crc32c_append(sum, &number.to_le_bytes()));
+    set.ids().iter().fold(start, |sum, id| crc32c::crc32c_append(sum, &id.to_le_bytes()))
+}
+
+/// Goes through a file of bricks and checks it.
+///
+/// # Errors
+/// When it is cut short or damaged.
+pub(super) fn check(from: &mut dyn Read, bytes: u64) -> io::Result<()> {
+    let mut head = [0; HEAD];
+    from.read_exact(&mut head)?;
+    let sum = crc32c::crc32c(&head[..HEAD - 4]);
+    if head[..8] != MAGIC || head[HEAD - 4..] != sum.to_le_bytes() {
+        return Err(damaged("is damaged at its beginning"));
+    }
+    let count = number(&head[28..36]);
+    let of_bricks = bytes.saturating_sub(HEAD as u64);
+    let brick = of_bricks.checked_div(count).unwrap_or(0);
+    if count.checked_mul(brick) != Some(of_bricks) || (count > 0 && brick < BRICK_HEAD as u64) {
+        return Err(damaged("has not the length that it tells"));
+    }
+    let mut record = vec![0; brick as usize];
+    for _ in 0..count {
+        from.read_exact(&mut record)?;
+        take(&record)?;
+    }
+    Ok(())
+}
+
+/// A brick's slot and its bytes out of a record whose checksum fits.
+fn take(record: &[u8]) -> io::Result<(Slot, &[u8])> {
+    let slot = Slot::from_le_bytes([record[0], record[1], record[2], record[3]]);
+    let bytes = &record[BRICK_HEAD..];
+    if record[4..8] != checksum(slot, bytes).to_le_bytes() {
+        return Err(damaged("is damaged: the checksum of a brick does not fit"));
+    }
+    Ok((slot, bytes))
+}
+
+/// Puts the bricks of a file back where they were, with their faces where the field has some; others stay as they are.
+///
+/// # Errors
+/// When the file is cut short or damaged, or is that of another field.
+pub fn restore<T: Element>(field: &BrickArray<T>, from: &mut dyn Read) -> io::Result<()> {
+    let mut there = [0; HEAD];
+    from.read_exact(&mut there)?;
+    let count = number(&there[28..36]);
+    if there[..] != head(field, count)[..] {
+        return Err(damaged("is of another field than that of this run"));
+    }
+    let mut record = vec![0; BRICK_HEAD + field.values_of_brick() * size_of::<T>()];
+    for _ in 0..count {
+        from.read_exact(&mut record)?;
+        let (slot, bytes) = take(&record)?;
+        if !field.set().owned().contains(&slot) {
+            return Err(damaged("names a brick that the field has not"));
+        }
+        field.write(slot, |values| T::fill_from_bytes(values, bytes));
+        if field.has_faces() {
+            field.refresh_faces(slot);
+        }
+    }
+    Ok(())
+}
+
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
+}
+
+fn damaged(what: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, what)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::grid::BrickGrid;
+    use crate::store::Scratch;
+
+    fn field(scratch: &Scratch) -> BrickArray<f32> {
+        let set = Arc::new(BrickSet::from_fn(BrickGrid::new([40, 33, 20], 16), |id| id != 2));
+        BrickArray::blank(scratch, &set, 9.0).unwrap()
+    }
+
+    #[test]
+    fn written_bricks_come_back_with_their_faces_and_no_others() {
+        let dir = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new(dir.path(), 1 << 30);
+        let (before, after) = (field(&scratch), field(&scratch));
+        for slot in [0, 3, 4] {
+            before.write(slot, |brick| {
+                (0..).zip(brick.iter_mut()).for_each(|(n, value)| *value = (slot * 5000 + n) as f32)
+            });
+        }
+        let mut file = Vec::new();
+        before.save(&mut file, &|| Ok(())).unwrap();
+        assert_eq!(file.len() as u64, before.saved_bytes());
+        check(&mut file.as_slice(), file.len() as u64).unwrap();
+        restore(&after, &mut file.as_slice()).unwrap();
+        for slot in before.set().owned() {
+            assert_eq!(after.unwritten(slot), before.unwritten(slot));
+            before.read(slot, |from| after.read(slot, |to| assert!(before.unwritten(slot).is_some() || from == to)));
+        }
+        after.read_face(3, crate::grid::FACES[0], |face| assert_eq!(face[1], 15_016.0));
+    }
+
+    #[test]
+    fn damage_is_seen_by_who_checks_and_by_who_restores() {
+        let dir = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new(dir.path(), 1 << 30);
+        let before = field(&scratch);
+        before.write(1, |brick| brick.fill(2.5));
+        let mut whole = Vec::new();
+        before.save(&mut whole, &|| Ok(())).unwrap();
+        for at in (0..whole.len()).step_by(61).chain(0..HEAD + BRICK_HEAD) {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 1 << (at % 8);
+            let is_seen = check(&mut damaged.as_slice(), damaged.len() as u64).is_err();
+            assert!(is_seen, "a bit of byte {at}");
+            assert!(restore(&field(&scratch), &mut damaged.as_slice()).is_err(), "a bit of byte {at}");
+            assert!(check(&mut &whole[..at], at as u64).is_err(), "cut at {at}");
+            assert!(restore(&field(&scratch), &mut &whole[..at]).is_err(), "cut at {at}");
+        }
+    }
+}
