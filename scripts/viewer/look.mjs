@@ -16,6 +16,10 @@ const WIDTH = 1280;
 const HEIGHT = 800;
 // Pixels of a picture that have to show what is looked for; the frame around data has some at its edges that are no pure yellow.
 const ENOUGH = 2000;
+// Bytes a second, few enough for pictures to be taken while a page loads.
+const SLOW = { offline: false, latency: 1, downloadThroughput: 2e6, uploadThroughput: -1 };
+// The part of a section that is there which has one colour, at most.
+const MOST_OF_ONE = 0.2;
 // Seconds until a page on a busy machine has drawn everything.
 const PATIENCE = 120;
 
@@ -47,13 +51,15 @@ const serve = async (store) => {
   throw new Error(`strandline view ${store} said nothing`);
 };
 
-// Bytes that were loaded when the section in the upper left was first to be seen.
-const firstSeen = async (page, what, bytes) => {
-  const clip = { x: 0, y: 60, width: WIDTH / 2 - 8, height: HEIGHT / 2 - 70 };
-  for (const until = Date.now() + 1000 * PATIENCE; Date.now() < until; await new Promise((after) => setTimeout(after, 100))) {
-    const before = bytes();
-    const pixels = pixelsOf(await page.screenshot({ clip })).map(([x, y, colour]) => [x, y + clip.y, colour]);
-    if (LOOKS[what](pixels) >= ENOUGH / 4) return before;
+// Bytes that were loaded when the middle of the section in the upper left was first to be seen: no colour, such as
+// that of labels over nothing, covers more than a part of it.
+const firstSeen = async (page, bytes) => {
+  const [width, height] = [WIDTH / 4, HEIGHT / 4];
+  const clip = { x: WIDTH / 4 - width / 2, y: HEIGHT / 4 - height / 2 + 30, width, height };
+  for (const until = Date.now() + 1000 * PATIENCE; Date.now() < until; await new Promise((after) => setTimeout(after, 20))) {
+    const counts = new Map();
+    for (const [, , colour] of pixelsOf(await page.screenshot({ clip }))) counts.set(colour.join(), (counts.get(colour.join()) ?? 0) + 1);
+    if (Math.max(...counts.values()) < MOST_OF_ONE * width * height) return bytes();
   }
 };
 
@@ -78,14 +84,16 @@ const look = async (browser, store, wanted) => {
     page.on("request", (request) => !request.url().startsWith(url) && !/^(data|blob):/.test(request.url()) && faults.push(`leaves: ${request.url()}`));
     const session = await page.createCDPSession();
     await session.send("Network.enable");
+    await session.send("Network.emulateNetworkConditions", SLOW);
     session.on("Network.loadingFinished", (event) => (bytes += event.encodedDataLength));
     // Chunks are fetched by workers.
     page.on("workercreated", (worker) => {
       worker.client.on("Network.loadingFinished", (event) => (bytes += event.encodedDataLength));
       worker.client.send("Network.enable").catch(() => {});
+      worker.client.send("Network.emulateNetworkConditions", SLOW).catch(() => {});
     });
     await page.goto(url);
-    const firstLook = await firstSeen(page, wanted.split(/[/,]/)[0], () => bytes);
+    const firstLook = await firstSeen(page, () => bytes);
     if (firstLook !== undefined) console.log(`${store}: ${(firstLook / 1e6).toFixed(2)} MB loaded until the middle slice was to be seen`);
     await page.waitForFunction(() => window.viewer?.layerManager.managedLayers.length > 0 && window.viewer.isReady(), {
       timeout: 1000 * PATIENCE,

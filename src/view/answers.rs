@@ -44,6 +44,8 @@ struct Now {
     state: String,
     /// Whether it was live when it was looked at.
     is_live: bool,
+    /// Whether a store that lived is there no more.
+    is_gone: bool,
     looked: Instant,
 }
 
@@ -52,7 +54,20 @@ const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
 
 impl Now {
     fn new(shown: Shown) -> Self {
-        Self { state: state::state(&shown).to_string(), is_live: shown.is_live(), looked: Instant::now(), shown }
+        let state = state::state(&shown).to_string();
+        Self { state, is_live: shown.is_live(), is_gone: false, looked: Instant::now(), shown }
+    }
+
+    /// What there is a moment later. What cannot be looked at any more stays as it was seen, and nobody writes it.
+    fn next(&self) -> Self {
+        self.shown.again().map_or_else(
+            |_| {
+                let (shown, state) = (self.shown.clone(), self.state.clone());
+                let is_gone = shown.live().next().is_none();
+                Self { state, is_live: shown.is_live(), is_gone, looked: Instant::now(), shown }
+            },
+            Self::new,
+        )
     }
 }
 
@@ -64,11 +79,8 @@ impl Site {
     /// What is shown; of what lives, looked at lately. Reads folders.
     fn looked_at(&self) -> Arc<Now> {
         let now = self.now();
-        if now.is_live
-            && now.looked.elapsed() > BETWEEN_LOOKS
-            && let Ok(shown) = now.shown.again()
-        {
-            *self.now.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(Now::new(shown));
+        if (now.is_live || now.is_gone) && now.looked.elapsed() > BETWEEN_LOOKS {
+            *self.now.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(now.next());
         }
         self.now()
     }
@@ -149,6 +161,7 @@ async fn live(State(site): State<Arc<Site>>) -> Response {
     let running = states.iter().filter(|live| live.state == LiveState::Running);
     let share = running.clone().map(|live| live.done).fold(1.0, f64::min);
     let words = match running.count() {
+        0 if now.is_gone => "interrupted: the store was taken away while it was written".into(),
         0 if states.iter().any(|live| live.state == LiveState::Interrupted) => {
             "interrupted before it was complete".into()
         }

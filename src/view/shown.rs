@@ -61,6 +61,8 @@ pub(super) struct Image {
     pub(super) kind: Kind,
     /// Whether it is a Zarr of version 2, as OME-Zarr 0.4 is.
     pub(super) is_version_2: bool,
+    /// Whether a voxel has four bytes or more.
+    pub(super) is_wide: bool,
     pub(super) axes: Vec<Axis>,
     /// The values from black to white.
     pub(super) window: Option<[f64; 2]>,
@@ -330,10 +332,18 @@ fn image(path: &str, folder: &Path, found: &Multiscale) -> Option<Image> {
             Kind::Picture
         },
         is_version_2: found.is_version_2,
+        is_wide: is_wide(&array),
         axes,
         window: window["start"].as_f64().zip(window["end"].as_f64()).map(|(low, high)| [low, high]),
         colors: colors(&found.attributes["image-label"]["colors"]),
     })
+}
+
+/// Whether an array's voxels have four bytes or more: its type is `float32`, or `<f4` in version 2.
+fn is_wide(array: &Value) -> bool {
+    let name = array["data_type"].as_str().or(array["dtype"].as_str()).unwrap_or_default();
+    let size = name.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(0);
+    if array["dtype"].is_string() { size >= 4 } else { size >= 32 }
 }
 
 fn colors(list: &Value) -> Vec<(u64, [u8; 3])> {

@@ -8,8 +8,8 @@ use super::shown::{Axis, Image, Kind, MeshFile, Shown};
 /// Colours of meshes without one, evenly around the circle of hues.
 const HUE_STEP: f64 = 0.618_033_988_75;
 
-/// Voxels along the longest axis of a large image.
-const LARGE: u64 = 512;
+/// Voxels along the longest axis of an image that is not large.
+const LARGE: u64 = 256;
 
 /// The state; sources begin with a slash, for the server that the page came from.
 pub(super) fn state(shown: &Shown) -> Value {
@@ -87,10 +87,15 @@ fn layer(image: &Image, shown: &Shown) -> Value {
 }
 
 /// Pixels that a voxel of a section may cover before a finer level is loaded: of large images the finer one would be most of what
-/// a page loads before anything is to be seen. Whoever looks closer gets all of it.
+/// a page loads before anything is to be seen, most of all where voxels are numbers that hardly pack. Whoever looks closer gets all
+/// of it.
 fn render_scale(image: &Image) -> f64 {
     let longest = image.axes.iter().map(|axis| axis.voxels).max().unwrap_or(0);
-    if longest > LARGE { 2.0 } else { 1.0 }
+    match (longest > LARGE, image.is_wide && image.kind != Kind::Labels) {
+        (false, _) => 1.0,
+        (true, false) => 2.0,
+        (true, true) => 4.0,
+    }
 }
 
 /// Marks as points in units of the image.
@@ -165,4 +170,22 @@ fn hue(turns: f64) -> [u8; 3] {
         let wave = 0.5 + 0.5 * libm::cos(std::f64::consts::TAU * (turns - shift));
         (90.0 + 165.0 * wave) as u8
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_images_open_coarser_and_those_of_wide_numbers_more_so() {
+        let scale = |voxels: u64, is_wide: bool, kind: Kind| {
+            let axis = Axis { name: "x".into(), metres: None, voxels, spacing: 1.0, origin: 0.0 };
+            let (path, name) = (String::new(), String::new());
+            let (window, colors) = (None, Vec::new());
+            render_scale(&Image { path, name, kind, is_version_2: false, is_wide, axes: vec![axis], window, colors })
+        };
+        assert_eq!([256, 257, 1024].map(|n| scale(n, false, Kind::Picture)), [1.0, 2.0, 2.0]);
+        assert_eq!([256, 257, 1024].map(|n| scale(n, true, Kind::Picture)), [1.0, 4.0, 4.0]);
+        assert_eq!(scale(1024, true, Kind::Labels), 2.0, "labels pack well");
+    }
 }

@@ -270,6 +270,12 @@ fn events_are_lines_of_json() {
     assert_eq!(events.last().unwrap()["event"], "done");
     let events = told("distance points.xyz --spacing 0.1 --log json -o out.zarr");
     let last = events.last().unwrap();
+    // Commands with fewer flags of their own tell likewise.
+    let converted = told("convert out.zarr a.nrrd --log json");
+    assert!(converted.iter().any(|event| event["event"] == "begin"), "{converted:?}");
+    assert_eq!(converted.last().unwrap()["event"], "done");
+    let refused = told("demo -o out.zarr --log json");
+    assert_eq!(refused[0]["code"], 2, "{refused:?}");
     let usage = told("distance points.xyz --log json --spacing nonsense -o other.zarr");
     assert_eq!((usage.len(), &usage[0]["event"], &usage[0]["code"]), (1, &"error".into(), &2.into()));
     assert_eq!((&last["event"], &last["code"]), (&"error".into(), &2.into()), "{events:?}");

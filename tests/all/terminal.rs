@@ -113,6 +113,27 @@ fn pipes_are_read_once() {
     assert!(code == Some(2) && said.contains("is a pipe or a device"), "{said}");
 }
 
+/// What nobody writes to is not waited for.
+#[cfg(target_os = "linux")]
+#[test]
+fn named_pipes_and_devices_are_refused() {
+    let bench = Bench::bare();
+    assert!(std::process::Command::new("mkfifo").arg(bench.path("p")).status().unwrap().success());
+    for run in [
+        "info p",
+        "measure p",
+        "reconstruct p -o none",
+        "distance p --spacing 1 -o none",
+        "convert p out/a.nrrd",
+        "convert p out/a.ply",
+    ] {
+        let said = bench.fail(run, 2);
+        assert!(said.contains("pipe"), "{run}: {said}");
+        let said = bench.fail(&run.replace(" p", " /dev/zero"), 2);
+        assert!(said.contains("device"), "{run}: {said}");
+    }
+}
+
 #[test]
 fn standard_input_is_an_input_like_others() {
     let bench = Bench::bare();

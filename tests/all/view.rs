@@ -7,6 +7,7 @@ use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
 
 use crate::common::ball::{Ball, Bench};
 use crate::common::random::Random;
@@ -273,6 +274,35 @@ fn what_cannot_be_shown_is_refused_and_the_time_ends() {
     assert!(bench.fail("view none.zarr --no-open", 2).contains("none.zarr"));
     bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     assert!(bench.succeed("view a.obj --no-open --for 1s --print-links").contains("precomputed://http://127.0.0.1:"));
+}
+
+/// A run that is killed before there is anything to see, and a store that is taken away, are not told as running.
+#[test]
+fn runs_that_have_ended_are_not_running() {
+    for (is_taken, word) in [(false, "interrupted before"), (true, "taken away")] {
+        let bench = Bench::bare();
+        bench.write("points.xyz", "0 0 0\n1 0 0\n0 1 0\n");
+        let run = "distance points.xyz --origin=-1,-1,-1 --spacing 0.005 --shape 600,600,600 --live -q -o out.zarr";
+        let mut run = bench.command(run).stderr(Stdio::null()).spawn().unwrap();
+        let until = Instant::now() + Duration::from_mins(1);
+        let wait = |seen: &dyn Fn() -> bool| {
+            while !seen() {
+                assert!(Instant::now() < until, "{word}");
+                std::thread::sleep(Duration::from_millis(5));
+            }
+        };
+        wait(&|| bench.path("out.zarr/zarr.json").is_file());
+        let served = Served::new(&bench, "out.zarr");
+        assert_eq!(served.json("/live.json")["running"], true);
+        run.kill().unwrap();
+        run.wait().unwrap();
+        if is_taken {
+            fs::remove_dir_all(bench.path("out.zarr")).unwrap();
+        }
+        wait(&|| served.json("/live.json")["running"] == false);
+        let told = served.json("/live.json");
+        assert!(told["text"].as_str().unwrap().contains(word), "{told}");
+    }
 }
 
 #[test]

@@ -60,14 +60,16 @@ pub(crate) enum Command {
 impl Command {
     /// Whether the run tells what it does as lines of JSON.
     pub(crate) fn tells_json(&self) -> bool {
-        let output = match self {
-            Self::Segment(args) => &args.output,
-            Self::Distance(args) => &args.job.output,
-            Self::Middle(args) => &args.job.output,
-            Self::Reconstruct(args) => &args.output,
+        let log = match self {
+            Self::Segment(args) => args.output.log,
+            Self::Distance(args) => args.job.output.log,
+            Self::Middle(args) => args.job.output.log,
+            Self::Reconstruct(args) => args.output.log,
+            Self::Demo(args) => args.log,
+            Self::Convert(args) => args.log,
             _ => return false,
         };
-        output.log == LogArg::Json
+        log == LogArg::Json
     }
 }
 

@@ -247,6 +247,9 @@ pub(crate) struct DemoArgs {
     /// Print nothing but errors
     #[arg(short, long)]
     pub(crate) quiet: bool,
+    /// How the run tells what it does: lines to read, or one JSON object an event
+    #[arg(long, value_enum, default_value_t = LogArg::Text)]
+    pub(crate) log: LogArg,
 }
 
 /// Measure a triangle mesh.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::common::{CompressArg, OmeArg};
+use super::common::{CompressArg, LogArg, OmeArg};
 use super::pages::VolumeArgs;
 use super::values::{parse_size, parse_spacing};
 
@@ -50,4 +50,7 @@ pub(crate) struct ConvertArgs {
     /// Print nothing but errors
     #[arg(short, long)]
     pub(crate) quiet: bool,
+    /// How the run tells what it does: lines to read, or one JSON object an event
+    #[arg(long, value_enum, default_value_t = LogArg::Text)]
+    pub(crate) log: LogArg,
 }

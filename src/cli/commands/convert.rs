@@ -95,7 +95,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     outputs.check()?;
     let cancel = signals::cancel_on_signals()?;
     let resources = Resources::new(args.memory, args.threads, args.scratch.as_deref(), Some(output))?;
-    let console = Arc::new(Console::new(Voice::of(args.quiet, false)));
+    let console = Arc::new(Console::new(Voice::told(args.log, args.quiet, false)));
     let is_volume = is_store(input) || format_of(input).is_some();
     match target {
         Target::Mesh(_) if is_volume => Err(Error::usage(

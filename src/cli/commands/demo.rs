@@ -42,6 +42,7 @@ pub(crate) fn run(args: &DemoArgs, typed: &[String]) -> Result<()> {
     segment.output.output = Output::Store(args.output.clone());
     segment.output.overwrite = overwrite;
     segment.output.quiet = args.quiet;
+    segment.output.log = args.log;
     let names = Names {
         command: "demo",
         image: "the built-in arabidopsis-embryo.tif".into(),

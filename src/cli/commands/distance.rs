@@ -18,7 +18,7 @@ use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
-use crate::cli::report::page::written::Written;
+use crate::cli::report::page::written::{Written, with_page};
 use crate::cli::report::run_report::{Ran, Report};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
@@ -126,7 +126,7 @@ impl Job {
         self.console.say(&plan);
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
         let engine = engine.with_ranks(self.args.job.ranks);
-        engine.outlook().expect(self.stages::<P>(threads));
+        engine.outlook().expect(with_page(self.stages::<P>(threads), self.args.job.output.store().is_some()));
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
         let found = result?;

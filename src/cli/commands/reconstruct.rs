@@ -18,7 +18,7 @@ use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
-use crate::cli::report::page::written::Written;
+use crate::cli::report::page::written::{Written, with_page};
 use crate::cli::report::run_report::{Distances, Hausdorff, Hole, Moves, Ran, Report, SimplifiedCopy};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
@@ -189,7 +189,7 @@ impl Job {
 
     fn run(&self, seconds: f64) -> Result<()> {
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
-        engine.outlook().expect(plan(seconds, self.writes_fields()));
+        engine.outlook().expect(with_page(plan(seconds, self.writes_fields()), self.writes_fields()));
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let found = result?;

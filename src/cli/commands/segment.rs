@@ -17,7 +17,7 @@ use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
-use crate::cli::report::page::written::Written;
+use crate::cli::report::page::written::{Written, with_page};
 use crate::cli::report::run_report::{Found, Ran, Report, Settings, Solver, crop_xyz};
 use crate::cli::report::{picture, table};
 use crate::cli::terminal::console::{Console, Voice};
@@ -166,7 +166,10 @@ impl Job {
         }
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
         let (voxels, threads, writes) = (self.crop.volume(), self.resources.threads, self.needs_store());
-        engine.outlook().expect(plan(estimate, &self.guides(), voxels, threads, writes));
+        engine.outlook().expect(with_page(
+            plan(estimate, &self.guides(), voxels, threads, writes),
+            self.args.output.store().is_some(),
+        ));
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let outcome = result?;

@@ -53,6 +53,7 @@ impl Outputs<'_> {
             is_read(would_replace)?;
         }
         self.files.iter().try_for_each(|path| self.check_store_of(path))?;
+        self.store.iter().chain(&self.files).try_for_each(|path| self.check_store_around(path))?;
         self.files.iter().try_for_each(|path| may_write(path, self.overwrite))
     }
 
@@ -68,6 +69,21 @@ impl Outputs<'_> {
             return Err(Error::usage("is part of a store that this run reads; give the output another name").at(file));
         }
         Ok(())
+    }
+
+    /// Refuses an output within another store, which would no longer be what its own run wrote, without leave.
+    fn check_store_around(&self, path: &Path) -> Result<()> {
+        let place = place_of(path);
+        match place.ancestors().skip(1).find(|folder| is_store(folder)) {
+            Some(store) if !self.overwrite => {
+                let what = format!(
+                    "lies in another store, {}; give a name outside of it, or --overwrite to write into it",
+                    store.display()
+                );
+                Err(Error::usage(what).at(path))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -259,6 +275,28 @@ mod tests {
         for file in ["old.zarr/zarr.json", "old.zarr/new.json", "in.zarr/../old.zarr/zarr.json"] {
             assert!(check("in.zarr/0", Some("old.zarr"), file).unwrap_err().contains("lies in the store"), "{file}");
         }
+    }
+
+    #[test]
+    fn nothing_is_put_into_another_store_without_leave() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir_all(at("old.zarr/0/c")).unwrap();
+        std::fs::write(at("old.zarr/zarr.json"), "{}").unwrap();
+        let input = at("scan.tif");
+        for name in ["old.zarr/new", "old.zarr/0/new", "old.zarr/0/c/new"] {
+            let path = at(name);
+            for (store, files) in [(Some(&*path), vec![]), (None, vec![&*path])] {
+                let check =
+                    |overwrite| Outputs { inputs: vec![&input], store, files: files.clone(), overwrite }.check();
+                assert!(check(false).unwrap_err().to_string().contains("lies in another store"), "{name}");
+                assert!(check(true).is_ok(), "{name}");
+            }
+        }
+        let beside = at("new.zarr");
+        assert!(
+            Outputs { inputs: vec![&input], store: Some(&beside), files: vec![], overwrite: false }.check().is_ok()
+        );
     }
 
     #[test]

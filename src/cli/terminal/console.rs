@@ -46,13 +46,18 @@ impl Voice {
         }
     }
 
-    /// What the flags of a run ask for.
-    pub(crate) fn of_run(output: &OutputArgs) -> Self {
-        match output.log {
-            LogArg::Text => Self::of(output.quiet, output.verbose),
-            LogArg::Json if output.quiet => Self::Quiet,
+    /// What they ask for where events may be lines of JSON.
+    pub(crate) fn told(log: LogArg, quiet: bool, verbose: bool) -> Self {
+        match log {
+            LogArg::Text => Self::of(quiet, verbose),
+            LogArg::Json if quiet => Self::Quiet,
             LogArg::Json => Self::Json,
         }
+    }
+
+    /// What the flags of a run ask for.
+    pub(crate) fn of_run(output: &OutputArgs) -> Self {
+        Self::told(output.log, output.quiet, output.verbose)
     }
 }
 

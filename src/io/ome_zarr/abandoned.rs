@@ -54,6 +54,37 @@ pub(super) fn remove(folder: &Path, name: &str, is_store: fn(&Path) -> bool) {
     }
 }
 
+/// Puts back what runs that are dead had set aside for the store at `path`: the store that was there before goes to its place
+/// where nothing has come to stand there. `is_empty` tells whether what stands there is of no use. Where something is, what was set
+/// aside goes, as it would have gone with the end of the run.
+pub(super) fn put_back(path: &Path, is_empty: impl Fn(&Path) -> bool) {
+    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return };
+    let prefix = prefix(&name.to_string_lossy());
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let found = entry.file_name().to_string_lossy().into_owned();
+        let Some(making) = found.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(REPLACED)) else { continue };
+        let ours = making.split_once('-').is_some_and(|(process, letters)| {
+            process.bytes().all(|b| b.is_ascii_digit()) && letters.bytes().all(|b| b.is_ascii_alphanumeric())
+        });
+        // Beside it stands the whole store that was to take its place: which to keep is not ours to say.
+        if !ours || folder.join(format!("{prefix}{making}")).exists() {
+            continue;
+        }
+        let aside = entry.path();
+        let Some(_locked) = claim(&aside) else { continue };
+        if is_empty(path) {
+            // A run that has come meanwhile is left alone.
+            let claimed = claim(path);
+            if path.exists() && (claimed.is_none() || fs::remove_dir_all(path).is_err()) {
+                continue;
+            }
+            let _ = fs::rename(&aside, path);
+        } else {
+            let _ = fs::remove_dir_all(&aside);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -41,10 +41,48 @@ pub(super) struct Standing {
     path: PathBuf,
     root: Arc<Root>,
     finished: bool,
-    /// What was there before, under a hidden name: it goes with this, or comes back where this never got a shard.
-    replaced: Option<(TempDir, Option<File>)>,
+    /// What was there before, which goes with this, or comes back where this never got a shard.
+    replaced: Option<Replaced>,
     _claim: Option<File>,
     _unfinished: Unfinished,
+}
+
+/// A store under a hidden name that tells it from one in the making: where the run is killed, the next one puts it back.
+#[derive(Debug)]
+struct Replaced {
+    folder: PathBuf,
+    goes: bool,
+    _claim: Option<File>,
+}
+
+impl Replaced {
+    /// Sets a store aside.
+    fn new(path: &Path) -> std::io::Result<Self> {
+        let free = hidden_folder(path).map_err(std::io::Error::other)?;
+        let mut folder = free.path().as_os_str().to_owned();
+        folder.push(REPLACED);
+        let folder = PathBuf::from(folder);
+        // Locked before it is there for others to find.
+        let claim = abandoned::claim(path);
+        fs::rename(path, &folder)?;
+        Ok(Self { folder, goes: true, _claim: claim })
+    }
+
+    /// Puts it where it was.
+    fn put_back(mut self, path: &Path) {
+        self.goes = false;
+        // Where that fails it stays under its hidden name.
+        let _ = fs::rename(&self.folder, path);
+    }
+}
+
+impl Drop for Replaced {
+    fn drop(&mut self) {
+        if self.goes {
+            // What cannot be removed is in nobody's way.
+            let _ = fs::remove_dir_all(&self.folder);
+        }
+    }
 }
 
 impl Place {
@@ -60,15 +98,9 @@ impl Place {
     /// The place itself; a store that is there makes room.
     pub(super) fn live(path: &Path, root: Arc<Root>) -> Result<Self> {
         let fault = |error: std::io::Error| io_error("the output cannot be created in its folder", &error).at(path);
-        let aside = hidden_folder(path)?;
-        let replaced = if exists(path) {
-            // An empty folder gives way to what is renamed to its name.
-            fs::rename(path, aside.path()).map_err(fault)?;
-            let claim = abandoned::claim(aside.path());
-            Some((aside, claim))
-        } else {
-            None
-        };
+        // What killed runs left goes, also where nothing makes room.
+        drop(hidden_folder(path)?);
+        let replaced = exists(path).then(|| Replaced::new(path)).transpose().map_err(fault)?;
         fs::create_dir(path).map_err(fault)?;
         root.stay();
         let claim = abandoned::claim(path);
@@ -150,10 +182,9 @@ impl Drop for Standing {
         // Where nothing can be seen in it, it is of no use.
         if self.root.written() == 0
             && fs::remove_dir_all(&self.path).is_ok()
-            && let Some((aside, _)) = self.replaced.take()
+            && let Some(aside) = self.replaced.take()
         {
-            let aside = aside.keep();
-            let _ = fs::rename(&aside, &self.path);
+            aside.put_back(&self.path);
         }
     }
 }
@@ -177,6 +208,16 @@ fn exists(path: &Path) -> bool {
 #[must_use]
 pub fn is_store(path: &Path) -> bool {
     ["zarr.json", ".zgroup", ".zattrs", ".zarray"].iter().any(|name| path.join(name).is_file())
+}
+
+/// Puts back the store that a killed run had set aside before anything of its own was to be seen at `path`.
+pub(super) fn put_back(path: &Path) {
+    let is_empty = |path: &Path| {
+        let has_nothing = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+        let has_begun = || live(path).is_some_and(|live| live.state == LiveState::Interrupted && live.written == 0);
+        !exists(path) || has_nothing() || has_begun()
+    };
+    abandoned::put_back(path, is_empty);
 }
 
 /// Refuses a place that something is at which may not go.

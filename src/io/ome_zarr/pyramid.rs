@@ -2,8 +2,11 @@
 
 use crate::grid::Geometry;
 
-/// The pyramid ends when no axis of a level is longer: small enough for one 3-D texture of any viewer.
-const COARSEST_EXTENT: i64 = 256;
+/// An image with no longer axis has one level: it is small enough for one 3-D texture of any viewer.
+const LARGEST_SINGLE: i64 = 256;
+
+/// The pyramid of others ends when no axis of a level is longer: a few chunks, so that the middle of the image is seen soon.
+const COARSEST_EXTENT: i64 = 128;
 
 /// One resolution level of an image.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,12 +21,14 @@ pub struct LevelPlan {
 ///
 /// An axis is halved while its voxels are at most half as long as the longest side, so that voxels grow toward cubes;
 /// from then on all axes are halved together. Axes of one voxel stay as they are. A block's voxel lies at the block's
-/// centre: `(factor - 1) / 2` source voxels further on.
+/// centre: `(factor - 1) / 2` source voxels further on. An image of at most 256 voxels along each axis has one level; the coarsest
+/// level of others has at most 128.
 #[must_use]
 pub fn plan_levels(geometry: &Geometry) -> Vec<LevelPlan> {
     let mut levels = vec![LevelPlan { geometry: geometry.clone(), factors: [1; 3] }];
     let mut finest = geometry.clone();
-    while finest.shape.iter().any(|&n| n > COARSEST_EXTENT) {
+    let is_single = geometry.shape.iter().all(|&n| n <= LARGEST_SINGLE);
+    while !is_single && finest.shape.iter().any(|&n| n > COARSEST_EXTENT) {
         let factors = next_factors(&finest);
         finest = coarser(&finest, factors);
         levels.push(LevelPlan { geometry: finest.clone(), factors });
@@ -72,12 +77,18 @@ mod tests {
     #[test]
     fn fine_axes_shrink_until_voxels_are_near_cubes() {
         let levels = plan_levels(&grid([2048, 2047, 60], [0.25, 0.25, 1.0]));
-        assert_eq!(factors(&levels), [[1, 1, 1], [2, 2, 1], [2, 2, 1], [2, 2, 2]]);
+        assert_eq!(factors(&levels), [[1, 1, 1], [2, 2, 1], [2, 2, 1], [2, 2, 2], [2, 2, 2]]);
         assert_eq!(levels[3].geometry.shape, [256, 256, 30]);
         assert_eq!(levels[3].geometry.spacing, [2.0, 2.0, 2.0]);
         // Centre of the first block of 8 x 8 x 2 voxels: 3.5 and 0.5 voxels from the first voxel's centre.
         assert_eq!(levels[3].geometry.origin, [100.875, -19.125, 3.5]);
         assert_eq!(levels[3].geometry.unit.as_deref(), Some("micrometer"));
+    }
+
+    #[test]
+    fn a_large_image_has_a_level_that_is_a_few_chunks() {
+        let coarsest = |n: i64| plan_levels(&grid([n, n, n], [1.0; 3])).last().unwrap().geometry.shape;
+        assert_eq!([256, 257, 512, 1024, 1025].map(coarsest), [[256; 3], [65; 3], [128; 3], [128; 3], [65; 3]]);
     }
 
     #[test]
@@ -90,8 +101,8 @@ mod tests {
     #[test]
     fn flat_axes_stay() {
         let levels = plan_levels(&grid([5000, 400, 1], [0.5, 0.5, 100.0]));
-        assert_eq!(factors(&levels)[1..], [[2, 2, 1]; 5]);
-        assert_eq!(levels[5].geometry.shape, [157, 13, 1]);
+        assert_eq!(factors(&levels)[1..], [[2, 2, 1]; 6]);
+        assert_eq!(levels[6].geometry.shape, [79, 7, 1]);
         // A fine axis that is flat must not keep the others from shrinking.
         assert_eq!(factors(&plan_levels(&grid([1, 600, 600], [0.01, 1.0, 1.0])))[1], [1, 2, 2]);
     }

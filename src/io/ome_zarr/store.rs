@@ -9,7 +9,7 @@ use super::compression::{Compression, Content};
 use super::files::create_parent;
 use super::level::LevelWriter;
 use super::metadata::{self, ImageSpec, LabelSpec};
-use super::place::{Place, check_target};
+use super::place::{Place, check_target, put_back};
 use super::pyramid::{LevelPlan, plan_levels};
 use super::root::Root;
 use super::shard::ShardLayout;
@@ -45,7 +45,8 @@ impl ImageWriter {
 
 impl StoreWriter {
     /// Begins the store that is to lie at `path`. With `overwrite` a store that is there already is replaced, at the
-    /// end. What killed runs left in the making of the same store is removed.
+    /// end. What killed runs left in the making of the same store is removed; a store that a live one had set aside
+    /// before it had anything of its own comes back first.
     ///
     /// # Errors
     /// `Usage` when something is at `path` that may not be replaced, or the folder it is to lie in does not exist;
@@ -60,6 +61,7 @@ impl StoreWriter {
     /// As [`StoreWriter::create`].
     pub fn create_as(version: OmeVersion, path: &Path, overwrite: bool) -> Result<Self> {
         let path = resolve(path)?;
+        put_back(&path);
         check_target(&path, overwrite)?;
         let place = Place::hidden(&path)?;
         let root = Arc::new(Root::new(place.folder(), version));
@@ -82,6 +84,7 @@ impl StoreWriter {
     /// As [`StoreWriter::create`].
     pub fn create_live_as(version: OmeVersion, path: &Path, overwrite: bool) -> Result<Self> {
         let path = resolve(path)?;
+        put_back(&path);
         check_target(&path, overwrite)?;
         let root = Arc::new(Root::new(&path, version));
         let place = Place::live(&path, root.clone())?;

@@ -6,10 +6,12 @@ use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::geometry::triangle::Triangle;
 use crate::pipeline::distance::{DistanceSettings, Needs, Writes, tree_bytes};
+use crate::pipeline::output::viewer_mesh;
 
 /// Seconds of one thread for a voxel whose label is made exact, and whose cell is looked at for surfaces.
 const EXACT_SECONDS: f64 = 40e-9;
 const SURFACE_SECONDS: f64 = 250e-9;
+const VIEWER_SECONDS: f64 = 20e-9;
 
 /// How labels are told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +73,9 @@ impl MiddleSettings {
             plan.insert(1, ("exact labels".into(), all * EXACT_SECONDS));
         }
         plan.insert(plan.len() - 1, ("surface".into(), all * SURFACE_SECONDS));
+        if writes {
+            plan.push((viewer_mesh::STAGE.to_owned(), all * VIEWER_SECONDS));
+        }
         plan
     }
 }

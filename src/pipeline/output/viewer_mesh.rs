@@ -59,6 +59,9 @@ pub struct Simplified {
     pub left_out: f64,
 }
 
+/// What the stage is called, each time; it takes about as long as the surface was drawn.
+pub(crate) const STAGE: &str = "meshes for viewers";
+
 /// What is said where there is no room.
 const NO_ROOM: &str = "the surface has no copy with fewer triangles for viewers: the memory has no room to make one; more --memory gives it";
 
@@ -90,7 +93,7 @@ pub fn for_viewers(
         }
         return Ok(None);
     };
-    let stage = engine.stage("meshes for viewers", 0);
+    let stage = engine.stage(STAGE, 0);
     let mut pairs = BTreeSet::new();
     let (mesh, copy) = if is_large {
         let (mesh, copy) = simplify(engine, written, geometry, &mut pairs)?;

@@ -10,6 +10,7 @@ use crate::pipeline::enclosure::needs::{COARSE_VOXELS, DISTANCE_BYTES, GRID_CELL
 use crate::pipeline::enclosure::region::RegionOfInterest;
 use crate::pipeline::enclosure::search::first_reach_for;
 use crate::pipeline::laying::check_counts;
+use crate::pipeline::output::viewer_mesh;
 
 /// What a run is expected to take; of a cloud whose holes are wider than the search's first reach it takes more.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -85,7 +86,7 @@ pub(super) fn boxes(region: &RegionOfInterest, cloud: &[[f64; 3]]) -> Footprint 
 #[must_use]
 pub fn plan(seconds: f64, writes: bool) -> Plan {
     let stages = [("distance", 0.15), ("tagging", 0.2), ("band", 0.1), ("level set", 0.5), ("surface", 0.05)];
-    let written = [("write levelset", 0.02), ("write distance", 0.02)];
+    let written = [(viewer_mesh::STAGE, 0.05), ("write levelset", 0.02), ("write distance", 0.02)];
     let written = written.into_iter().filter(|_| writes);
     stages.into_iter().chain(written).map(|(name, share)| (name.into(), share * seconds)).collect()
 }

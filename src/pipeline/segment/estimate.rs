@@ -19,6 +19,7 @@ use crate::pipeline::enclosure::region::{RegionOfInterest, voxel_bounds};
 use crate::pipeline::image::smoothing::thread_bytes;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::marks::{ObjectMarks, cloud_of, contour_gap};
+use crate::pipeline::output::viewer_mesh;
 use crate::store::VolumeSource;
 
 /// What a run is expected to take.
@@ -70,6 +71,8 @@ const STACK_SECONDS: [f64; 3] = [7e-9, 8e-9, 3e-9];
 /// The longest stages of an object, and their shares of its time.
 const OBJECT_STAGES: [(&str, f64); 6] =
     [("profiles", 0.03), ("shape", 0.28), ("distance", 0.1), ("speed", 0.08), ("level set", 0.46), ("surface", 0.05)];
+/// The same of its mesh for viewers.
+const VIEWER_SHARE: f64 = 0.05;
 
 /// Memory that an outline takes: its curve, its edges and where they lie; and what an object's profiles and shape take.
 const OUTLINE_BYTES: u64 = 256 << 10;
@@ -215,6 +218,7 @@ pub fn plan(estimate: &Estimate, guides: &Guides<'_>, voxels: u64, threads: usiz
     for (marks, surface) in guides.objects.iter().zip(surfaces) {
         let stages = OBJECT_STAGES.iter();
         plan.extend(stages.map(|(name, share)| (format!("{name} {}", marks.object), near * surface * share)));
+        plan.extend(writes.then(|| (viewer_mesh::STAGE.to_owned(), near * surface * VIEWER_SHARE)));
     }
     plan
 }

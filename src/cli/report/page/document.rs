@@ -7,7 +7,7 @@ use super::html::Html;
 use super::picture::Picture;
 use super::settings::told;
 use super::views::Views;
-use super::{objects, plots, settings, slices, stages};
+use super::{objects, plots, settings, slices, stages, warnings};
 use crate::cli::terminal::text::{bytes, duration, grouped};
 use crate::error::Result;
 use crate::exec::StageReport;
@@ -126,8 +126,10 @@ impl Document<'_> {
     }
 
     fn warnings(&self, page: &mut Html) {
-        let notes = self.report["notes"].as_array().into_iter().flatten();
-        notes.for_each(|note| page.element("p", &[("class", "warning")], &sentence(&told(note))));
+        let notes: Vec<String> = self.report["notes"].as_array().into_iter().flatten().map(told).collect();
+        for line in warnings::lines(&notes) {
+            page.element("p", &[("class", "warning")], &line);
+        }
     }
 
     fn inputs(&self, page: &mut Html) {
@@ -255,16 +257,6 @@ fn xyz(zyx: &Value) -> Vec<Value> {
     zyx.as_array().into_iter().flatten().rev().cloned().collect()
 }
 
-/// A note as a sentence.
-fn sentence(note: &str) -> String {
-    // A file's name stays as it is.
-    let is_word = note.split([' ', ':']).next().is_some_and(|word| word.chars().all(|c| c.is_ascii_lowercase()));
-    let (start, rest) = note.split_at(note.chars().next().map_or(0, char::len_utf8));
-    let start = if is_word { start.to_ascii_uppercase() } else { start.to_owned() };
-    let end = if note.ends_with(['.', '?', '!']) { "" } else { "." };
-    format!("{start}{rest}{end}")
-}
-
 /// The command line as a shell takes it.
 fn command_line(typed: &[String]) -> String {
     let quoted = |(n, word): (usize, &String)| {
@@ -287,12 +279,5 @@ mod tests {
     fn commands_can_be_copied() {
         let typed = ["/opt/bin/strandline", "segment", "a b.tif", "--tau=2", "it's", ""].map(String::from);
         assert_eq!(command_line(&typed), "strandline segment 'a b.tif' --tau=2 'it'\\''s' ''");
-    }
-
-    #[test]
-    fn notes_become_sentences() {
-        assert_eq!(sentence("object 3: one mark is off"), "Object 3: one mark is off.");
-        assert_eq!(sentence("a.tif: is it whole?"), "a.tif: is it whole?");
-        assert_eq!(sentence(""), ".");
     }
 }

@@ -12,4 +12,5 @@ mod settings;
 mod slices;
 mod stages;
 mod views;
+mod warnings;
 pub(crate) mod written;

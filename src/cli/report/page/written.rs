@@ -12,11 +12,21 @@ use super::views::{Surface, Viewer};
 use crate::cli::outputs::files::write_whole;
 use crate::cli::report::run_report::Report;
 use crate::error::{Error, Result};
-use crate::exec::{Engine, Progress, Stage};
+use crate::exec::{Engine, Plan, Progress, Stage};
 use crate::io::ome_zarr::StoreWriter;
 
 /// Objects whose surfaces are shown, the largest.
 const MOST_SURFACES: usize = 12;
+
+/// What the stage is called, and the seconds that it probably takes.
+const STAGE: &str = "report page";
+const SECONDS: f64 = 0.5;
+
+/// The stages of a run that writes a report at its end, or none.
+pub(crate) fn with_page(mut plan: Plan, writes: bool) -> Plan {
+    plan.extend(writes.then(|| (STAGE.to_owned(), SECONDS)));
+    plan
+}
 
 /// Where a report goes, and who hears of what goes wrong.
 pub(crate) struct Written<'a> {
@@ -35,7 +45,7 @@ impl Written<'_> {
         evidence: &Evidence<'_>,
         report: impl Fn() -> Report<S, R>,
     ) -> Result<()> {
-        let stage = self.engine.stage("report page", 0);
+        let stage = self.engine.stage(STAGE, 0);
         let made = self.page(&stage, evidence, &report());
         // A stage that a signal has ended is not told as done.
         self.engine.check()?;

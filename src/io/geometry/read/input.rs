@@ -1,8 +1,9 @@
 //! `Input`: a file of sources, opened once, whose first bytes can be looked at before it is read.
 
 use std::fmt;
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, BufRead, BufReader, Chain, Cursor, Read};
+use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
 use super::decoding::{LineFeeds, Utf16};
@@ -42,6 +43,7 @@ impl Input {
             if metadata.is_dir() {
                 return Err(Error::input(format!("is a folder; give one file with {wanted}")));
             }
+            refuse_endless(path, &metadata)?;
             let length = metadata.is_file().then_some(metadata.len());
             (Box::new(File::open(path).map_err(|e| unreadable(&e))?), length)
         };
@@ -143,6 +145,22 @@ impl fmt::Debug for Input {
 #[must_use]
 pub fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == "-"
+}
+
+/// Refuses what may never give a byte: a named pipe, which waits for somebody who writes to it, and a device.
+fn refuse_endless(path: &Path, metadata: &Metadata) -> Result<()> {
+    let kind = metadata.file_type();
+    // What a shell opens for a run, such as `<(command)`, has somebody at its other end, and no name of its own.
+    let is_opened = path.starts_with("/dev/fd") || path == "/dev/stdin" || path.canonicalize().is_err();
+    if kind.is_fifo() && !is_opened {
+        let what =
+            "is a named pipe, which waits for ever where nobody writes to it; give - and the pipe as standard input";
+        return Err(Error::input(what));
+    }
+    if kind.is_char_device() || kind.is_block_device() {
+        return Err(Error::input("is a device; give a file, or - for standard input"));
+    }
+    Ok(())
 }
 
 fn first_bytes(bytes: &mut Bytes) -> Result<Vec<u8>> {

@@ -234,6 +234,39 @@ fn live_stores_that_are_given_up_say_so_or_go() {
     assert_eq!(entries(folder.path()), ["out.zarr"]);
 }
 
+/// What a live run that is killed leaves in its first moments: the store that was there under a hidden name, and little in its place.
+#[test]
+fn a_store_that_was_set_aside_comes_back() {
+    for stands in ["nothing", "empty", "begun", "more"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.zarr");
+        let aside = folder.path().join(".out.zarr.partial-12-abcDEF-replaced");
+        if stands == "empty" {
+            fs::create_dir(&path).unwrap();
+        } else if stands != "nothing" {
+            let store = StoreWriter::create_live(&path, false).unwrap();
+            write_all(&live_image(&store), 7);
+            drop(store);
+        }
+        if stands == "begun" {
+            let document = fs::read_to_string(path.join("zarr.json")).unwrap();
+            fs::write(path.join("zarr.json"), document.replace("\"written\": 1", "\"written\": 0")).unwrap();
+            assert_eq!(live(&path).unwrap().written, 0);
+        }
+        write_store(&folder.path().join("old.zarr"), false, 3).unwrap();
+        fs::rename(folder.path().join("old.zarr"), &aside).unwrap();
+        // A run that goes on keeps its lock on what it has set aside.
+        let held = crate::io::ome_zarr::abandoned::claim(&aside).unwrap();
+        let _ = StoreWriter::create_live(&folder.path().join("out.zarr"), false).map(drop);
+        assert!(aside.exists(), "{stands}");
+        drop(held);
+        let error = StoreWriter::create(&path, false).map(drop).unwrap_err().to_string();
+        let is_old = live(&path).is_none();
+        assert_eq!((is_old, error.contains("interrupted")), (stands != "more", stands == "more"), "{stands}: {error}");
+        assert_eq!(entries(folder.path()), ["out.zarr"], "{stands}");
+    }
+}
+
 #[test]
 fn stores_that_are_not_live_say_nothing() {
     let folder = tempfile::tempdir().unwrap();
