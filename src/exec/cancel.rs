@@ -1,29 +1,72 @@
 //! `Cancel`: a flag that a signal handler sets and every loop over bricks looks at.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 
+/// How long a run that is terminated may go on to where a checkpoint can be taken, and take it.
+const GRACE: Duration = Duration::from_secs(8);
+
 /// Shared between whoever wants the run to end and the loops that can end it.
 #[derive(Clone, Debug, Default)]
-pub struct Cancel(Arc<AtomicUsize>);
+pub struct Cancel {
+    flag: Arc<AtomicUsize>,
+    saving: Arc<Saving>,
+}
+
+/// Stages under way that put by what they have solved.
+#[derive(Debug, Default)]
+struct Saving {
+    stages: AtomicUsize,
+    /// Since when the end is asked for.
+    since: OnceLock<Instant>,
+}
 
 impl Cancel {
     /// The number of the signal that asked for the end, or 0; a signal handler may store it there.
     #[must_use]
     pub fn flag(&self) -> Arc<AtomicUsize> {
-        self.0.clone()
+        self.flag.clone()
     }
 
-    /// Goes on unless the run was asked to end.
+    /// Goes on unless the run was asked to end. One that is terminated goes on for a while where a stage under way can put by what
+    /// it has solved.
     ///
     /// # Errors
     /// [`crate::error::ErrorKind::Interrupted`] once the flag is set.
     pub fn check(&self) -> Result<()> {
-        match self.0.load(Relaxed) {
+        if self.is_asked() && !self.is_saving() { self.end() } else { Ok(()) }
+    }
+
+    /// Goes on only if the end was not asked for.
+    pub(super) fn end(&self) -> Result<()> {
+        match self.flag.load(Relaxed) {
             0 => Ok(()),
             signal => Err(Error::interrupted(signal as i32)),
         }
+    }
+
+    pub(super) fn is_asked(&self) -> bool {
+        self.flag.load(Relaxed) != 0
+    }
+
+    /// Whether the end was asked for and a stage has yet time to put by what it has solved.
+    #[must_use]
+    pub fn is_saving(&self) -> bool {
+        self.flag.load(Relaxed) == libc::SIGTERM as usize
+            && self.saving.stages.load(Relaxed) > 0
+            && self.saving.since.get_or_init(Instant::now).elapsed() < GRACE
+    }
+
+    /// A stage begins that can put by what it has solved.
+    pub(super) fn begin_saving(&self) {
+        self.saving.stages.fetch_add(1, Relaxed);
+    }
+
+    /// It is over.
+    pub(super) fn end_saving(&self) {
+        self.saving.stages.fetch_sub(1, Relaxed);
     }
 }

@@ -11,6 +11,8 @@ use super::memory::budget::{Budget, machine_memory, peak_resident};
 use super::memory::footprint::{Account, Footprint, Hold};
 use super::progress::heard::{OfRank, Progress};
 use super::progress::outlook::{Outlook, Running};
+use super::save_points::{SavePoint, SavePoints};
+use super::workers::Workers;
 use crate::error::{Error, Result};
 use crate::store::{Scratch, Traffic};
 
@@ -50,6 +52,7 @@ pub struct Engine {
     budget: Budget,
     account: Arc<Account>,
     outlook: Arc<Outlook>,
+    saving: Option<Arc<SavePoints>>,
     reports: Mutex<Vec<StageReport>>,
 }
 
@@ -71,13 +74,24 @@ impl Engine {
         let account = Account::new(budget, scratch.clone());
         let (outlook, reports) = (Arc::default(), Mutex::default());
         progress.look_out(&outlook);
-        Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, outlook, reports })
+        Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, outlook, saving: None, reports })
     }
 
     /// The engine with so many ranks, 1 or more, for stages that can be shared out: see [`Stage::on_ranks`].
     #[must_use]
     pub fn with_ranks(self, ranks: usize) -> Self {
         Self { ranks: ranks.max(1), ..self }
+    }
+
+    /// The engine of a run that puts by what it has solved; one rank alone does.
+    #[must_use]
+    pub fn with_save_points(self, saving: Option<Arc<SavePoints>>) -> Self {
+        Self { saving: saving.filter(|_| self.ranks == 1), ..self }
+    }
+
+    /// What was put by is not needed any more: all results are where they shall be.
+    pub fn forget_save_points(&self) {
+        self.saving.iter().for_each(|saving| saving.clear());
     }
 
     /// The engine of one of this engine's ranks: its share of the threads, at least one; the same window.
@@ -92,6 +106,7 @@ impl Engine {
             budget: self.budget,
             account: self.account.clone(),
             outlook: self.outlook.clone(),
+            saving: None,
             reports: Mutex::default(),
         })
     }
@@ -109,6 +124,7 @@ impl Engine {
             budget: self.budget,
             account: self.account.clone(),
             outlook: self.outlook.clone(),
+            saving: self.saving.clone(),
             reports: Mutex::default(),
         }
     }
@@ -198,8 +214,16 @@ impl Engine {
             planned: self.outlook.begin(name, total),
             started: Instant::now(),
             before: self.scratch.traffic(),
+            is_resumable: false,
             report: Mutex::new(StageReport { name: name.into(), ..StageReport::default() }),
         }
+    }
+
+    /// Begins a stage that can be gone on with: see [`Stage::save_point`]. Of one name there are as many, in the same order, in
+    /// every run with the same inputs and settings.
+    #[must_use]
+    pub fn resumable_stage(&self, name: &str, total: u64) -> Stage<'_> {
+        Stage { is_resumable: true, ..self.stage(name, total) }
     }
 
     /// What the finished stages cost, in the order they ended.
@@ -223,6 +247,7 @@ pub struct Stage<'a> {
     planned: Option<Arc<Running>>,
     started: Instant,
     before: Traffic,
+    is_resumable: bool,
     report: Mutex<StageReport>,
 }
 
@@ -296,6 +321,14 @@ impl<'a> Stage<'a> {
         self.engine.threads()
     }
 
+    /// Where the stage puts by what it solves, if it is resumable and the run does so. Asked for by what solves, at its start.
+    #[must_use]
+    pub fn save_point(&self) -> Option<SavePoint<'a>> {
+        let saving = self.engine.saving.as_ref().filter(|_| self.is_resumable)?;
+        let report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(saving.begin(&report.name, &self.engine.cancel, self.engine.progress.as_ref()))
+    }
+
     /// Tells what else the stage holds: see [`Engine::hold`].
     ///
     /// # Errors
@@ -346,40 +379,5 @@ impl<'a> Stage<'a> {
         self.planned.iter().for_each(|planned| self.engine.outlook.end(planned));
         self.engine.reports.lock().unwrap_or_else(PoisonError::into_inner).push(report.clone());
         report
-    }
-}
-
-/// One set of work buffers for each thread, made when first needed.
-pub struct Workers<W> {
-    idle: Mutex<Vec<W>>,
-    make: Box<dyn Fn() -> W + Send + Sync>,
-}
-
-impl<W: Send> Workers<W> {
-    /// Buffers made by `make`, at most one set for each thread.
-    pub fn new(make: impl Fn() -> W + Send + Sync + 'static) -> Self {
-        Self { idle: Mutex::default(), make: Box::new(make) }
-    }
-
-    /// What a function tells of each set that is idle.
-    pub fn idle<R>(&self, tell: impl FnMut(&W) -> R) -> Vec<R> {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).iter().map(tell).collect()
-    }
-
-    /// Lends out a set that is idle, or a new one.
-    pub fn with<R>(&self, f: impl FnOnce(&mut W) -> R) -> R {
-        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut worker = idle.unwrap_or_else(|| (self.make)());
-        let result = f(&mut worker);
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(worker);
-        result
-    }
-}
-
-impl Workers<()> {
-    /// For work that needs no buffers.
-    #[must_use]
-    pub fn none() -> Self {
-        Self::new(|| ())
     }
 }

@@ -1,10 +1,11 @@
 //! Fields that are relaxed brick by brick until nothing changes: each brick once, and again after one beside it changed.
 
-use super::engine::{Stage, Workers};
+use super::engine::Stage;
 use super::exchange::Exchange;
 use super::halo::{HaloPlan, Reach};
 use super::relax::{Relax, Until, Waves};
 use super::schedule::{checkerboard, corner_colours};
+use super::workers::Workers;
 use crate::error::Result;
 use crate::grid::{FACES, Face, NEIGHBOURS_26, Slot};
 use crate::store::{BrickArray, Element};

@@ -6,8 +6,9 @@
 //! others by the faces of the brick and a note, which travel while the bricks that nobody else reads are visited. What is
 //! visited follows from values alone, so results depend neither on threads nor on ranks.
 
-use super::engine::{Stage, Workers};
+use super::engine::Stage;
 use super::exchange::{Exchange, Note};
+use super::workers::Workers;
 use crate::error::Result;
 use crate::grid::Slot;
 use crate::store::{BrickArray, Element};

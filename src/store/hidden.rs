@@ -133,7 +133,7 @@ fn claimed<T>(make: impl Fn() -> io::Result<T>, open: impl Fn(&T) -> io::Result<
 }
 
 /// Removes what dead runs of this system left in a folder.
-fn remove_abandoned(folder: &Path) {
+pub(super) fn remove_abandoned(folder: &Path) {
     if system().is_empty() {
         return;
     }

@@ -52,6 +52,8 @@ mod outlines;
 #[cfg(target_os = "linux")]
 mod outputs;
 mod report_page;
+#[cfg(target_os = "linux")]
+mod resume;
 mod room_circles;
 #[cfg(target_os = "linux")]
 mod segment_notes;

@@ -8,7 +8,8 @@ use std::process::Stdio;
 use crate::common::ball::{Ball, Bench};
 use crate::common::held::{Ended, Held};
 
-const RUN: &str = "segment image.tif --points marks.csv -o out/x.zarr -v";
+// Checkpoints are what a run may leave: tests/all/resume.rs.
+const RUN: &str = "segment image.tif --points marks.csv -o out/x.zarr -v --checkpoint off";
 const SENTENCE: &str = "strandline: interrupted; nothing is left that looks complete and is not";
 
 /// True for the line that says how far a slow stage is.

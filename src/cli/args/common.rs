@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use super::pages::{PagesArgs, VolumeArgs};
+use super::survive::SurviveArgs;
 use super::values::{
     Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
     solvers_help,
@@ -207,6 +208,8 @@ pub(crate) struct OutputArgs {
     /// How the run tells what it does: lines to read, or one JSON object an event
     #[arg(long, value_enum, default_value_t = LogArg::Text)]
     pub(crate) log: LogArg,
+    #[command(flatten)]
+    pub(crate) survive: SurviveArgs,
 }
 
 /// How events are told.

@@ -8,6 +8,7 @@ pub(crate) mod grid;
 pub(crate) mod middle;
 pub(crate) mod pages;
 pub(crate) mod reconstruct;
+pub(crate) mod survive;
 pub(crate) mod values;
 #[cfg(feature = "viewer")]
 pub(crate) mod view;

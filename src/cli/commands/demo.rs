@@ -7,6 +7,7 @@ use clap::Parser;
 use super::segment::{Job, Names};
 use crate::cli::args::command_line::{Cli, Command};
 use crate::cli::args::common::DemoArgs;
+use crate::cli::args::survive::Checkpoint;
 use crate::cli::args::values::Output;
 use crate::cli::print;
 use crate::cli::terminal::signals;
@@ -43,6 +44,7 @@ pub(crate) fn run(args: &DemoArgs, typed: &[String]) -> Result<()> {
     segment.output.overwrite = overwrite;
     segment.output.quiet = args.quiet;
     segment.output.log = args.log;
+    segment.output.survive.checkpoint = Some(Checkpoint::Off);
     let names = Names {
         command: "demo",
         image: "the built-in arabidopsis-embryo.tif".into(),

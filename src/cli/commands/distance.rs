@@ -15,6 +15,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
+use crate::cli::outputs::survival::{finished_before, save_points};
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
@@ -55,12 +56,19 @@ struct Job {
 
 /// Runs the command.
 pub(crate) fn run(args: &DistanceJobArgs, typed: &[String]) -> Result<()> {
-    Job::new(args.clone(), None, typed)?.run_precise()
+    begin(args.clone(), None, typed)
 }
 
 /// Runs `middle`: a distance with labels, and the surface between them.
 pub(crate) fn run_middle(args: DistanceJobArgs, choice: MiddleChoice, typed: &[String]) -> Result<()> {
-    Job::new(args, Some(choice), typed)?.run_precise()
+    begin(args, Some(choice), typed)
+}
+
+fn begin(mut args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[String]) -> Result<()> {
+    let mesh = middle.as_ref().and_then(|choice| choice.mesh.clone());
+    let output = &mut args.job.output;
+    let files = [output.report.clone(), mesh];
+    if finished_before(output, &files)? { Ok(()) } else { Job::new(args, middle, typed)?.run_precise() }
 }
 
 impl Job {
@@ -124,12 +132,14 @@ impl Job {
             return Ok(());
         }
         self.console.say(&plan);
+        let saving = save_points(&self.args.job.output, &self.typed, self.console.as_ref())?;
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
-        let engine = engine.with_ranks(self.args.job.ranks);
+        let engine = engine.with_ranks(self.args.job.ranks).with_save_points(saving);
         engine.outlook().expect(with_page(self.stages::<P>(threads), self.args.job.output.store().is_some()));
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
         let found = result?;
+        engine.forget_save_points();
         if !self.args.job.output.quiet {
             let output = &self.args.job.output;
             let [labels_in, pairs_in] = ["", "meshes/pairs.csv"]

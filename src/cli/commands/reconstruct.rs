@@ -16,6 +16,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile, distance_to_marks};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
+use crate::cli::outputs::survival::{finished_before, save_points};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -57,6 +58,11 @@ struct Job {
 
 /// Runs the command.
 pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
+    let mut args = args.clone();
+    let files = [args.output.report.clone(), args.mesh.clone()];
+    if finished_before(&mut args.output, &files)? {
+        return Ok(());
+    }
     let job = Job::new(args.clone(), typed)?;
     let threads = job.resources.threads as u64;
     let estimate = estimate(&job.grid, &job.cloud, &job.settings, threads, job.writes_fields());
@@ -188,11 +194,14 @@ impl Job {
     }
 
     fn run(&self, seconds: f64) -> Result<()> {
+        let saving = save_points(&self.args.output, &self.typed, self.console.as_ref())?;
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
+        let engine = engine.with_save_points(saving);
         engine.outlook().expect(with_page(plan(seconds, self.writes_fields()), self.writes_fields()));
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let found = result?;
+        engine.forget_save_points();
         if !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)))?;
         }

@@ -15,6 +15,7 @@ use crate::cli::outputs::checks::{Outputs, numbered};
 use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
+use crate::cli::outputs::survival::{finished_before, save_points};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -65,6 +66,11 @@ pub(crate) struct Names {
 /// Runs the command.
 pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     let points = args.points.iter().map(|path| path.display().to_string()).collect();
+    let mut args = args.clone();
+    let files = [&args.output.report, &args.drawn.mesh, &args.drawn.picture].map(Clone::clone);
+    if finished_before(&mut args.output, &files)? {
+        return Ok(());
+    }
     let names = Names { command: "segment", image: args.image.display().to_string(), points };
     let job = Job::new(names, args.clone(), typed, signals::cancel_on_signals()?)?;
     let estimate = job.estimate();
@@ -164,7 +170,8 @@ impl Job {
         if self.console.is_verbose() {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
-        let engine = self.resources.engine(&self.cancel, self.console.clone())?;
+        let saving = save_points(&self.args.output, &self.typed, self.console.as_ref())?;
+        let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_save_points(saving);
         let (voxels, threads, writes) = (self.crop.volume(), self.resources.threads, self.needs_store());
         engine.outlook().expect(with_page(
             plan(estimate, &self.guides(), voxels, threads, writes),
@@ -173,6 +180,7 @@ impl Job {
         let result = self.solve_and_write(&engine);
         self.console.clear();
         let outcome = result?;
+        engine.forget_save_points();
         if !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())))?;
         }

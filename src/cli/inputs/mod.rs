@@ -1,6 +1,7 @@
 //! What was typed becomes what is read: images, marks, sources, grids, settings.
 
 pub(crate) mod grid;
+pub(crate) mod identity;
 pub(crate) mod image;
 pub(crate) mod marks;
 pub(crate) mod noted;

@@ -4,3 +4,4 @@ pub(crate) mod checks;
 pub(crate) mod drawing;
 pub(crate) mod files;
 pub(crate) mod store;
+pub(crate) mod survival;

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
 use signal_hook::flag;
 
 use crate::cli::tell;
@@ -21,6 +21,8 @@ use crate::store::remove_unfinished;
 const LOOK: Duration = Duration::from_millis(100);
 /// How long a run may take to end in order.
 const PATIENCE: Duration = Duration::from_millis(1200);
+/// How long it may take where it puts by what it has solved before.
+const LONGEST: Duration = Duration::from_millis(9500);
 
 /// True once somebody has said, or is about to say, how the process ends.
 static ENDS: AtomicBool = AtomicBool::new(false);
@@ -41,7 +43,7 @@ pub(crate) fn cancel_on_signals() -> Result<Cancel> {
     // A file that grows past its limit is then an error of the write, which names the file, and not the end.
     flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))
         .map_err(|error| Error::from_io("cannot listen to signals", &error))?;
-    let asked = cancel.flag();
+    let (asked, saver) = (cancel.flag(), cancel.clone());
     let watch = move || {
         while asked.load(Relaxed) == 0 {
             thread::sleep(LOOK);
@@ -50,7 +52,11 @@ pub(crate) fn cancel_on_signals() -> Result<Cancel> {
         // Of two signals that come before this one is seen.
         again.store(false, Relaxed);
         let seen = Instant::now();
-        while seen.elapsed() < PATIENCE && !again.load(Relaxed) {
+        let mut saved = seen;
+        while saved.elapsed() < PATIENCE && seen.elapsed() < LONGEST && !again.load(Relaxed) {
+            if saver.is_saving() {
+                saved = Instant::now();
+            }
             thread::sleep(LOOK);
         }
         if speak_last() {
@@ -60,6 +66,13 @@ pub(crate) fn cancel_on_signals() -> Result<Cancel> {
     };
     thread::Builder::new().spawn(watch).map_err(|error| Error::from_io("cannot listen to signals", &error))?;
     Ok(cancel)
+}
+
+/// A flag that SIGUSR1 sets, with which schedulers say that the end is near: a checkpoint is wanted, and the run goes on.
+pub(crate) fn wish_on_signal() -> Result<Arc<AtomicBool>> {
+    let wish = Arc::new(AtomicBool::new(false));
+    flag::register(SIGUSR1, wish.clone()).map_err(|error| Error::from_io("cannot listen to signals", &error))?;
+    Ok(wish)
 }
 
 /// Whether whoever started the process asked that a signal be passed over, as `nohup` does.

@@ -171,7 +171,7 @@ pub(crate) fn solve_sets_watched<P: Precision, R>(
         outside: outside.as_ref(),
     };
     stage.finish();
-    let stage = engine.stage("distance", set.len() as u64);
+    let stage = engine.resumable_stage("distance", set.len() as u64);
     stage.voxels(geometry.domain().volume());
     let options = Options {
         farthest: settings.farthest.unwrap_or(f64::INFINITY),

@@ -7,7 +7,7 @@
 
 use super::band::{Band, read_mask};
 use super::growing::Growing;
-use super::time_loop::{Evolution, Stop, TimeLoop};
+use super::time_loop::{Evolution, Stop, Taken, TimeLoop};
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Waves, Workers, checkerboard, one_wave};
 use crate::grid::{BrickSet, FACES, Slot};
@@ -123,7 +123,8 @@ struct Solver<'a> {
     visited: u64,
 }
 
-/// Moves the surface until it rests. The result is in `band.u`; `growing` shows what it is on the way.
+/// Moves the surface until it rests. The result is in `band.u`; `growing` shows what it is on the way. A stage that can be gone on
+/// with puts by the last two time levels, which are all that further steps depend on.
 ///
 /// # Errors
 /// When the run is interrupted.
@@ -138,27 +139,21 @@ pub fn evolve(
 ) -> Result<Evolution> {
     let mut growing = growing;
     let grid = *band.solved.set().grid();
-    let mut done = Evolution {
-        steps: 0,
-        sor_iterations: 0,
-        stopped_by: "max-steps",
-        residual: f64::INFINITY,
-        residuals: Vec::new(),
-    };
     let [all, faces] = &[HaloPlan::new(grid, Reach::All), HaloPlan::new(grid, Reach::Faces)];
     let workers = &Workers::new(Worker::new);
     let kept = room_to_keep(engine, band)?;
     let cells = &Cells::new(band.solved.set());
     let exchange = &Exchange::new(engine.comm(), band.solved.set(), all)?;
-    let mut cell_iterations = 0;
     let waves = Waves { stage, exchange, workers, waves: &cells.colours };
     let owned = one_wave(band.solved.set());
     exchange.faces(&band.distance, &owned)?;
     exchange.faces(&band.u, &owned)?;
     let mut next = second_level(stage, engine, &band.u)?;
     exchange.faces(&next, &owned)?;
-    while done.steps < settings.max_steps {
-        let (kept, first) = (kept.as_ref(), done.steps == 0);
+    let mut save_point = stage.save_point();
+    let mut taken = Taken::resume(save_point.as_ref(), [&band.u, &next])?;
+    let mut first = true;
+    while !taken.ended && taken.steps < settings.max_steps {
         let solver = Solver {
             engine,
             band,
@@ -168,7 +163,7 @@ pub fn evolve(
             spacing,
             all,
             faces,
-            kept,
+            kept: kept.as_ref(),
             first,
             cells,
             round: 0,
@@ -178,22 +173,19 @@ pub fn evolve(
         };
         let (step, visits) = solver.step(&waves)?;
         std::mem::swap(&mut band.u, &mut next);
-        done.steps += 1;
+        first = false;
         if let Some(growing) = &mut growing {
             growing.show(engine, &band.u)?;
         }
-        cell_iterations += visits * LOCAL_ITERATIONS as u64;
-        let (residual, limit, name) = step.judged_by(settings.stop);
-        done.residual = residual;
-        done.residuals.push(residual);
-        if residual < limit {
-            done.stopped_by = name;
-            break;
+        taken.step(step.judged_by(settings.stop), visits * LOCAL_ITERATIONS as u64);
+        if let Some(save_point) = &mut save_point {
+            save_point.reached(taken.ended, || taken.clone(), &[&band.u, &next])?;
         }
     }
     // Cells are relaxed as often as they need: reported is the mean over all of them.
     let all = |count: f64| engine.comm().sum(&[count]);
-    done.sor_iterations = (all(cell_iterations as f64)? / all(owned.len() as f64)?.max(1.0)).ceil() as u64;
+    let mean = (all(taken.cell_iterations as f64)? / all(owned.len() as f64)?.max(1.0)).ceil() as u64;
+    let done = taken.evolution(settings.stop, mean);
     stage.iterated(done.sor_iterations, done.residual);
     Ok(done)
 }
@@ -241,11 +233,11 @@ struct Step {
 }
 
 impl Step {
-    /// What a rule looks at, its limit and its name.
-    fn judged_by(self, stop: Stop) -> (f64, f64, &'static str) {
+    /// What a rule looks at, and its limit.
+    fn judged_by(self, stop: Stop) -> (f64, f64) {
         match stop {
-            Stop::Surface(limit) => (self.speed, limit, "surface"),
-            Stop::L2(limit) => (self.l2, limit, "l2"),
+            Stop::Surface(limit) => (self.speed, limit),
+            Stop::L2(limit) => (self.l2, limit),
         }
     }
 }

@@ -1,6 +1,11 @@
 //! The settings of the time loop, when it ends, and how it ended (docs/algorithms.md, "Time loop").
 
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
+use crate::exec::SavePoint;
 use crate::kernel::level_set::scheme::velocity::Velocity;
+use crate::store::BrickArray;
 
 /// When the time loop ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,6 +14,17 @@ pub enum Stop {
     Surface(f64),
     /// When the discrete L2 norm of a step's change falls under this (Kósa 2015).
     L2(f64),
+}
+
+impl Stop {
+    /// What reports call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Surface(_) => "surface",
+            Self::L2(_) => "l2",
+        }
+    }
 }
 
 /// Settings of the time loop and its linear solver.
@@ -40,4 +56,39 @@ pub struct Evolution {
     pub residual: f64,
     /// What it looked at after each step.
     pub residuals: Vec<f64>,
+}
+
+/// The steps that were taken.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Taken {
+    pub(super) steps: u32,
+    pub(super) cell_iterations: u64,
+    /// What the rule looked at after each.
+    residuals: Vec<f64>,
+    /// The surface rests.
+    pub(super) ended: bool,
+}
+
+impl Taken {
+    /// None, or those of an earlier run, which left the last two time levels.
+    pub(super) fn resume(save_point: Option<&SavePoint<'_>>, levels: [&BrickArray<f32>; 2]) -> Result<Self> {
+        let Some(saved) = save_point.and_then(SavePoint::saved) else { return Ok(Self::default()) };
+        for (n, level) in levels.into_iter().enumerate() {
+            saved.restore(n, level)?;
+        }
+        saved.facts()
+    }
+
+    pub(super) fn step(&mut self, (residual, limit): (f64, f64), cell_iterations: u64) {
+        self.steps += 1;
+        self.cell_iterations += cell_iterations;
+        self.residuals.push(residual);
+        self.ended = residual < limit;
+    }
+
+    pub(super) fn evolution(self, stop: Stop, sor_iterations: u64) -> Evolution {
+        let stopped_by = if self.ended { stop.name() } else { "max-steps" };
+        let residual = self.residuals.last().copied().unwrap_or(f64::INFINITY);
+        Evolution { steps: self.steps, sor_iterations, stopped_by, residual, residuals: self.residuals }
+    }
 }

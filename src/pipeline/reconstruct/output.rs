@@ -216,7 +216,7 @@ fn solve(
     (band, sheet): (&mut Band, &mut Vec<u32>),
     mut growing: Option<&mut Growing<'_>>,
 ) -> Result<Evolution> {
-    let stage = engine.stage("level set", 0);
+    let stage = engine.resumable_stage("level set", 0);
     stage.voxels(band.voxels);
     let time_loop = settings.motion.time_loop(geometry);
     let mut evolution = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop, growing.as_deref_mut())?;

@@ -79,7 +79,7 @@ impl Begun {
         if forces.speed.is_some() || image.is_none() {
             time_loop.velocity.rho = f32::from(u8::from(image.is_some()));
         }
-        let stage = engine.stage(&name("level set", marks), 0);
+        let stage = engine.resumable_stage(&name("level set", marks), 0);
         stage.voxels(band.voxels);
         let evolution = if rests {
             Evolution { steps: 0, sor_iterations: 0, stopped_by: "too thin", residual: 0.0, residuals: Vec::new() }

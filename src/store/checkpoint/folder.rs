@@ -12,6 +12,7 @@ use super::payload::{self, SavedField};
 use super::record;
 use crate::error::{Error, Result};
 use crate::store::HiddenFile;
+use crate::store::hidden::remove_abandoned;
 
 /// Who makes checkpoints: program, settings, inputs, by name. Of another run's nothing is taken.
 pub type Identity = Vec<(String, String)>;
@@ -79,10 +80,7 @@ impl Checkpoints {
     pub fn begin(folder: &Path, identity: Identity, replace: bool) -> Result<Self> {
         let there = numbers(folder);
         if !there.is_empty() && !replace {
-            return Err(Error::usage(
-                "holds checkpoints of a run that was ended; give --resume to go on with it, or --overwrite to begin anew",
-            )
-            .at(folder));
+            return Err(Self::would_be_lost(folder));
         }
         let state = State { lock: lock(folder)?, ..State::default() };
         let checkpoints = Self { folder: folder.to_path_buf(), identity, state: Mutex::new(state) };
@@ -90,6 +88,20 @@ impl Checkpoints {
             checkpoints.clear();
         }
         Ok(checkpoints)
+    }
+
+    /// Whether checkpoints of a run that was ended lie in a folder.
+    #[must_use]
+    pub fn lie_in(folder: &Path) -> bool {
+        !numbers(folder).is_empty()
+    }
+
+    /// What is said where they would go without leave.
+    #[must_use]
+    pub fn would_be_lost(folder: &Path) -> Error {
+        let what =
+            "holds checkpoints of a run that was ended; give --resume to go on with it, or --overwrite to begin anew";
+        Error::usage(what).at(folder)
     }
 
     /// Those of a run that goes on with what was put by in a folder: the last checkpoint that is whole.
@@ -210,6 +222,7 @@ impl Checkpoints {
             return;
         }
         self.drop_older(&mut state);
+        remove_abandoned(&self.folder);
         let _ = fs::remove_file(self.folder.join(LOCK));
         let _ = fs::remove_dir(&self.folder);
         state.lock = None;

@@ -166,7 +166,7 @@ mod tests {
         let (before, after) = (field(&scratch), field(&scratch));
         for slot in [0, 3, 4] {
             before.write(slot, |brick| {
-                (0..).zip(brick.iter_mut()).for_each(|(n, value)| *value = (slot * 5000 + n) as f32)
+                (0..).zip(brick.iter_mut()).for_each(|(n, value)| *value = (slot * 5000 + n) as f32);
             });
         }
         let mut file = Vec::new();

@@ -1,0 +1,87 @@
+//! How a run survives its end: where its checkpoints go, and what `--resume` finds.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::cli::args::common::OutputArgs;
+use crate::cli::args::survive::Checkpoint;
+use crate::cli::inputs::identity::identity;
+use crate::cli::terminal::console::{Console, Voice};
+use crate::cli::terminal::signals::wish_on_signal;
+use crate::error::{Error, Result};
+use crate::exec::{Progress, SavePoints};
+use crate::io::ome_zarr::{LiveState, is_store, live};
+use crate::store::checkpoint::Checkpoints;
+
+/// What follows the name of a store in that of the folder of its run's checkpoints.
+const ENDING: &str = ".checkpoint";
+
+/// The folder of a run's checkpoints, where it takes some.
+fn folder(output: &OutputArgs) -> Option<PathBuf> {
+    match (&output.survive.checkpoint, output.store()) {
+        (Some(Checkpoint::Folder(folder)), _) => Some(folder.clone()),
+        (None, Some(store)) => {
+            let mut name = store.file_name()?.to_owned();
+            name.push(ENDING);
+            Some(store.with_file_name(name))
+        }
+        _ => None,
+    }
+}
+
+/// Looks at what an earlier run left before anything is read; true where all of it is there already. What a run that is gone on
+/// with had begun may be replaced.
+///
+/// # Errors
+/// When there is nothing to go on with where `--resume` says so, or something that would be lost.
+pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]) -> Result<bool> {
+    let folder = folder(output);
+    let has_checkpoints = folder.as_deref().is_some_and(Checkpoints::lie_in);
+    if !output.survive.resume {
+        return match &folder {
+            Some(folder) if has_checkpoints && !output.overwrite => Err(Checkpoints::would_be_lost(folder)),
+            _ => Ok(false),
+        };
+    }
+    if folder.is_none() {
+        let what = "--resume needs to know where the checkpoints are: give the store with -o that the run was to write, or their folder with --checkpoint";
+        return Err(Error::usage(what));
+    }
+    let is_whole = |store: &Path| is_store(store) && live(store).is_none_or(|live| live.state == LiveState::Complete);
+    let is_there = |file: &Option<PathBuf>| file.as_ref().is_none_or(|file| file.exists());
+    if let Some(store) = output.store().filter(|store| is_whole(store) && !has_checkpoints)
+        && files.iter().all(is_there)
+    {
+        let console = Console::new(Voice::of_run(output));
+        console.note(&format!("{} is complete; there is nothing to go on with", store.display()));
+        return Ok(true);
+    }
+    let was_cut_off = |store: &Path| live(store).is_some_and(|live| live.state == LiveState::Interrupted);
+    output.overwrite |= has_checkpoints || output.store().is_some_and(was_cut_off);
+    Ok(false)
+}
+
+/// Where the run puts by what it solves, with what it goes on from.
+///
+/// # Errors
+/// When another run works there, or what lies there is of another one.
+pub(crate) fn save_points(
+    output: &OutputArgs,
+    typed: &[String],
+    console: &dyn Progress,
+) -> Result<Option<Arc<SavePoints>>> {
+    let Some(folder) = folder(output) else { return Ok(None) };
+    let identity = identity(typed)?;
+    let checkpoints = if output.survive.resume {
+        let (checkpoints, found) = Checkpoints::resume(&folder, identity)?;
+        found.torn.iter().for_each(|torn| console.note(&format!("a checkpoint is passed over: {torn}")));
+        console.note(&match found.stages {
+            0 => format!("{} holds nothing to go on with; the run begins anew", folder.display()),
+            stages => format!("goes on from the checkpoint in {}, of {stages} stage(s)", folder.display()),
+        });
+        checkpoints
+    } else {
+        Checkpoints::begin(&folder, identity, output.overwrite)?
+    };
+    Ok(Some(Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish_on_signal()?))))
+}

@@ -1,0 +1,195 @@
+//! When a run puts by what it has solved, and what a stage finds that goes on from there.
+//!
+//! A stage that can be gone on with asks for a [`SavePoint`] when it begins and tells it whenever what it has is consistent: at
+//! the end of a round, of a time step, of itself. There a checkpoint is taken if it is time for one, if a signal asked for it,
+//! or before the run ends by SIGTERM.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::cancel::Cancel;
+use super::progress::heard::Progress;
+use crate::error::{Error, Result};
+use crate::grid::digits::bytes;
+use crate::store::checkpoint::{Checkpoints, SavedField, pack, restore, unpack};
+use crate::store::{BrickArray, Element};
+
+/// How often checkpoints are taken where nobody says.
+const EVERY: Duration = Duration::from_secs(600);
+/// A run that has gone on for less loses little.
+const SHORT: Duration = Duration::from_secs(30);
+/// Where nobody says how often, checkpoints take at most one in so many seconds.
+const SHARE: u32 = 40;
+/// Bytes a second that a disk takes, before one is known.
+const RATE: f64 = 300e6;
+
+/// Where and how often a run puts by what it has solved.
+pub struct SavePoints {
+    checkpoints: Checkpoints,
+    every: Option<Duration>,
+    begun: Instant,
+    /// Set by whoever wants a checkpoint now.
+    wish: Arc<AtomicBool>,
+    /// How often that was.
+    wishes: AtomicUsize,
+    /// How often stages of each name began: they do so in the same order in every run.
+    stages: Mutex<HashMap<String, u32>>,
+    /// Time and bytes of all checkpoints so far.
+    spent: Mutex<(Duration, u64)>,
+}
+
+impl SavePoints {
+    /// `every` says how often, whatever it costs; `wish` asks for one now.
+    #[must_use]
+    pub fn new(checkpoints: Checkpoints, every: Option<Duration>, wish: Arc<AtomicBool>) -> Self {
+        Self {
+            checkpoints,
+            every,
+            begun: Instant::now(),
+            wish,
+            wishes: AtomicUsize::new(0),
+            stages: Mutex::default(),
+            spent: Mutex::default(),
+        }
+    }
+
+    /// Removes all checkpoints: the run is done.
+    pub fn clear(&self) {
+        self.checkpoints.clear();
+    }
+
+    /// The save point of a stage that begins.
+    pub(super) fn begin<'a>(&'a self, name: &str, cancel: &'a Cancel, progress: &'a dyn Progress) -> SavePoint<'a> {
+        let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
+        let count = stages.entry(name.to_owned()).or_default();
+        *count += 1;
+        let key = format!("{name} #{count}");
+        cancel.begin_saving();
+        SavePoint { points: self, cancel, progress, key, last: Instant::now(), wishes: self.wishes.load(Relaxed) }
+    }
+
+    /// How often a checkpoint was asked for.
+    fn wishes(&self) -> usize {
+        let is_new = self.wish.swap(false, Relaxed);
+        self.wishes.fetch_add(usize::from(is_new), Relaxed) + usize::from(is_new)
+    }
+
+    /// Whether so many more bytes keep checkpoints to their share of the run's time.
+    fn affords(&self, more: u64) -> bool {
+        let (spent, written) = *self.spent.lock().unwrap_or_else(PoisonError::into_inner);
+        let rate = if written > 0 { written as f64 / spent.as_secs_f64().max(1e-6) } else { RATE };
+        (spent + Duration::from_secs_f64(more as f64 / rate)) * SHARE <= self.begun.elapsed()
+    }
+
+    fn spend(&self, time: Duration, written: u64) {
+        let mut spent = self.spent.lock().unwrap_or_else(PoisonError::into_inner);
+        *spent = (spent.0 + time, spent.1 + written);
+    }
+}
+
+/// Where a stage puts by what it has solved.
+pub struct SavePoint<'a> {
+    points: &'a SavePoints,
+    cancel: &'a Cancel,
+    progress: &'a dyn Progress,
+    key: String,
+    last: Instant,
+    wishes: usize,
+}
+
+impl SavePoint<'_> {
+    /// What the stage had put by in the run that this one goes on with.
+    #[must_use]
+    pub fn saved(&self) -> Option<Saved> {
+        let (facts, files) = self.points.checkpoints.entry(&self.key)?;
+        Some(Saved { facts, files })
+    }
+
+    /// What the stage has is consistent: a checkpoint is taken if it is time, and at its end if it is not too dear.
+    ///
+    /// # Errors
+    /// When the run is to end. A checkpoint that cannot be taken is told, and no error.
+    pub fn reached<F: Serialize>(
+        &mut self,
+        ended: bool,
+        facts: impl FnOnce() -> F,
+        fields: &[&dyn SavedField],
+    ) -> Result<()> {
+        let (is_last, wishes) = (self.cancel.is_asked(), self.points.wishes());
+        let is_wished = wishes != self.wishes;
+        if !is_last && !is_wished && !self.is_due(ended, fields) {
+            return Ok(());
+        }
+        self.cancel.check()?;
+        let started = Instant::now();
+        let goes_on = || self.cancel.check().map_err(io::Error::other);
+        let saved = pack(&facts()).and_then(|facts| self.points.checkpoints.save(&self.key, facts, fields, &goes_on));
+        self.points.spend(started.elapsed(), *saved.as_ref().unwrap_or(&0));
+        (self.last, self.wishes) = (Instant::now(), wishes);
+        match saved {
+            Ok(written) if is_last || is_wished => {
+                self.progress.note(&format!("a checkpoint of {} was taken; --resume goes on from it", bytes(written)));
+            }
+            Ok(_) => {}
+            Err(_) if is_last => {}
+            Err(error) => {
+                self.progress.note(&format!("no checkpoint could be taken, the run goes on without: {error}"))
+            }
+        }
+        self.cancel.end()
+    }
+
+    fn is_due(&self, ended: bool, fields: &[&dyn SavedField]) -> bool {
+        match self.points.every {
+            Some(every) => self.last.elapsed() >= every || (ended && self.points.begun.elapsed() >= every),
+            None => {
+                let is_time = self.last.elapsed() >= EVERY || (ended && self.points.begun.elapsed() >= SHORT);
+                is_time && self.points.affords(fields.iter().map(|field| field.saved_bytes()).sum())
+            }
+        }
+    }
+}
+
+impl Drop for SavePoint<'_> {
+    fn drop(&mut self) {
+        self.cancel.end_saving();
+    }
+}
+
+/// What a stage had put by.
+pub struct Saved {
+    facts: Vec<u8>,
+    files: Vec<PathBuf>,
+}
+
+impl Saved {
+    /// What it knew.
+    ///
+    /// # Errors
+    /// When that is something else.
+    pub fn facts<F: DeserializeOwned>(&self) -> Result<F> {
+        unpack(&self.facts).map_err(|error| {
+            Error::from_io("the checkpoint cannot be understood; leave --resume out to begin anew", &error)
+        })
+    }
+
+    /// Puts the bricks of its `n`-th field back.
+    ///
+    /// # Errors
+    /// When they cannot be read, or are those of another field.
+    pub fn restore<T: Element>(&self, n: usize, field: &BrickArray<T>) -> Result<()> {
+        let Some(path) = self.files.get(n) else { return Err(Error::failed("the checkpoint has too few fields")) };
+        let read = || restore(field, &mut BufReader::with_capacity(1 << 20, File::open(path)?));
+        read().map_err(|error| {
+            Error::from_io("the checkpoint cannot be read; leave --resume out to begin anew", &error).at(path)
+        })
+    }
+}

@@ -1,0 +1,153 @@
+//! Runs that are ended and gone on with: the same bits as undisturbed, or a clear refusal. `scripts/try_resume` ends them at random
+//! moments, some hundred times.
+
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::PI;
+use std::fs;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::common::ball::{Ball, Bench};
+use crate::common::held::{Ended, Held};
+use crate::common::stores::{contents, same};
+
+/// Points on a sphere, in a spiral.
+fn sphere(count: usize, centre: [f64; 3], radius: f64) -> String {
+    let point = |n: usize| {
+        let z = 1.0 - (2.0 * n as f64 + 1.0) / count as f64;
+        let (around, ring) = (PI * (1.0 + 5.0_f64.sqrt()) * n as f64, (1.0 - z * z).sqrt());
+        let at = [ring * around.cos(), ring * around.sin(), z];
+        let [x, y, z] = std::array::from_fn(|a| centre[a] + radius * at[a]);
+        format!("{x} {y} {z}\n")
+    };
+    (0..count).map(point).collect()
+}
+
+fn bench() -> Bench {
+    let bench = Bench::new(&Ball::small());
+    bench.write("a.xyz", &sphere(2000, [0.0; 3], 1.0));
+    bench.write("b.xyz", &sphere(500, [1.3, 0.0, 0.0], 0.5));
+    bench
+}
+
+/// Each command, long enough to be ended on its way.
+const RUNS: [&str; 4] = [
+    "segment image.tif --points marks.csv --tol 1e-30 --max-steps 300",
+    "distance a.xyz b.xyz --spacing 0.02 --padding 1 --labels --brick 16",
+    "middle a.xyz b.xyz --spacing 0.02 --brick 16",
+    "reconstruct a.xyz --tol 1e-30 --max-steps 60",
+];
+
+/// Ends a run by SIGTERM when it has taken so many checkpoints; its store is `out/x.zarr`.
+fn terminated(bench: &Bench, run: &str, checkpoints: usize) {
+    let mut command = bench.command(&format!("{run} -o out/x.zarr --checkpoint-every 1ms"));
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let last = bench.path("out/x.zarr.checkpoint").join(format!("{checkpoints:06}.checkpoint"));
+    let begun = Instant::now();
+    while !last.exists() && begun.elapsed() < Duration::from_secs(60) {
+        std::thread::yield_now();
+    }
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(143), "{run}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn terminated_runs_go_on_with_the_same_bits() {
+    let bench = bench();
+    for run in RUNS {
+        bench.succeed(&format!("{run} -o out/whole.zarr --checkpoint off"));
+        terminated(&bench, run, 1);
+        assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr.checkpoint"], "{run}");
+        let told = bench.fail(&format!("{run} -o out/x.zarr"), 2);
+        assert!(told.contains("x.zarr.checkpoint: holds checkpoints of a run that was ended; give --resume"), "{told}");
+        let output = bench.run(&format!("{run} -o out/x.zarr --resume --threads 1 --memory 400MiB"));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && said.contains("goes on from the checkpoint"), "{run}: {said}");
+        assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr"], "{run}");
+        same(&contents(&bench.path("out/whole.zarr")), &contents(&bench.path("out/x.zarr")), run);
+        for store in ["out/whole.zarr", "out/x.zarr"] {
+            fs::remove_dir_all(bench.path(store)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn other_runs_are_refused_with_the_difference() {
+    let bench = bench();
+    let run = RUNS[1];
+    terminated(&bench, run, 1);
+    let told = bench.fail(&format!("{run} --method fsm -o out/x.zarr --resume"), 2);
+    assert!(told.contains("--method was not given and is fsm"), "{told}");
+    let told = bench.fail(&format!("{} -o out/x.zarr --resume", run.replace("0.02", "0.04")), 2);
+    assert!(told.contains("--spacing was 0.02 and is 0.04"), "{told}");
+    bench.write("b.xyz", &sphere(501, [1.3, 0.0, 0.0], 0.5));
+    let told = bench.fail(&format!("{run} -o out/x.zarr --resume"), 2);
+    assert!(told.contains("SOURCES was a.xyz (") && told.contains("b.xyz ("), "{told}");
+    // With leave it begins anew.
+    bench.succeed(&format!("{run} -o out/x.zarr --overwrite"));
+    assert_eq!(bench.entries("out"), ["x.zarr"]);
+}
+
+#[test]
+fn a_checkpoint_can_be_asked_for() {
+    let bench = bench();
+    let run = RUNS[0];
+    bench.succeed(&format!("{run} -o out/whole.zarr --checkpoint off"));
+    let mut held = Held::start(bench.command(&format!("{run} -o out/x.zarr -v --checkpoint out/mine")));
+    held.hear("speed 1  done");
+    held.signal("USR1");
+    held.hear("--resume goes on from it");
+    assert!(
+        bench.entries("out/mine").iter().any(|name| name == "000001.checkpoint"),
+        "{:?}",
+        bench.entries("out/mine")
+    );
+    let Ended { status, said, .. } = held.finish();
+    assert!(status.success(), "{said}");
+    assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr"]);
+    same(&contents(&bench.path("out/whole.zarr")), &contents(&bench.path("out/x.zarr")), run);
+}
+
+#[test]
+fn a_torn_checkpoint_is_told_and_the_one_before_is_taken() {
+    let bench = bench();
+    let run = RUNS[0];
+    bench.succeed(&format!("{run} -o out/whole.zarr --checkpoint off"));
+    terminated(&bench, run, 3);
+    let folder = bench.path("out/x.zarr.checkpoint");
+    let manifests = || {
+        let names = bench.entries("out/x.zarr.checkpoint");
+        names.into_iter().filter(|name| name.ends_with(".checkpoint")).collect::<Vec<_>>()
+    };
+    let last = folder.join(manifests().last().unwrap());
+    let bytes = fs::read(&last).unwrap();
+    fs::write(&last, &bytes[..bytes.len() / 2]).unwrap();
+    let output = bench.run(&format!("{run} -o out/x.zarr --resume"));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("a checkpoint is passed over") && said.contains("is cut short"), "{said}");
+    assert!(said.contains("goes on from the checkpoint"), "{said}");
+    same(&contents(&bench.path("out/whole.zarr")), &contents(&bench.path("out/x.zarr")), run);
+}
+
+#[test]
+fn there_may_be_nothing_to_go_on_with() {
+    let bench = bench();
+    let run = RUNS[1];
+    let told = bench.fail(&format!("{run} -o none --resume"), 2);
+    assert!(told.contains("give the store with -o"), "{told}");
+    bench.succeed(&format!("{run} -o out/x.zarr --resume"));
+    let before = contents(&bench.path("out/x.zarr"));
+    let report = fs::read(bench.path("out/x.zarr/report.json")).unwrap();
+    bench.succeed(&format!("{run} -o out/x.zarr --resume"));
+    same(&before, &contents(&bench.path("out/x.zarr")), "complete already");
+    assert_eq!(report, fs::read(bench.path("out/x.zarr/report.json")).unwrap(), "nothing ran");
+    let folder = bench.path("held.checkpoint");
+    fs::create_dir(&folder).unwrap();
+    let lock = fs::File::create(folder.join("lock")).unwrap();
+    lock.lock().unwrap();
+    let told = bench.fail(&format!("{run} -o out/y.zarr --checkpoint held.checkpoint"), 2);
+    assert!(told.contains("belongs to a run that goes on"), "{told}");
+}
