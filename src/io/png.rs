@@ -1,4 +1,4 @@
-//! Writes pictures as PNG: 8 bits of red, green and blue.
+//! Pictures as PNG: 8 bits of red, green and blue.
 
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -39,6 +39,16 @@ pub fn rgb_bytes([width, height]: [u32; 2], pixels: &[u8]) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The size and the pixels of such a picture; none of bytes that are no PNG, or one of another kind.
+#[must_use]
+pub fn read_rgb(bytes: &[u8]) -> Option<([u32; 2], Vec<u8>)> {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().ok()?;
+    let mut pixels = vec![0; reader.output_buffer_size()?];
+    let info = reader.next_frame(&mut pixels).ok()?;
+    let is_rgb = (info.color_type, info.bit_depth) == (png::ColorType::Rgb, png::BitDepth::Eight);
+    is_rgb.then_some(([info.width, info.height], pixels))
+}
+
 fn encode(
     to: impl Write,
     [width, height]: [u32; 2],
@@ -75,6 +85,8 @@ mod tests {
         let mut reader = png::Decoder::new(std::io::BufReader::new(File::open(&path).unwrap())).read_info().unwrap();
         reader.next_frame(&mut read).unwrap();
         assert_eq!(read, pixels);
+        assert_eq!(read_rgb(&rgb_bytes([5, 3], &pixels).unwrap()), Some(([5, 3], pixels)));
+        assert_eq!(read_rgb(b"no picture"), None);
     }
 
     #[test]

@@ -23,6 +23,7 @@ use crate::cli::report::page::written::{Written, with_page};
 use crate::cli::report::run_report::{Ran, Report};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
+use crate::cli::terminal::log;
 use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, place, triple};
 use crate::error::{Error, Result};
@@ -126,6 +127,8 @@ impl Job {
         let plan = self.plan(&needs);
         if self.args.job.output.dry_run {
             print(&format!("{plan}\n"))?;
+            let written = if self.args.job.output.store().is_some() { self.written() } else { 0 };
+            log::plan(Budget::least(needs.held), needs.scratch, written, needs.seconds);
         }
         self.fits(&needs)?;
         if self.args.job.output.dry_run {

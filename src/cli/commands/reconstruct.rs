@@ -23,6 +23,7 @@ use crate::cli::report::page::written::{Written, with_page};
 use crate::cli::report::run_report::{Distances, Hausdorff, Hole, Moves, Ran, Report, SimplifiedCopy};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
+use crate::cli::terminal::log;
 use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
 use crate::error::{Error, Result};
@@ -69,6 +70,8 @@ pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
     let plan = job.plan(&estimate);
     if args.output.dry_run {
         print(&format!("{plan}\n"))?;
+        let output = if job.writes_fields() { estimate.output } else { 0 };
+        log::plan(Budget::least(estimate.held), estimate.scratch, output, estimate.seconds);
     }
     job.fits(&estimate)?;
     if args.output.dry_run {

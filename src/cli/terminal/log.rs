@@ -27,6 +27,14 @@ pub(crate) fn event(name: &str, mut what: Value) {
     let _ = writeln!(stderr(), "{what}");
 }
 
+/// Tells what a run would take, where that is asked for: bytes of memory that it must be allowed at least, of temporary fields, and
+/// of output before compression; and seconds.
+pub(crate) fn plan(least_memory: u64, scratch: u64, output: u64, seconds: f64) {
+    if is_json() {
+        event("plan", json!({ "least_memory": least_memory, "scratch": scratch, "output": output, "time": seconds }));
+    }
+}
+
 /// Tells that a run is done, where that is asked for.
 pub(crate) fn success() {
     if is_json() {

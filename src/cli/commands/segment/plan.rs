@@ -3,6 +3,7 @@
 use super::Job;
 use crate::cli::print;
 use crate::cli::report::table;
+use crate::cli::terminal::log;
 use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
 use crate::error::Result;
 use crate::exec::{Budget, Progress};
@@ -80,6 +81,8 @@ impl Job {
             lines.push(format!("output: up to {} before compression", bytes(estimate.output)));
         }
         lines.push(format!("time: very roughly {}\n", duration(estimate.seconds)));
+        let output = if self.needs_store() { estimate.output } else { 0 };
+        log::plan(least, estimate.scratch, output, estimate.seconds);
         print(&lines.join("\n"))
     }
 }

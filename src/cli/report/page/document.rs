@@ -48,6 +48,25 @@ pub(super) struct Document<'a> {
     pub(super) figures: &'a Figures,
 }
 
+/// A page that needs nothing but itself.
+pub(crate) fn whole_page(title: &str, body: impl FnOnce(&mut Html)) -> String {
+    let mut page = Html::new();
+    page.raw("<!DOCTYPE html>\n");
+    page.within("html", &[("lang", "en"), ("xmlns", "http://www.w3.org/1999/xhtml")], |page| {
+        page.within("head", &[], |head| {
+            head.element("meta", &[("charset", "utf-8")], "");
+            head.element("meta", &[("http-equiv", "Content-Security-Policy"), ("content", POLICY)], "");
+            head.element("meta", &[("name", "viewport"), ("content", "width=device-width, initial-scale=1")], "");
+            // Without it browsers ask the server for an icon.
+            head.element("link", &[("rel", "icon"), ("href", "data:,")], "");
+            head.element("title", &[], title);
+            head.within("style", &[], |style| style.raw(STYLE));
+        });
+        page.within("body", &[], |page| page.within("main", &[], body));
+    });
+    page.finish()
+}
+
 impl Document<'_> {
     /// The whole page.
     ///
@@ -55,21 +74,7 @@ impl Document<'_> {
     /// When a plot cannot be drawn.
     pub(super) fn page(&self) -> Result<String> {
         let body = self.body()?;
-        let mut page = Html::new();
-        page.raw("<!DOCTYPE html>\n");
-        page.within("html", &[("lang", "en"), ("xmlns", "http://www.w3.org/1999/xhtml")], |page| {
-            page.within("head", &[], |head| {
-                head.element("meta", &[("charset", "utf-8")], "");
-                head.element("meta", &[("http-equiv", "Content-Security-Policy"), ("content", POLICY)], "");
-                head.element("meta", &[("name", "viewport"), ("content", "width=device-width, initial-scale=1")], "");
-                // Without it browsers ask the server for an icon.
-                head.element("link", &[("rel", "icon"), ("href", "data:,")], "");
-                head.element("title", &[], &self.title());
-                head.within("style", &[], |style| style.raw(STYLE));
-            });
-            page.within("body", &[], |page| page.within("main", &[], |main| main.raw(&body)));
-        });
-        Ok(page.finish())
+        Ok(whole_page(&self.title(), |main| main.raw(&body)))
     }
 
     fn title(&self) -> String {

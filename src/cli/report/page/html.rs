@@ -2,7 +2,7 @@
 
 /// A page, or a part of one, in the making.
 #[derive(Debug, Default)]
-pub(super) struct Html {
+pub(crate) struct Html {
     text: String,
 }
 
@@ -10,12 +10,12 @@ pub(super) struct Html {
 const EMPTY: [&str; 4] = ["meta", "link", "img", "br"];
 
 impl Html {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::default()
     }
 
     /// An element with its attributes, and what is in it.
-    pub(super) fn within(&mut self, name: &str, attributes: &[(&str, &str)], inside: impl FnOnce(&mut Self)) {
+    pub(crate) fn within(&mut self, name: &str, attributes: &[(&str, &str)], inside: impl FnOnce(&mut Self)) {
         self.text.push('<');
         self.text.push_str(name);
         for (attribute, value) in attributes {
@@ -37,12 +37,12 @@ impl Html {
     }
 
     /// An element with nothing in it but text.
-    pub(super) fn element(&mut self, name: &str, attributes: &[(&str, &str)], text: &str) {
+    pub(crate) fn element(&mut self, name: &str, attributes: &[(&str, &str)], text: &str) {
         self.within(name, attributes, |inside| inside.text(text));
     }
 
     /// Text.
-    pub(super) fn text(&mut self, text: &str) {
+    pub(crate) fn text(&mut self, text: &str) {
         for c in text.chars() {
             match c {
                 '&' => self.text.push_str("&amp;"),
@@ -59,12 +59,12 @@ impl Html {
     }
 
     /// What is HTML already: made by this program from numbers and words of its own.
-    pub(super) fn raw(&mut self, html: &str) {
+    pub(crate) fn raw(&mut self, html: &str) {
         self.text.push_str(html);
     }
 
     /// A table; its first row are the headings. Cells name their heading, for narrow pages, which show rows as paragraphs.
-    pub(super) fn table(&mut self, rows: &[Vec<String>]) {
+    pub(crate) fn table(&mut self, rows: &[Vec<String>]) {
         let Some((head, body)) = rows.split_first() else { return };
         self.within("div", &[("class", "wide")], |inside| {
             inside.within("table", &[], |table| {
@@ -86,7 +86,7 @@ impl Html {
         });
     }
 
-    pub(super) fn finish(self) -> String {
+    pub(crate) fn finish(self) -> String {
         self.text
     }
 }

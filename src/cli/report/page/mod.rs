@@ -4,7 +4,7 @@
 
 pub(crate) mod document;
 pub(crate) mod evidence;
-mod html;
+pub(crate) mod html;
 mod objects;
 mod picture;
 mod plots;
