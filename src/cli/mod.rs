@@ -1,9 +1,10 @@
 //! The command line: what was typed (`args`), what it means (`config`), doing it (`segment`, `demo`, `info`).
 //!
 //! Results go to stdout, everything else to stderr. Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable
-//! input, 130 interrupted, 143 terminated.
+//! input, 3 some of several items failed, 130 interrupted, 143 terminated.
 
 mod args;
+mod batch;
 mod commands;
 mod inputs;
 mod outputs;
@@ -23,6 +24,7 @@ use args::command_line::{Cli, Command};
 /// Runs the program with its arguments, the first of which is its own name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
+    terminal::parent::end_with_parent();
     let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => {
@@ -76,6 +78,7 @@ fn execute(cli: Cli, typed: &[String]) -> Result<()> {
         Command::Distance(args) => commands::distance::run(&args, typed),
         Command::Middle(args) => commands::middle::run(&args, typed),
         Command::Reconstruct(args) => commands::reconstruct::run(&args, typed),
+        Command::Batch(args) => commands::batch::run(&args),
         Command::Demo(args) => commands::demo::run(&args, typed),
         Command::Convert(args) => commands::convert::run(&args),
         Command::Measure(args) => commands::measure::run(&args),

@@ -2,6 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
+use super::batch::BatchArgs;
 use super::common::{DemoArgs, InfoArgs, LogArg, MeasureArgs, SegmentArgs};
 use super::convert::ConvertArgs;
 use super::distance::DistanceJobArgs;
@@ -32,6 +33,9 @@ pub(crate) enum Command {
     /// Reconstruct a closed surface from a point cloud, without normals
     #[command(after_help = HELP_ON_DISTANCE)]
     Reconstruct(Box<ReconstructArgs>),
+    /// Run many items of a list, several at a time; run again what is missing, failed or changed
+    #[command(after_help = HELP_ON_BATCH)]
+    Batch(Box<BatchArgs>),
     /// Segment the built-in stack of a plant embryo
     Demo(DemoArgs),
     /// Write a volume or a mesh in another format: OME-Zarr 0.4 or 0.5, OME-TIFF, VTI, NRRD; PLY, OBJ, STL, VTP
@@ -67,6 +71,7 @@ impl Command {
             Self::Reconstruct(args) => args.output.log,
             Self::Demo(args) => args.log,
             Self::Convert(args) => args.log,
+            Self::Batch(args) => args.log,
             _ => return false,
         };
         log == LogArg::Json
@@ -77,6 +82,10 @@ pub(crate) const HELP_ON_SEGMENT: &str = "\
 Lengths are physical, in the unit of the image; triples are x,y,z; the centre of the first voxel is 0,0,0,
 or where an OME-Zarr image has it.
 Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 3 some\nobjects could not be solved, 130 interrupted, 143 terminated.";
+
+pub(crate) const HELP_ON_BATCH: &str = "\
+Exit codes: 0 all items are done, 1 the run failed, 2 wrong usage or a list with mistakes, 3 some items failed,
+130 interrupted, 143 terminated.";
 
 pub(crate) const HELP_ON_DISTANCE: &str = "\
 Lengths are those of the files; triples are x,y,z.

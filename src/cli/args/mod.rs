@@ -1,5 +1,6 @@
 //! What was typed: the commands and their flags.
 
+pub(crate) mod batch;
 pub(crate) mod command_line;
 pub(crate) mod common;
 pub(crate) mod convert;

@@ -2,5 +2,6 @@
 
 pub(crate) mod console;
 pub(crate) mod log;
+pub(crate) mod parent;
 pub(crate) mod signals;
 pub(crate) mod text;

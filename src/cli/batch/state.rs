@@ -1,0 +1,219 @@
+//! What is known of an item from earlier runs, in `DIR/.batch/NAME.json`: with what it was run, and what came of it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::content::{Input, Looks, changed};
+use super::list::items::Item;
+use crate::cli::outputs::files::write_whole;
+use crate::error::{Error, Result};
+
+/// The version whose results are in a folder.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// How far an item is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Stage {
+    Done,
+    Failed,
+    /// Not run yet.
+    Skipped,
+    /// Begun, and not ended by itself: also what stands there while it runs.
+    Interrupted,
+}
+
+impl Stage {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Failed => "failed",
+            Self::Skipped => "skipped",
+            Self::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// An object that a run found, or failed to find. Volume, area and distances physical.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Object {
+    pub(crate) label: Option<u64>,
+    /// Why there is none.
+    pub(crate) reason: Option<String>,
+    pub(crate) volume: Option<f64>,
+    pub(crate) area: Option<f64>,
+    pub(crate) marks_mean: Option<f64>,
+    pub(crate) marks_max: Option<f64>,
+}
+
+/// What is known of an item.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct State {
+    pub(crate) version: String,
+    pub(crate) settings: BTreeMap<String, String>,
+    pub(crate) inputs: Vec<Input>,
+    #[serde(rename = "state")]
+    pub(crate) stage: Stage,
+    pub(crate) code: Option<i32>,
+    pub(crate) reason: Option<String>,
+    /// Seconds of its last run, and the most bytes of memory it had.
+    pub(crate) seconds: Option<f64>,
+    pub(crate) peak: Option<u64>,
+    /// Bytes and threads that it was given.
+    pub(crate) memory: Option<u64>,
+    pub(crate) threads: Option<usize>,
+    /// Whether a store of its name is this batch's own.
+    pub(crate) owns: bool,
+    pub(crate) objects: Vec<Object>,
+}
+
+/// The folder of results.
+#[derive(Clone, Debug)]
+pub(crate) struct Folder(pub(crate) PathBuf);
+
+impl Folder {
+    /// Makes it, with its place for states.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub(crate) fn make(&self) -> Result<()> {
+        fs::create_dir_all(self.0.join(".batch"))
+            .map_err(|error| Error::from_io("cannot be made as the folder of results", &error).at(&self.0))
+    }
+
+    pub(crate) fn store(&self, item: &str) -> PathBuf {
+        self.0.join(format!("{item}.zarr"))
+    }
+
+    pub(crate) fn log(&self, item: &str) -> PathBuf {
+        self.0.join(format!("{item}.log"))
+    }
+
+    /// A small picture of what was found.
+    pub(crate) fn picture(&self, item: &str) -> PathBuf {
+        self.0.join(".batch").join(format!("{item}.png"))
+    }
+
+    fn path(&self, item: &str) -> PathBuf {
+        self.0.join(".batch").join(format!("{item}.json"))
+    }
+
+    /// What is known of an item, if anything.
+    pub(crate) fn state(&self, item: &str) -> Option<State> {
+        serde_json::from_slice(&fs::read(self.path(item)).ok()?).ok()
+    }
+
+    /// Keeps what is known of an item.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn keep(&self, item: &str, state: &State) -> Result<()> {
+        let path = self.path(item);
+        let fault = |error: std::io::Error| Error::from_io("the state of an item cannot be kept", &error).at(&path);
+        let text = serde_json::to_vec_pretty(state).map_err(|error| fault(error.into()))?;
+        write_whole(&path, true, |file| file.write_all(&text)).map_err(fault)
+    }
+}
+
+impl State {
+    /// An item that is about to be run.
+    pub(crate) fn begun(item: &Item) -> Self {
+        Self {
+            version: VERSION.into(),
+            settings: item.settings.clone(),
+            inputs: Vec::new(),
+            stage: Stage::Interrupted,
+            code: None,
+            reason: None,
+            seconds: None,
+            peak: None,
+            memory: None,
+            threads: None,
+            owns: false,
+            objects: Vec::new(),
+        }
+    }
+
+    /// What changed between this run of an item and one that is to be made.
+    fn changed_settings(&self, item: &Item) -> Vec<String> {
+        let mut why = Vec::new();
+        if self.version != VERSION {
+            why.push(format!("version changed from {} to {VERSION}", self.version));
+        }
+        let names: std::collections::BTreeSet<&String> = self.settings.keys().chain(item.settings.keys()).collect();
+        for name in names {
+            let (was, is) = (self.settings.get(name), item.settings.get(name));
+            if was != is {
+                let told = |value: Option<&String>| value.map_or_else(|| "its default".into(), Clone::clone);
+                why.push(format!("{name} changed from {} to {}", told(was), told(is)));
+            }
+        }
+        why
+    }
+}
+
+/// Why an item is to be run: nothing where it is done already. Times of inputs that hold what they held are kept if `keeps`.
+pub(crate) fn reasons(folder: &Folder, item: &Item, keeps: bool, stop: &AtomicBool) -> Result<Vec<String>> {
+    let Some(state) = folder.state(&item.name) else { return Ok(vec!["missing".into()]) };
+    match state.stage {
+        Stage::Failed => return Ok(vec!["failed before".into()]),
+        Stage::Interrupted => return Ok(vec!["interrupted before".into()]),
+        Stage::Skipped => return Ok(vec!["missing".into()]),
+        Stage::Done => {}
+    }
+    if !is_whole(&folder.store(&item.name)) {
+        return Ok(vec!["missing: its store is gone".into()]);
+    }
+    let mut why = state.changed_settings(item);
+    let (names, now) = changed(&item.files, &state.inputs, stop);
+    let is_other_list = now.iter().map(|input| &input.path).ne(state.inputs.iter().map(|input| &input.path));
+    // Other files than before are a setting that changed, and told as such.
+    if !is_other_list {
+        why.extend(names.into_iter().map(|name| format!("{name} changed")));
+    }
+    if keeps && why.is_empty() && now != state.inputs {
+        folder.keep(&item.name, &State { inputs: now, ..state })?;
+    }
+    Ok(why)
+}
+
+/// What is known of an item that another batch has done meanwhile, as its inputs are now.
+pub(crate) fn done_meanwhile(folder: &Folder, item: &Item) -> Option<State> {
+    let state =
+        folder.state(&item.name).filter(|state| state.stage == Stage::Done && is_whole(&folder.store(&item.name)))?;
+    let is_same = |(name, path): &(String, PathBuf)| {
+        let was = state.inputs.iter().find(|input| input.path == *name && input.hash.is_some());
+        was.is_some_and(|was| Looks::of(path).is_ok_and(|now| now == was.looks))
+    };
+    (state.changed_settings(item).is_empty() && item.files.iter().all(is_same)).then_some(state)
+}
+
+/// Whether a store is there, under its name.
+fn is_whole(store: &Path) -> bool {
+    store.join("report.json").is_file()
+}
+
+/// What a run reports of its result, its seconds and its memory; none where there is no report.
+pub(crate) fn reported(store: &Path) -> Option<(Vec<Object>, f64, u64)> {
+    let report: Value = serde_json::from_slice(&fs::read(store.join("report.json")).ok()?).ok()?;
+    let result = &report["result"];
+    let one = |object: &Value| Object {
+        label: object["label"].as_u64(),
+        reason: object["reason"].as_str().map(str::to_owned),
+        volume: object["volume"].as_f64(),
+        area: object["area"].as_f64(),
+        marks_mean: object["hausdorff"]["mean"].as_f64(),
+        marks_max: object["hausdorff"]["max"].as_f64(),
+    };
+    let all = |name: &str| result[name].as_array().into_iter().flatten().map(one).collect::<Vec<_>>();
+    let mut objects = if result["objects"].is_array() { all("objects") } else { vec![one(result)] };
+    objects.extend(all("refused"));
+    objects.sort_by_key(|object| object.label);
+    Some((objects, report["seconds"].as_f64()?, report["peak_rss_bytes"].as_u64()?))
+}
