@@ -41,6 +41,8 @@ mod triangle_distance;
 mod watershed;
 mod wavefront;
 
+#[cfg(target_os = "linux")]
+mod batch;
 mod builders;
 mod builders_refused;
 mod citations;
