@@ -384,6 +384,17 @@ spacing = 1
     let sources = bench.json("out/both.zarr/report.json")["settings"]["sources"].as_array().unwrap().len();
     assert_eq!(sources, 2);
     assert_eq!(batch(&bench, "").2, [""; 0]);
+    // What it made it makes again, what others made stays.
+    fs::remove_dir_all(bench.path("out/a-middle.zarr")).unwrap();
+    bench.write("mine.ply", "mine");
+    bench
+        .write("jobs.toml", &list.replace("out/{stem}.ply", "mine.ply").replace(", [\"in/b.csv\", \"moved.csv\"]", ""));
+    let (code, said, ran) = batch(&bench, "");
+    assert_eq!((code, ran.join(" ")), (3, "a-middle".into()), "{said}");
+    assert_eq!(fs::read_to_string(bench.path("mine.ply")).unwrap(), "mine");
+    bench.write("jobs.toml", list);
+    let (code, said, ran) = batch(&bench, "");
+    assert_eq!((code, ran.join(" ")), (0, "a-middle".into()), "{said}");
 }
 
 #[test]

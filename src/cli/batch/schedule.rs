@@ -1,7 +1,7 @@
 //! Runs items, several at a time, and keeps what came of each.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -63,16 +63,25 @@ pub(crate) fn check_own(folder: &Folder, item: &Item) -> std::result::Result<(),
     let state = folder.state(&item.name);
     let there = |path: &Path| path.symlink_metadata().is_ok();
     let (store, log) = (folder.store(&item.name), folder.log(&item.name));
+    let is_made = |path: &PathBuf| state.as_ref().is_some_and(|state| state.made.contains(path));
     let foreign = if there(&store) && !state.as_ref().is_some_and(|state| state.owns) {
         store
     } else if state.is_none() && fs::metadata(&log).is_ok_and(|is| !is.is_file() || is.len() > 0) {
         log
+    } else if let Some(file) = item.writes.iter().find(|path| there(path) && !is_made(path)) {
+        file.clone()
     } else {
         return Ok(());
     };
     let foreign = foreign.display();
     let reason = format!("{foreign} is there and not of this batch; move it away, or give the item another `name`");
     Err(Refused { code: 2, reason })
+}
+
+/// Whether a run of an item finds what earlier ones made, which it is to replace.
+pub(crate) fn is_replacing(folder: &Folder, item: &Item) -> bool {
+    let store = folder.store(&item.name);
+    std::iter::once(&store).chain(&item.writes).any(|path| path.symlink_metadata().is_ok())
 }
 
 impl<'a> Schedule<'a> {
@@ -156,12 +165,12 @@ impl<'a> Schedule<'a> {
             each(one.place, &state, self.left())?;
             return Ok(true);
         }
-        let mut state = State::begun(item);
+        let mut state = State::begun(item, self.folder.state(&item.name));
         (state.memory, state.threads, state.owns) = (Some(memory), Some(threads), true);
         self.folder.keep(&item.name, &state)?;
         let store = self.folder.store(&item.name);
         let allowed = Allowed { memory, threads, scratch: self.pool.scratch.clone() };
-        let words = arguments(item, &store, &allowed, store.symlink_metadata().is_ok());
+        let words = arguments(item, &store, &allowed, is_replacing(self.folder, item));
         match start(item, &words, log) {
             Ok(child) => self.watch(one.place, child, state, (memory, threads)),
             Err(error) => {
@@ -184,7 +193,7 @@ impl<'a> Schedule<'a> {
             // Not again in this round.
             return Ok(false);
         }
-        let mut state = State::begun(&self.items[one.place]);
+        let mut state = State::begun(&self.items[one.place], None);
         (state.stage, state.reason) = (Stage::Skipped, Some("another batch works on it".into()));
         each(one.place, &state, self.left())?;
         Ok(true)
@@ -223,6 +232,9 @@ impl<'a> Schedule<'a> {
                 };
                 state.reason = (!status.success()).then(|| reason(status, &log));
                 if matches!(state.code, Some(0 | 3)) {
+                    state.made.extend(
+                        item.writes.iter().filter(|path| !state.made.contains(path)).cloned().collect::<Vec<_>>(),
+                    );
                     self.gather(item, &store, &mut state);
                 }
             }

@@ -70,6 +70,9 @@ pub(crate) struct State {
     pub(crate) threads: Option<usize>,
     /// Whether a store of its name is this batch's own.
     pub(crate) owns: bool,
+    /// Files beside the store that runs of it have made.
+    #[serde(default)]
+    pub(crate) made: Vec<PathBuf>,
     pub(crate) objects: Vec<Object>,
 }
 
@@ -122,8 +125,9 @@ impl Folder {
 }
 
 impl State {
-    /// An item that is about to be run.
-    pub(crate) fn begun(item: &Item) -> Self {
+    /// An item that is about to be run; what earlier runs made stays this batch's own.
+    pub(crate) fn begun(item: &Item, before: Option<Self>) -> Self {
+        let (owns, made) = before.map_or((false, Vec::new()), |before| (before.owns, before.made));
         Self {
             version: VERSION.into(),
             settings: item.settings.clone(),
@@ -135,7 +139,8 @@ impl State {
             peak: None,
             memory: None,
             threads: None,
-            owns: false,
+            owns,
+            made,
             objects: Vec::new(),
         }
     }

@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use crate::cli::args::batch::BatchArgs;
-use crate::cli::args::common::LogArg;
 use crate::cli::batch::asked::Asked;
 use crate::cli::batch::list::items::{Item, items};
 use crate::cli::batch::list::problems::Problems;
 use crate::cli::batch::list::{init, manifest};
 use crate::cli::batch::page::{seconds, told};
 use crate::cli::batch::plan::{Plan, Pool, Refused, each, plans, pool_share};
-use crate::cli::batch::schedule::{Schedule, check_own};
+use crate::cli::batch::schedule::{Schedule, check_own, is_replacing};
 use crate::cli::batch::share::Waiting;
 use crate::cli::batch::state::{Folder, Stage, State, reasons};
 use crate::cli::batch::summary::Summary;
@@ -44,11 +43,7 @@ pub(crate) fn run(args: &BatchArgs) -> Result<()> {
     }
     let mine = |(place, item)| args.shard.is_none_or(|shard| shard.has(place)).then_some(item);
     let items: Vec<Item> = all.into_iter().enumerate().filter_map(mine).collect();
-    let voice = match args.log {
-        _ if args.quiet => Voice::Quiet,
-        LogArg::Json => Voice::Json,
-        LogArg::Text => Voice::Normal,
-    };
+    let voice = Voice::told(args.log, args.quiet, false);
     let teller = Teller::new(voice, items.iter().map(|item| item.name.chars().count()));
     let batch = Batch { args, folder: Folder(output.clone()), items, teller };
     if args.summary { batch.sum_up() } else { batch.run() }
@@ -101,7 +96,7 @@ impl Batch<'_> {
             .iter()
             .zip(&owned)
             .filter(|(_, own)| own.is_ok())
-            .map(|((place, _), _)| (&self.items[*place], self.folder.store(&self.items[*place].name).exists()))
+            .map(|((place, _), _)| (&self.items[*place], is_replacing(&self.folder, &self.items[*place])))
             .collect();
         let mut answers = plans(&to_ask, &output, &pool, &asked).into_iter();
         let answers: Vec<Answer> = owned
@@ -170,11 +165,8 @@ impl Batch<'_> {
 
     /// Keeps why an item was not run.
     fn refused(&self, item: &Item, refused: Refused) -> Result<State> {
-        let before = self.folder.state(&item.name);
-        let mut state = State::begun(item);
+        let mut state = State::begun(item, self.folder.state(&item.name));
         (state.stage, state.code, state.reason) = (Stage::Failed, Some(refused.code), Some(refused.reason));
-        // A store that an earlier run made stays this batch's own.
-        state.owns = before.is_some_and(|before| before.owns);
         self.folder.keep(&item.name, &state)?;
         Ok(state)
     }

@@ -25,6 +25,8 @@ pub(crate) struct Item {
     pub(crate) inputs: Vec<PathBuf>,
     /// All files that it reads, as they are written in the list and as they are opened.
     pub(crate) files: Vec<(String, PathBuf)>,
+    /// Files that it writes beside its store.
+    pub(crate) writes: Vec<PathBuf>,
     /// All that decides its result, by the list's words.
     pub(crate) settings: BTreeMap<String, String>,
     /// What it gets, where the list says so.
@@ -38,12 +40,12 @@ pub(crate) fn items(manifest: &Manifest, output: &Path, problems: &mut Problems)
     let (mut found, mut names, mut written) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
     for entry in &manifest.entries {
         let maker = Maker { manifest, entry, output };
-        for (item, writes) in maker.items(problems) {
+        for item in maker.items(problems) {
             if let Some(other) = names.insert(item.name.clone(), entry.line) {
                 let text = format!("two items are called {}, the other of line {other}; give one a `name`", item.name);
                 problems.add(entry.line, text);
             }
-            for path in writes {
+            for path in item.writes.clone() {
                 if let Some(other) = written.insert(path.clone(), item.name.clone()) {
                     let path = path.display();
                     problems
@@ -64,8 +66,8 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// The items of an entry, each with what it writes beside its store.
-    fn items(&self, problems: &mut Problems) -> Vec<(Item, Vec<PathBuf>)> {
+    /// The items of an entry.
+    fn items(&self, problems: &mut Problems) -> Vec<Item> {
         let (entry, line) = (self.entry, self.entry.line);
         let kind = match entry.key("command").map(|key| (&key.given, key.line)) {
             Some((Given::Text(name), at)) => Kind::named(name).map_err(|text| (at, text)),
@@ -239,7 +241,7 @@ impl Maker<'_> {
         (kind, flags, keys): (Kind, &Flags, &[&Key]),
         group: &[String],
         problems: &mut Problems,
-    ) -> Option<(Item, Vec<PathBuf>)> {
+    ) -> Option<Item> {
         let (entry, folder) = (self.entry, &self.manifest.folder);
         let stem = stem(&group[0]);
         let name = match entry.key("name").map(|key| (&key.given, key.line)) {
@@ -280,9 +282,9 @@ impl Maker<'_> {
         }
         let as_written = |path: &PathBuf| path.strip_prefix(folder).unwrap_or(path).to_string_lossy().into_owned();
         let files = read.files.iter().map(|path| (as_written(path), path.clone())).collect();
-        let resources = read.resources;
+        let (resources, writes) = (read.resources, read.writes);
         let (memory, threads, scratch) = (resources.memory, resources.threads, resources.scratch);
-        Some((Item { name, kind, words, inputs, files, settings, memory, threads, scratch }, read.writes))
+        Some(Item { name, kind, words, inputs, files, writes, settings, memory, threads, scratch })
     }
 }
 
