@@ -4,13 +4,15 @@ Five are broken in different ways and one needs more memory than is allowed: the
 and each failure has its reason. Then the same again (nothing is computed, in less than two seconds), with one setting changed (that
 item alone), killed in the middle and run again (only what is left), each with what it took. The memory of all processes together
 is sampled while the first run goes on. The time is told against the sum of the items' times alone with one thread, shared among the
-threads. Exit code 1 when something is not as it must be; times are told, and counted only with --strict.
+threads. Exit code 1 when something is not as it must be; times are told, and counted only with --strict: on a machine that others use two
+processes get less of it than one does. Seconds of processors, which hardly depend on that, are told beside them.
 """
 
 import argparse
 import json
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -85,7 +87,8 @@ class Batch:
         for line in child.stderr:
             if line.startswith("{"):
                 events.append(json.loads(line))
-            if kill_after and sum(event["event"] == "item" and event["state"] == "done" for event in events) >= kill_after:
+            done = [event for event in events if event["event"] == "item" and event["state"] == "done"]
+            if kill_after and len(done) >= kill_after:
                 child.send_signal(signal.SIGKILL)
                 kill_after = None
         code = child.wait()
@@ -99,6 +102,12 @@ class Batch:
 
 def ended(events):
     return {event["item"]: event["state"] for event in events if event["event"] == "item"}
+
+
+def worked():
+    """Seconds of processors that ended children have taken, with theirs."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def alone(program, place, names, settings):
@@ -143,16 +152,24 @@ def main():
         whole = [name for name in names if name not in BROKEN]
         batch = Batch(program, place, settings)
         # Half of the items alone before, half after, so that a machine that others use is as busy for both.
+        began = worked()
         single = alone(program, place, whole[::2], settings)
+        of_single = worked() - began
+        before = worked()
         code, events, seconds, peak = batch.run()
+        of_batch = worked() - before
+        began = worked()
         single |= alone(program, place, whole[1::2], settings)
+        of_single += worked() - began
         check_first(batch, (code, events, peak), whole, settings, found)
         share = seconds / (sum(single.values()) / settings.threads)
         is_quick = share <= 1.1 or not settings.strict
         found.told(
             is_quick,
-            f"{seconds:.1f} s; alone with one thread {sum(single.values()):.1f} s in all: {share:.3f} of that by {settings.threads}",
+            f"{seconds:.1f} s; alone with one thread {sum(single.values()):.1f} s in all: "
+            f"{share:.3f} of that by {settings.threads}",
         )
+        print(f"     {of_batch:.1f} s of processors; alone {of_single:.1f} s", flush=True)
         check_again(batch, place, whole, settings, found)
     sys.exit(found.bad > 0)
 
