@@ -1,11 +1,12 @@
 """scripts/try_batch: 40 items, 34 of them whole, through `strandline batch`.
 
-Five are broken in different ways and one needs more memory than is allowed: the others must have results, the exit code is 3,
-and each failure has its reason. Then the same again (nothing is computed, in less than two seconds), with one setting changed (that
-item alone), killed in the middle and run again (only what is left), each with what it took. The memory of all processes together
-is sampled while the first run goes on. The time is told against the sum of the items' times alone with one thread, shared among the
-threads. Exit code 1 when something is not as it must be; times are told, and counted only with --strict: on a machine that others use two
-processes get less of it than one does. Seconds of processors, which hardly depend on that, are told beside them.
+Five are broken in different ways and one needs more memory than is allowed: the others must have results, the exit
+code is 3, and each failure has its reason. Then the same again (nothing is computed, in less than two seconds), with
+one setting changed (that item alone), killed in the middle and run again (only what is left), each with what it took.
+The memory of all processes together is sampled while the first run goes on. The time is told against the sum of the
+items' times alone with one thread, shared among the threads. Exit code 1 when something is not as it must be; times
+are told, and counted only with --strict: on a machine that others use two processes get less of it than one does.
+Seconds of processors, which hardly depend on that, are told beside them.
 """
 
 import argparse
@@ -70,7 +71,7 @@ class Batch:
         self.place = place
 
     def run(self, *more, kill_after=None):
-        """Runs it; returns the exit code, its events, seconds, and the most memory; killed when so many items have ended."""
+        """Runs it; returns exit code, events, seconds, and the most memory; killed when so many items have ended."""
         began, peak, events = time.monotonic(), 0, []
         child = subprocess.Popen(
             [*self.command, *more], cwd=self.place, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
@@ -115,8 +116,8 @@ def alone(program, place, names, settings):
     seconds = {}
     for name in names:
         command = [
-            program, "segment", f"in/{name}.tif", "--points", f"in/{name}.csv", "-o", "alone.zarr", "-q", "--threads", "1",
-            "--memory", f"{settings.memory // settings.threads}MiB",
+            program, "segment", f"in/{name}.tif", "--points", f"in/{name}.csv", "-o", "alone.zarr", "-q",
+            "--threads", "1", "--memory", f"{settings.memory // settings.threads}MiB",
         ]  # fmt: skip
         began = time.monotonic()
         subprocess.run(command, cwd=place, check=True)

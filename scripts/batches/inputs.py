@@ -10,7 +10,8 @@ SPACING = 0.5
 
 def write_tiff(path, pages, side):
     """Writes pages of 16-bit grey values, uncompressed, as ImageJ does, with a spacing."""
-    description = f"ImageJ=1.54f\nimages={len(pages)}\nslices={len(pages)}\nunit=um\nspacing={SPACING}\n".encode() + b"\0"
+    told = f"ImageJ=1.54f\nimages={len(pages)}\nslices={len(pages)}\nunit=um\nspacing={SPACING}\n"
+    description = told.encode() + b"\0"
     out = bytearray(b"II*\0")
     out += struct.pack("<I", 0)
     shared = len(out)
