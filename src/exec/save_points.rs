@@ -23,7 +23,7 @@ use crate::store::checkpoint::{Checkpoints, SavedField, pack, restore, unpack};
 use crate::store::{BrickArray, Element};
 
 /// How often checkpoints are taken where nobody says.
-const EVERY: Duration = Duration::from_secs(600);
+const EVERY: Duration = Duration::from_mins(10);
 /// A run that has gone on for less loses little.
 const SHORT: Duration = Duration::from_secs(30);
 /// Where nobody says how often, checkpoints take at most one in so many seconds.
@@ -141,20 +141,19 @@ impl SavePoint<'_> {
             Ok(_) => {}
             Err(_) if is_last => {}
             Err(error) => {
-                self.progress.note(&format!("no checkpoint could be taken, the run goes on without: {error}"))
+                self.progress.note(&format!("no checkpoint could be taken, the run goes on without: {error}"));
             }
         }
-        self.cancel.end()
+        self.cancel.end();
     }
 
     fn is_due(&self, ended: bool, fields: &[&dyn SavedField]) -> bool {
-        match self.points.every {
-            Some(every) => self.last.elapsed() >= every || (ended && self.points.begun.elapsed() >= every),
-            None => {
-                let is_time = self.last.elapsed() >= EVERY || (ended && self.points.begun.elapsed() >= SHORT);
-                is_time && self.points.affords(fields.iter().map(|field| field.saved_bytes()).sum())
-            }
+        let since = self.points.begun.elapsed();
+        if let Some(every) = self.points.every {
+            return self.last.elapsed() >= every || (ended && since >= every);
         }
+        let is_time = self.last.elapsed() >= EVERY || (ended && since >= SHORT);
+        is_time && self.points.affords(fields.iter().map(|field| field.saved_bytes()).sum())
     }
 }
 

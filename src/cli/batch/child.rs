@@ -30,9 +30,19 @@ pub(crate) struct Allowed {
     pub(crate) scratch: Option<PathBuf>,
 }
 
+/// What a run of an item finds of earlier ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Before {
+    Nothing,
+    /// What it is to replace.
+    Replaced,
+    /// Checkpoints of the same run, which was ended.
+    Resumed,
+}
+
 /// The command line of an item. What replaces a store, and what else a further try is to do other than the first one, is said
 /// here and nowhere else.
-pub(crate) fn arguments(item: &Item, store: &Path, allowed: &Allowed, is_replacing: bool) -> Vec<OsString> {
+pub(crate) fn arguments(item: &Item, store: &Path, allowed: &Allowed, before: Before) -> Vec<OsString> {
     let with = |flag: &str, value: &Path| {
         let mut word = OsString::from(flag);
         word.push(value);
@@ -44,8 +54,10 @@ pub(crate) fn arguments(item: &Item, store: &Path, allowed: &Allowed, is_replaci
     all.push(format!("--threads={}", allowed.threads).into());
     all.extend(item.scratch.as_ref().or(allowed.scratch.as_ref()).map(|folder| with("--scratch=", folder)));
     all.push(with("--output=", store));
-    if is_replacing {
-        all.push("--overwrite".into());
+    match before {
+        Before::Nothing => {}
+        Before::Replaced => all.push("--overwrite".into()),
+        Before::Resumed => all.push("--resume".into()),
     }
     all
 }

@@ -9,7 +9,7 @@ use std::thread;
 use serde_json::Value;
 
 use super::asked::Asked;
-use super::child::{Allowed, arguments, ask, code};
+use super::child::{Allowed, Before, arguments, ask, code};
 use super::list::Kind;
 use super::list::items::Item;
 use crate::cli::terminal::text::bytes;
@@ -124,7 +124,8 @@ fn plan(item: &Item, output: &Path, pool: &Pool, is_replacing: bool) -> Result<P
     let allowed = Allowed { memory: most, threads: 1, scratch: pool.scratch.clone() };
     // A name that nobody has: whether the store's own may be replaced is decided elsewhere.
     let store = output.join(format!(".batch-plan-{}.zarr", item.name));
-    let (status, said) = ask(item, &arguments(item, &store, &allowed, is_replacing))
+    let before = if is_replacing { Before::Replaced } else { Before::Nothing };
+    let (status, said) = ask(item, &arguments(item, &store, &allowed, before))
         .map_err(|error| Refused { code: 1, reason: format!("cannot be started: {error}") })?;
     let events: Vec<Value> = said.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
     let event = |name: &str| events.iter().find(|event| event["event"] == name);

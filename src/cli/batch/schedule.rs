@@ -10,7 +10,7 @@ use crossbeam_channel::{Receiver, Sender, select, unbounded};
 use rustix::process::Signal;
 
 use super::asked::Asked;
-use super::child::{Allowed, arguments, code, open_log, peak, reason, signal_all, start, wait};
+use super::child::{Allowed, Before, arguments, code, open_log, peak, reason, signal_all, start, wait};
 use super::content;
 use super::list::items::Item;
 use super::plan::{Pool, Refused};
@@ -18,12 +18,14 @@ use super::share::{Free, Waiting, next};
 use super::state::{Folder, Stage, State, done_meanwhile, reported};
 use super::tell::Teller;
 use super::thumbnail;
+use crate::cli::outputs::survival::checkpoints_of;
 use crate::error::{Error, Result};
+use crate::store::checkpoint::Checkpoints;
 
 /// How often it is looked how much memory runs have, and whether a log is free again.
 const LOOK: Duration = Duration::from_millis(100);
 /// How long a run may take to end that was asked to.
-const PATIENCE: Duration = Duration::from_secs(10);
+const PATIENCE: Duration = Duration::from_secs(11);
 /// How long another batch, which may be ending, is waited for.
 const OTHERS: Duration = Duration::from_secs(5);
 
@@ -82,6 +84,19 @@ pub(crate) fn check_own(folder: &Folder, item: &Item) -> std::result::Result<(),
 pub(crate) fn is_replacing(folder: &Folder, item: &Item) -> bool {
     let store = folder.store(&item.name);
     std::iter::once(&store).chain(&item.writes).any(|path| path.symlink_metadata().is_ok())
+}
+
+/// What a run of an item finds. Only one that was ended is gone on with: one that refused to be would again.
+fn before(folder: &Folder, item: &Item) -> Before {
+    let has_checkpoints = Checkpoints::lie_in(&checkpoints_of(&folder.store(&item.name)));
+    let is_same = |state: State| state.stage == Stage::Interrupted && state.changed_settings(item).is_empty();
+    if has_checkpoints && folder.state(&item.name).is_some_and(is_same) {
+        Before::Resumed
+    } else if has_checkpoints || is_replacing(folder, item) {
+        Before::Replaced
+    } else {
+        Before::Nothing
+    }
 }
 
 impl<'a> Schedule<'a> {
@@ -165,12 +180,13 @@ impl<'a> Schedule<'a> {
             each(one.place, &state, self.left())?;
             return Ok(true);
         }
+        let before = before(self.folder, item);
         let mut state = State::begun(item, self.folder.state(&item.name));
         (state.memory, state.threads, state.owns) = (Some(memory), Some(threads), true);
         self.folder.keep(&item.name, &state)?;
         let store = self.folder.store(&item.name);
         let allowed = Allowed { memory, threads, scratch: self.pool.scratch.clone() };
-        let words = arguments(item, &store, &allowed, is_replacing(self.folder, item));
+        let words = arguments(item, &store, &allowed, before);
         match start(item, &words, log) {
             Ok(child) => self.watch(one.place, child, state, (memory, threads)),
             Err(error) => {

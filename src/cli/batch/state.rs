@@ -146,7 +146,7 @@ impl State {
     }
 
     /// What changed between this run of an item and one that is to be made.
-    fn changed_settings(&self, item: &Item) -> Vec<String> {
+    pub(crate) fn changed_settings(&self, item: &Item) -> Vec<String> {
         let mut why = Vec::new();
         if self.version != VERSION {
             why.push(format!("version changed from {} to {VERSION}", self.version));

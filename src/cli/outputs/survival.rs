@@ -20,13 +20,16 @@ const ENDING: &str = ".checkpoint";
 fn folder(output: &OutputArgs) -> Option<PathBuf> {
     match (&output.survive.checkpoint, output.store()) {
         (Some(Checkpoint::Folder(folder)), _) => Some(folder.clone()),
-        (None, Some(store)) => {
-            let mut name = store.file_name()?.to_owned();
-            name.push(ENDING);
-            Some(store.with_file_name(name))
-        }
+        (None, Some(store)) => Some(checkpoints_of(store)),
         _ => None,
     }
+}
+
+/// The folder of the checkpoints of a run that writes a store, where no other is named.
+pub(crate) fn checkpoints_of(store: &Path) -> PathBuf {
+    let mut name = store.file_name().unwrap_or_default().to_owned();
+    name.push(ENDING);
+    store.with_file_name(name)
 }
 
 /// Looks at what an earlier run left before anything is read; true where all of it is there already. What a run that is gone on
