@@ -144,7 +144,7 @@ impl SavePoint<'_> {
                 self.progress.note(&format!("no checkpoint could be taken, the run goes on without: {error}"));
             }
         }
-        self.cancel.end();
+        self.cancel.end()
     }
 
     fn is_due(&self, ended: bool, fields: &[&dyn SavedField]) -> bool {
