@@ -45,7 +45,7 @@ fn terminated(bench: &Bench, run: &str, checkpoints: usize) {
     let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let last = bench.path("out/x.zarr.checkpoint").join(format!("{checkpoints:06}.checkpoint"));
     let begun = Instant::now();
-    while !last.exists() && begun.elapsed() < Duration::from_secs(60) {
+    while !last.exists() && begun.elapsed() < Duration::from_mins(1) {
         std::thread::yield_now();
     }
     Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
