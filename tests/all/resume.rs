@@ -144,6 +144,8 @@ fn there_may_be_nothing_to_go_on_with() {
     bench.succeed(&format!("{run} -o out/x.zarr --resume"));
     same(&before, &contents(&bench.path("out/x.zarr")), "complete already");
     assert_eq!(report, fs::read(bench.path("out/x.zarr/report.json")).unwrap(), "nothing ran");
+    let told = bench.fail(&format!("{} -o out/x.zarr --resume", run.replace("0.02", "0.04")), 2);
+    assert!(told.contains("is complete, and of another run: --spacing was 0.02 and is 0.04"), "{told}");
     let folder = bench.path("held.checkpoint");
     fs::create_dir(&folder).unwrap();
     let lock = fs::File::create(folder.join("lock")).unwrap();

@@ -69,7 +69,7 @@ fn begin(mut args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[Strin
     let mesh = middle.as_ref().and_then(|choice| choice.mesh.clone());
     let output = &mut args.job.output;
     let files = [output.report.clone(), mesh];
-    if finished_before(output, &files)? { Ok(()) } else { Job::new(args, middle, typed)?.run_precise() }
+    if finished_before(output, &files, typed)? { Ok(()) } else { Job::new(args, middle, typed)?.run_precise() }
 }
 
 impl Job {

@@ -61,7 +61,7 @@ struct Job {
 pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
     let mut args = args.clone();
     let files = [args.output.report.clone(), args.mesh.clone()];
-    if finished_before(&mut args.output, &files)? {
+    if finished_before(&mut args.output, &files, typed)? {
         return Ok(());
     }
     let job = Job::new(args.clone(), typed)?;

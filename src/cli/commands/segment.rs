@@ -68,7 +68,7 @@ pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     let points = args.points.iter().map(|path| path.display().to_string()).collect();
     let mut args = args.clone();
     let files = [&args.output.report, &args.drawn.mesh, &args.drawn.picture].map(Clone::clone);
-    if finished_before(&mut args.output, &files)? {
+    if finished_before(&mut args.output, &files, typed)? {
         return Ok(());
     }
     let names = Names { command: "segment", image: args.image.display().to_string(), points };

@@ -11,7 +11,7 @@ use crate::cli::terminal::signals::wish_on_signal;
 use crate::error::{Error, Result};
 use crate::exec::{Progress, SavePoints};
 use crate::io::ome_zarr::{LiveState, is_store, live};
-use crate::store::checkpoint::Checkpoints;
+use crate::store::checkpoint::{Checkpoints, difference};
 
 /// What follows the name of a store in that of the folder of its run's checkpoints.
 const ENDING: &str = ".checkpoint";
@@ -37,7 +37,7 @@ pub(crate) fn checkpoints_of(store: &Path) -> PathBuf {
 ///
 /// # Errors
 /// When there is nothing to go on with where `--resume` says so, or something that would be lost.
-pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]) -> Result<bool> {
+pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>], typed: &[String]) -> Result<bool> {
     let folder = folder(output);
     let has_checkpoints = folder.as_deref().is_some_and(Checkpoints::lie_in);
     if !output.survive.resume {
@@ -55,6 +55,7 @@ pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]
     if let Some(store) = output.store().filter(|store| is_whole(store) && !has_checkpoints)
         && files.iter().all(is_there)
     {
+        check_same(store, typed)?;
         let console = Console::new(Voice::of_run(output));
         console.note(&format!("{} is complete; there is nothing to go on with", store.display()));
         return Ok(true);
@@ -62,6 +63,19 @@ pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]
     let was_cut_off = |store: &Path| live(store).is_some_and(|live| live.state == LiveState::Interrupted);
     output.overwrite |= has_checkpoints || output.store().is_some_and(was_cut_off);
     Ok(false)
+}
+
+/// Refuses to take a finished store for that of the run that was typed where another one made it.
+fn check_same(store: &Path, typed: &[String]) -> Result<()> {
+    let report = std::fs::read(store.join("report.json")).unwrap_or_default();
+    let report: serde_json::Value = serde_json::from_slice(&report).unwrap_or_default();
+    let made: Option<Vec<String>> = serde_json::from_value(report["arguments"].clone()).ok();
+    let then = made.map(|made| identity(&made)).transpose()?.unwrap_or_default();
+    let Some(difference) = difference(&then, &identity(typed)?) else { return Ok(()) };
+    let what = format!(
+        "is complete, and of another run: {difference}; choose another output, or give --overwrite in place of --resume"
+    );
+    Err(Error::usage(what).at(store))
 }
 
 /// Where the run puts by what it solves, with what it goes on from.

@@ -287,7 +287,8 @@ fn whole(folder: &Path, file: &FileOf) -> io::Result<()> {
 }
 
 /// The first thing in which two runs differ, in words.
-fn difference(then: &Identity, now: &Identity) -> Option<String> {
+#[must_use]
+pub fn difference(then: &Identity, now: &Identity) -> Option<String> {
     let of = |identity: &Identity, name: &str| {
         identity.iter().find(|(known, _)| known == name).map(|(_, value)| value.clone())
     };

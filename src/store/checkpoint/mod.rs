@@ -13,6 +13,6 @@ mod folder;
 mod payload;
 mod record;
 
-pub use folder::{Checkpoints, Entry, Found, Identity};
+pub use folder::{Checkpoints, Entry, Found, Identity, difference};
 pub use payload::{SavedField, restore};
 pub use record::{pack, unpack};
