@@ -3,9 +3,10 @@
 use clap::{Parser, Subcommand};
 
 use super::batch::BatchArgs;
-use super::common::{DemoArgs, InfoArgs, LogArg, MeasureArgs, SegmentArgs};
+use super::common::{DemoArgs, InfoArgs, LogArg, SegmentArgs};
 use super::convert::ConvertArgs;
 use super::distance::DistanceJobArgs;
+use super::measure::MeasureArgs;
 use super::middle::MiddleArgs;
 use super::reconstruct::ReconstructArgs;
 #[cfg(feature = "viewer")]

@@ -6,6 +6,7 @@ pub(crate) mod common;
 pub(crate) mod convert;
 pub(crate) mod distance;
 pub(crate) mod grid;
+pub(crate) mod measure;
 pub(crate) mod middle;
 pub(crate) mod pages;
 pub(crate) mod reconstruct;

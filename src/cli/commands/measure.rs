@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde_json::json;
 
-use crate::cli::args::common::MeasureArgs;
+use crate::cli::args::measure::MeasureArgs;
 use crate::cli::inputs::noted::read_told;
 use crate::cli::print;
 use crate::cli::terminal::console::{Console, Voice};

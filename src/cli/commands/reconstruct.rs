@@ -5,8 +5,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use serde::Serialize;
-
 use crate::cli::args::grid::GridArgs;
 use crate::cli::args::reconstruct::{CloudGridArgs, ReconstructArgs};
 use crate::cli::inputs::grid::asked_grid;
@@ -20,7 +18,8 @@ use crate::cli::outputs::survival::{finished_before, save_points};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
-use crate::cli::report::run_report::{Distances, Hausdorff, Hole, Moves, Ran, Report, SimplifiedCopy};
+use crate::cli::report::reconstruction::{Found, Settings};
+use crate::cli::report::run_report::{Ran, Report};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::log;
@@ -282,7 +281,12 @@ impl Job {
             ranks: engine.ranks(),
             started: self.started,
         };
-        Report::new(&ran, Settings::new(self, found), &found.geometry, Found::new(found, self.cloud.len() as u64, copy))
+        Report::new(
+            &ran,
+            Settings::new(&self.args, &self.settings, &self.resources.scratch, found),
+            &found.geometry,
+            Found::new(found, self.cloud.len() as u64, copy),
+        )
     }
 }
 
@@ -333,92 +337,4 @@ fn describe_found(found: &Reconstruction) -> String {
         found.evolution.stopped_by
     ));
     lines.join("\n") + "\n"
-}
-
-/// Every setting, also those that nobody gave; lengths physical.
-#[derive(Debug, Serialize)]
-struct Settings {
-    cloud: String,
-    output: Option<String>,
-    compress: &'static str,
-    ome: &'static str,
-    method: &'static str,
-    #[serde(flatten)]
-    motion: Moves,
-    /// Null when it was found; it is then in the result.
-    beta: Option<f64>,
-    scratch: String,
-}
-
-impl Settings {
-    fn new(job: &Job, found: &Reconstruction) -> Self {
-        Self {
-            cloud: job.args.cloud.display().to_string(),
-            output: job.args.output.store().map(|path| path.display().to_string()),
-            compress: job.args.output.compress.name(),
-            ome: job.args.output.ome.name(),
-            method: job.settings.method.name(),
-            motion: Moves::new(&job.settings.motion, &found.geometry),
-            beta: job.settings.beta,
-            scratch: job.resources.scratch.display().to_string(),
-        }
-    }
-}
-
-/// What was found.
-#[derive(Debug, Serialize)]
-struct Found {
-    volume: f64,
-    area: f64,
-    closed: bool,
-    components: u64,
-    triangles: u64,
-    /// The copy of a large surface.
-    simplified: Option<SimplifiedCopy>,
-    open_edges: u64,
-    hausdorff: Option<Hausdorff>,
-    distances: Option<Distances>,
-    cloud_points: u64,
-    /// Points farther from the surface than a voxel.
-    lost_points: u64,
-    /// Points held as thin shells or slits.
-    sheet_points: u64,
-    spaces: usize,
-    beta: f64,
-    hole: Option<Hole>,
-    band_voxels: u64,
-    time_steps: u32,
-    sor_iterations: u64,
-    stopped_by: &'static str,
-    residual: f64,
-    /// What the rule that ends the motion looked at after each time step.
-    residuals: Vec<f64>,
-}
-
-impl Found {
-    fn new(found: &Reconstruction, cloud_points: u64, copy: Option<Simplified>) -> Self {
-        Self {
-            volume: found.measures.volume,
-            area: found.measures.area,
-            closed: found.measures.is_closed(),
-            components: found.measures.components,
-            triangles: found.measures.triangles,
-            simplified: copy.map(Into::into),
-            open_edges: found.measures.open_edges,
-            hausdorff: found.hausdorff.map(Into::into),
-            distances: found.spread.clone().map(Into::into),
-            cloud_points,
-            lost_points: found.lost_points,
-            sheet_points: found.sheet_points,
-            spaces: found.spaces,
-            beta: found.beta,
-            hole: found.hole.map(Into::into),
-            band_voxels: found.band_voxels,
-            time_steps: found.evolution.steps,
-            sor_iterations: found.evolution.sor_iterations,
-            stopped_by: found.evolution.stopped_by,
-            residual: found.evolution.residual,
-            residuals: found.evolution.residuals.clone(),
-        }
-    }
 }

@@ -1,0 +1,104 @@
+//! What a reconstruction reports: its settings, and what was found.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::run_report::{Distances, Hausdorff, Hole, SimplifiedCopy};
+use super::settings::Moves;
+use crate::cli::args::reconstruct::ReconstructArgs;
+use crate::pipeline::output::viewer_mesh::Simplified;
+use crate::pipeline::reconstruct::{ReconstructSettings, Reconstruction};
+
+/// Every setting, also those that nobody gave; lengths physical.
+#[derive(Debug, Serialize)]
+pub(crate) struct Settings {
+    cloud: String,
+    output: Option<String>,
+    compress: &'static str,
+    ome: &'static str,
+    method: &'static str,
+    #[serde(flatten)]
+    motion: Moves,
+    /// Null when it was found; it is then in the result.
+    beta: Option<f64>,
+    scratch: String,
+}
+
+impl Settings {
+    pub(crate) fn new(
+        args: &ReconstructArgs,
+        settings: &ReconstructSettings,
+        scratch: &Path,
+        found: &Reconstruction,
+    ) -> Self {
+        Self {
+            cloud: args.cloud.display().to_string(),
+            output: args.output.store().map(|path| path.display().to_string()),
+            compress: args.output.compress.name(),
+            ome: args.output.ome.name(),
+            method: settings.method.name(),
+            motion: Moves::new(&settings.motion, &found.geometry),
+            beta: settings.beta,
+            scratch: scratch.display().to_string(),
+        }
+    }
+}
+
+/// What was found.
+#[derive(Debug, Serialize)]
+pub(crate) struct Found {
+    volume: f64,
+    area: f64,
+    closed: bool,
+    components: u64,
+    triangles: u64,
+    /// The copy of a large surface.
+    simplified: Option<SimplifiedCopy>,
+    open_edges: u64,
+    hausdorff: Option<Hausdorff>,
+    distances: Option<Distances>,
+    cloud_points: u64,
+    /// Points farther from the surface than a voxel.
+    lost_points: u64,
+    /// Points held as thin shells or slits.
+    sheet_points: u64,
+    spaces: usize,
+    beta: f64,
+    hole: Option<Hole>,
+    band_voxels: u64,
+    time_steps: u32,
+    sor_iterations: u64,
+    stopped_by: &'static str,
+    residual: f64,
+    /// What the rule that ends the motion looked at after each time step.
+    residuals: Vec<f64>,
+}
+
+impl Found {
+    pub(crate) fn new(found: &Reconstruction, cloud_points: u64, copy: Option<Simplified>) -> Self {
+        Self {
+            volume: found.measures.volume,
+            area: found.measures.area,
+            closed: found.measures.is_closed(),
+            components: found.measures.components,
+            triangles: found.measures.triangles,
+            simplified: copy.map(Into::into),
+            open_edges: found.measures.open_edges,
+            hausdorff: found.hausdorff.map(Into::into),
+            distances: found.spread.clone().map(Into::into),
+            cloud_points,
+            lost_points: found.lost_points,
+            sheet_points: found.sheet_points,
+            spaces: found.spaces,
+            beta: found.beta,
+            hole: found.hole.map(Into::into),
+            band_voxels: found.band_voxels,
+            time_steps: found.evolution.steps,
+            sor_iterations: found.evolution.sor_iterations,
+            stopped_by: found.evolution.stopped_by,
+            residual: found.evolution.residual,
+            residuals: found.evolution.residuals.clone(),
+        }
+    }
+}
