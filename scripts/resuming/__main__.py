@@ -105,11 +105,17 @@ def main():
                         trial = trials.Trial(program, command, place, seconds, how, numbers).run(wanted)
                     found.append(trial)
                     for fault in trial.faults:
-                        print(f"  {name}, {how}, {'; '.join(trial.steps)}: {fault}; it said: {trial.said[-1][-300:]}", flush=True)
+                        print(
+                            f"  {name}, {how}, {'; '.join(trial.steps)}: {fault}; it said: {trial.said[-1][-300:]}",
+                            flush=True,
+                        )
                 went_on = sum("goes on from the checkpoint" in " ".join(trial.said) for trial in found)
                 told = Counter("refused" if trial.steps[-1].endswith(": 2") else "done" for trial in found)
                 faults = sum(bool(trial.faults) for trial in found)
-                print(f"{name}, {how}: {seconds:.1f} s whole; {len(found)} trials, {went_on} went on from a checkpoint, {dict(told)}, {faults} at fault", flush=True)
+                print(
+                    f"{name}, {how}: {seconds:.1f} s whole; {len(found)} trials, {went_on} went on from a checkpoint, {dict(told)}, {faults} at fault",
+                    flush=True,
+                )
                 bad, counted = bad + faults, counted + len(found)
     print(f"{counted} trials, {bad} at fault")
     sys.exit(1 if bad else 0)

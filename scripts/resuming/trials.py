@@ -71,7 +71,9 @@ class Trial:
     def once(self, resume, moment, sent):
         """One run, sent a signal after a while if it is not done by then; its code."""
         every = f"{self.numbers.choice([20, 50, 100, 300])}ms"
-        child = start(self.program, [*self.arguments, *(["--resume"] if resume else [])], self.folder, self.scratch, every)
+        child = start(
+            self.program, [*self.arguments, *(["--resume"] if resume else [])], self.folder, self.scratch, every
+        )
         asked = None
         if sent is not None:
             try:
@@ -115,7 +117,11 @@ class Trial:
             self.compare(wanted)
         elif not (self.how == "damage" and code == REFUSED):
             self.faults.append(f"the last run ended with {code}")
-        left = [path.name for path in [*self.folder.iterdir(), *self.scratch.iterdir()] if path.name.startswith(".strandline")]
+        left = [
+            path.name
+            for path in [*self.folder.iterdir(), *self.scratch.iterdir()]
+            if path.name.startswith(".strandline")
+        ]
         if code == 0 and (self.folder / "out.zarr.checkpoint").exists():
             left.append("out.zarr.checkpoint")
         if left:
@@ -160,4 +166,3 @@ def unmount(small):
 
 def enlarge(small, size):
     subprocess.run(["mount", "-o", f"remount,size={size}", str(small)], check=True)
-
