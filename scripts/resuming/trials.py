@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import time
-from pathlib import Path
 
 # What tells times or the folder, and no result.
 VARYING = {"report.json", "report.html"}
