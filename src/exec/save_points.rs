@@ -139,9 +139,9 @@ impl SavePoint<'_> {
                 self.progress.note(&format!("a checkpoint of {} was taken; --resume goes on from it", bytes(written)));
             }
             Ok(_) => {}
-            Err(_) if is_last => {}
             Err(error) => {
-                self.progress.note(&format!("no checkpoint could be taken, the run goes on without: {error}"));
+                let what = if is_last { "before the end" } else { "the run goes on without" };
+                self.progress.note(&format!("no checkpoint could be taken, {what}: {error}"));
             }
         }
         self.cancel.end()
