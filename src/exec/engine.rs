@@ -13,7 +13,7 @@ use super::progress::heard::{OfRank, Progress};
 use super::progress::outlook::{Outlook, Running};
 use super::save_points::{SavePoint, SavePoints};
 use super::workers::Workers;
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::store::{Scratch, Traffic};
 
 /// What one stage of a run cost.
@@ -89,9 +89,13 @@ impl Engine {
         Self { saving: saving.filter(|_| self.ranks == 1), ..self }
     }
 
-    /// What was put by is not needed any more: all results are where they shall be.
-    pub fn forget_save_points(&self) {
-        self.saving.iter().for_each(|saving| saving.clear());
+    /// The run is over: what was put by goes, unless the run ended by something that can be mended: a signal, a
+    /// full disk, too little memory.
+    pub fn settle_save_points<R>(&self, result: &Result<R>) {
+        let is_final = |error: &Error| matches!(error.kind(), ErrorKind::Input | ErrorKind::Vanished);
+        if result.as_ref().err().is_none_or(is_final) {
+            self.saving.iter().for_each(|saving| saving.clear());
+        }
     }
 
     /// The engine of one of this engine's ranks: its share of the threads, at least one; the same window.

@@ -141,8 +141,8 @@ impl Job {
         engine.outlook().expect(with_page(self.stages::<P>(threads), self.args.job.output.store().is_some()));
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
+        engine.settle_save_points(&result);
         let found = result?;
-        engine.forget_save_points();
         if !self.args.job.output.quiet {
             let output = &self.args.job.output;
             let [labels_in, pairs_in] = ["", "meshes/pairs.csv"]

@@ -202,8 +202,8 @@ impl Job {
         engine.outlook().expect(with_page(plan(seconds, self.writes_fields()), self.writes_fields()));
         let result = self.solve_and_write(&engine);
         self.console.clear();
+        engine.settle_save_points(&result);
         let found = result?;
-        engine.forget_save_points();
         if !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)))?;
         }

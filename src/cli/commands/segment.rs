@@ -180,8 +180,8 @@ impl Job {
         ));
         let result = self.solve_and_write(&engine);
         self.console.clear();
+        engine.settle_save_points(&result);
         let outcome = result?;
-        engine.forget_save_points();
         if !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())))?;
         }
