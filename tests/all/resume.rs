@@ -140,9 +140,14 @@ fn there_may_be_nothing_to_go_on_with() {
     assert!(told.contains("give the store with -o"), "{told}");
     bench.succeed(&format!("{run} -o out/x.zarr --resume"));
     let before = contents(&bench.path("out/x.zarr"));
+    // As a run leaves it that is ended while it removes its checkpoints.
+    fs::create_dir(bench.path("out/x.zarr.checkpoint")).unwrap();
+    bench.write("out/x.zarr.checkpoint/lock", "");
+    bench.write("out/x.zarr.checkpoint/000007-0.bricks", "x");
     let report = fs::read(bench.path("out/x.zarr/report.json")).unwrap();
     bench.succeed(&format!("{run} -o out/x.zarr --resume"));
     same(&before, &contents(&bench.path("out/x.zarr")), "complete already");
+    assert_eq!(bench.entries("out"), ["x.zarr"]);
     assert_eq!(report, fs::read(bench.path("out/x.zarr/report.json")).unwrap(), "nothing ran");
     let told = bench.fail(&format!("{} -o out/x.zarr --resume", run.replace("0.02", "0.04")), 2);
     assert!(told.contains("is complete, and of another run: --spacing was 0.02 and is 0.04"), "{told}");

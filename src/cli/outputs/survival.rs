@@ -56,6 +56,12 @@ pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]
         && files.iter().all(is_there)
     {
         check_same(store, typed)?;
+        // That run may have been ended while it removed its checkpoints.
+        if let Some((rest, _)) =
+            folder.as_ref().and_then(|folder| Checkpoints::resume(folder, identity(typed).ok()?).ok())
+        {
+            rest.clear();
+        }
         let console = Console::new(Voice::of_run(output));
         console.note(&format!("{} is complete; there is nothing to go on with", store.display()));
         return Ok(true);
