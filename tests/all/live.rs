@@ -97,10 +97,9 @@ fn contents(store: &Path) -> Vec<(PathBuf, Vec<u8>)> {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 folders.push(path);
-            } else if path
-                .file_name()
-                .is_some_and(|name| !["zarr.json", "report.json", "report.html"].map(AsRef::as_ref).contains(&name))
-            {
+            } else if path.file_name().is_some_and(|name| {
+                !["zarr.json", "report.json", "report.html", "checksums.txt"].map(AsRef::as_ref).contains(&name)
+            }) {
                 found.push((path.strip_prefix(store).unwrap().to_path_buf(), fs::read(&path).unwrap()));
             }
         }

@@ -309,7 +309,10 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
             let path = entry.expect("the store is readable").path();
             if path.is_dir() {
                 folders.push(path);
-            } else if path.file_name().is_some_and(|name| name != "report.json" && name != "report.html") {
+            } else if path
+                .file_name()
+                .is_some_and(|name| name != "report.json" && name != "report.html" && name != "checksums.txt")
+            {
                 let name = path.strip_prefix(folder).expect("inside the folder").display().to_string();
                 found.push((name, std::fs::read(path).expect("the store is readable")));
             }

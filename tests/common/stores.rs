@@ -13,14 +13,14 @@ pub(crate) fn volume(group: &Path) -> Vec<f64> {
     image.read_box(0, &image.levels()[0].geometry.domain()).unwrap()
 }
 
-/// All files of a store but the report, with their contents.
+/// All files of a store but the report and the checksums, its among them, with their contents.
 pub(crate) fn contents(store: &Path) -> Vec<(String, Vec<u8>)> {
     fn walk(folder: &Path, root: &Path, found: &mut Vec<(String, Vec<u8>)>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 walk(&path, root, found);
-            } else if !path.ends_with("report.json") && !path.ends_with("report.html") {
+            } else if !["report.json", "report.html", "checksums.txt"].iter().any(|name| path.ends_with(name)) {
                 let name = path.strip_prefix(root).unwrap().to_str().unwrap().to_owned();
                 found.push((name, fs::read(&path).unwrap()));
             }

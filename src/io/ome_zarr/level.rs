@@ -11,6 +11,7 @@ use super::metadata;
 use super::pyramid::LevelPlan;
 use super::root::Root;
 use super::shard::{ChunkCodec, ShardLayout, encode_chunk, write_shard};
+use super::sums::{FileSum, Summing};
 use super::version::OmeVersion;
 use crate::error::Result;
 use crate::grid::{Box3, Geometry};
@@ -119,9 +120,15 @@ impl LevelWriter {
         if let Some(root) = &self.root {
             root.check_place().map_err(|error| error.at(&self.store))?;
         }
-        let bytes = write_whole(&self.shard_path(shard), |sink| write_shard(sink, chunks, self.layout, &self.codec))
-            .map_err(|error| error.at(&self.store))?;
-        self.root.iter().filter(|_| bytes > 0).for_each(|root| root.count());
+        let (path, mut sum) = (self.shard_path(shard), FileSum::default());
+        let bytes = write_whole(&path, |sink| {
+            let mut sink = Summing::new(sink);
+            let bytes = write_shard(&mut sink, chunks, self.layout, &self.codec)?;
+            sum = sink.sum;
+            Ok(bytes)
+        })
+        .map_err(|error| error.at(&self.store))?;
+        self.root.iter().for_each(|root| root.wrote(&path, sum));
         Ok(bytes)
     }
 

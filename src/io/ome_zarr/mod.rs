@@ -17,6 +17,7 @@ mod read;
 mod root;
 mod shard;
 mod store;
+mod sums;
 mod version;
 
 pub use abandoned::LONGEST_ENDING;
@@ -29,4 +30,5 @@ pub use read::{ImageReader, StoredLevel};
 pub use root::{Live, LiveState, Root, live};
 pub use shard::{joined_bytes, shard_bytes};
 pub use store::{ImageWriter, StoreWriter};
+pub use sums::{CHECKSUMS, FileSum, listed_sums, store_files};
 pub use version::OmeVersion;

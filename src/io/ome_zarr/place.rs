@@ -120,10 +120,13 @@ impl Place {
     }
 
     /// Puts what is whole into its place.
-    pub(super) fn finish(self, path: &Path, overwrite: bool) -> Result<()> {
-        if let Self::Live(standing) = &self {
-            standing.root.check_place().map_err(|error| error.at(path))?;
+    pub(super) fn finish(self, path: &Path, overwrite: bool, root: &Root) -> Result<()> {
+        match &self {
+            Self::Live(standing) => standing.root.check_place(),
+            // A live store says once more how far it is, so its sums come last.
+            Self::Hidden(_) => root.write_sums(),
         }
+        .map_err(|error| error.at(path))?;
         sync_tree(self.folder()).map_err(|error| error.at(path))?;
         match self {
             Self::Hidden(hidden) => hidden.finish(path, overwrite),
@@ -165,6 +168,7 @@ impl Standing {
         let _ = fs::remove_dir(self.path.join(GROWING));
         self.root.tell(LiveState::Complete, 1.0).map_err(|error| error.at(&self.path))?;
         self.finished = true;
+        self.root.write_sums().map_err(|error| error.at(&self.path))?;
         Ok(())
     }
 }

@@ -16,6 +16,7 @@ use crate::grid::{Box3, Geometry};
 pub struct ImageReader {
     folder: PathBuf,
     levels: Vec<StoredLevel>,
+    kind: Option<String>,
 }
 
 /// One resolution level as its metadata tells it.
@@ -27,6 +28,19 @@ pub struct StoredLevel {
     pub geometry: Geometry,
     /// The type of a voxel as Zarr names it.
     pub element: String,
+    /// Voxels of what is one file, `[x, y, z]`: a shard, or a chunk where there are none.
+    pub shard: [i64; 3],
+    /// What stands before the number of a shard in the path of its file.
+    prefix: &'static str,
+}
+
+impl StoredLevel {
+    /// The file that holds a voxel, as a path in the image's group.
+    #[must_use]
+    pub fn file_of(&self, voxel: [i64; 3]) -> String {
+        let [x, y, z]: [i64; 3] = std::array::from_fn(|a| voxel[a] / self.shard[a]);
+        format!("{}/{}{z}/{y}/{x}", self.path, self.prefix)
+    }
 }
 
 impl ImageReader {
@@ -47,7 +61,13 @@ impl ImageReader {
         let levels = read(multiscale)
             .filter(|levels| !levels.is_empty())
             .ok_or_else(|| Error::input("holds no OME-Zarr image with the axes z, y, x that can be read").at(group))?;
-        Ok(Self { folder: group.to_path_buf(), levels })
+        Ok(Self { folder: group.to_path_buf(), levels, kind: multiscale["type"].as_str().map(ToOwned::to_owned) })
+    }
+
+    /// How coarser levels are made, as the metadata say it: `mean` or `mode` of those that we wrote.
+    #[must_use]
+    pub fn kind(&self) -> Option<&str> {
+        self.kind.as_deref()
     }
 
     /// The levels, finest first.
@@ -110,7 +130,11 @@ fn axes(multiscale: &Value) -> Option<Option<String>> {
 fn level(group: &Path, dataset: &Value, unit: Option<String>) -> Option<StoredLevel> {
     let path = dataset["path"].as_str()?.to_owned();
     let document = |name: &str| read_json(&group.join(&path).join(name)).ok();
-    let array = document("zarr.json").or_else(|| document(".zarray"))?;
+    let (array, prefix) =
+        document("zarr.json").map(|array| (array, "c/")).or_else(|| Some((document(".zarray")?, "")))?;
+    let shard = xyz(&array["chunk_grid"]["configuration"]["chunk_shape"], Value::as_i64)
+        .or_else(|| xyz(&array["chunks"], Value::as_i64))
+        .filter(|shard: &[i64; 3]| shard.iter().all(|&n| n > 0))?;
     let transformations = dataset["coordinateTransformations"].as_array()?;
     let vector = |kind: &str| transformations.iter().find_map(|t| xyz(&t[kind], Value::as_f64));
     let geometry = Geometry {
@@ -120,7 +144,7 @@ fn level(group: &Path, dataset: &Value, unit: Option<String>) -> Option<StoredLe
         unit,
     };
     let element = array["data_type"].as_str().or_else(|| named_type(array["dtype"].as_str()?))?.to_owned();
-    Some(StoredLevel { path, geometry, element })
+    Some(StoredLevel { path, geometry, element, shard, prefix })
 }
 
 /// A list of z, y, x as a triple.

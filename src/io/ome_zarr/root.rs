@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::abandoned;
 use super::metadata;
+use super::sums::{FileSum, ShardSums};
 use super::version::OmeVersion;
 use crate::error::{Error, Result};
 
@@ -55,6 +56,7 @@ pub struct Root {
     version: OmeVersion,
     said: Mutex<Said>,
     written: AtomicU64,
+    sums: ShardSums,
     /// Device and number of a live store's folder: somebody may put another in its place.
     identity: OnceLock<(u64, u64)>,
 }
@@ -73,6 +75,7 @@ impl Root {
             version,
             said: Mutex::default(),
             written: AtomicU64::new(0),
+            sums: ShardSums::default(),
             identity: OnceLock::new(),
         }
     }
@@ -82,9 +85,19 @@ impl Root {
         self.version
     }
 
-    /// Counts a shard that was written.
-    pub(super) fn count(&self) {
-        self.written.fetch_add(1, Relaxed);
+    /// Counts a shard that was written at a path, with the sum of its bytes; one without a byte is none.
+    pub(super) fn wrote(&self, path: &Path, sum: FileSum) {
+        if sum.length > 0 {
+            self.written.fetch_add(1, Relaxed);
+        }
+        if let Ok(inside) = path.strip_prefix(&self.folder) {
+            self.sums.put(&inside.to_string_lossy().replace('\\', "/"), sum);
+        }
+    }
+
+    /// Writes the checksums of all files, which are whole.
+    pub(super) fn write_sums(&self) -> Result<()> {
+        self.sums.write(&self.folder)
     }
 
     /// From now on the store's folder has to be the one that is there.

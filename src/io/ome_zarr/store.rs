@@ -182,7 +182,7 @@ impl StoreWriter {
     /// When files cannot be written out to the disk or renamed, or something came to lie at the path meanwhile. The
     /// store that was there before stays then.
     pub fn finish(self) -> Result<()> {
-        self.place.finish(&self.path, self.overwrite)
+        self.place.finish(&self.path, self.overwrite, &self.root)
     }
 
     fn begin_labels(&self, spec: &LabelSpec<'_>) -> Result<ImageWriter> {

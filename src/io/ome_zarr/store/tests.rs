@@ -69,7 +69,7 @@ fn finished_stores_are_in_place_and_readable_by_others() {
     let path = folder.path().join("out.zarr");
     write_store(&path, false, 1).unwrap();
     assert_eq!(entries(folder.path()), ["out.zarr"]);
-    assert_eq!(entries(&path), ["0", "zarr.json"]);
+    assert_eq!(entries(&path), ["0", "checksums.txt", "zarr.json"]);
     assert!(path.join("0/c/0/0/0").is_file());
     let plain = folder.path().join("plain");
     fs::create_dir(&plain).unwrap();
