@@ -83,6 +83,7 @@ fn execute(cli: Cli, typed: &[String]) -> Result<()> {
         Command::Convert(args) => commands::convert::run(&args),
         Command::Measure(args) => commands::measure::run(&args),
         Command::Info(args) => commands::info::run(&args),
+        Command::Verify(args) => commands::verify::run(&args),
         #[cfg(feature = "viewer")]
         Command::View(args) => commands::view::run(&args),
         Command::Completions { shell } => commands::shell::completions(shell),

@@ -13,3 +13,4 @@ pub mod output;
 pub mod reconstruct;
 pub mod segment;
 pub mod surface;
+pub mod verify;

@@ -38,6 +38,7 @@ mod reconstruct;
 mod reconstruct_cli;
 mod surfaces;
 mod triangle_distance;
+mod verify;
 mod watershed;
 mod wavefront;
 

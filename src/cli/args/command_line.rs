@@ -9,6 +9,7 @@ use super::distance::DistanceJobArgs;
 use super::measure::MeasureArgs;
 use super::middle::MiddleArgs;
 use super::reconstruct::ReconstructArgs;
+use super::verify::VerifyArgs;
 #[cfg(feature = "viewer")]
 use super::view::ViewArgs;
 
@@ -46,6 +47,9 @@ pub(crate) enum Command {
     Measure(MeasureArgs),
     /// Tell what an input or output is: shape, axes, spacing, unit, type
     Info(InfoArgs),
+    /// Check a store: checksums, every chunk, pyramids, and labels and meshes against the fields they are of
+    #[command(after_help = HELP_ON_VERIFY)]
+    Verify(VerifyArgs),
     /// Look at results in the browser: stores, OME-Zarr of other programs, meshes
     #[cfg(feature = "viewer")]
     View(ViewArgs),
@@ -73,6 +77,7 @@ impl Command {
             Self::Demo(args) => args.log,
             Self::Convert(args) => args.log,
             Self::Batch(args) => args.log,
+            Self::Verify(args) => args.log,
             _ => return false,
         };
         log == LogArg::Json
@@ -87,6 +92,11 @@ Exit codes: 0 done, 1 the run failed, 2 wrong usage or unusable input, 3 some\no
 pub(crate) const HELP_ON_BATCH: &str = "\
 Exit codes: 0 all items are done, 1 the run failed, 2 wrong usage or a list with mistakes, 3 some items failed,
 130 interrupted, 143 terminated.";
+
+pub(crate) const HELP_ON_VERIFY: &str = "\
+Nothing of the store is changed.
+Exit codes: 0 all is well, 1 something is wrong, 2 there is no such store or it cannot be run again, 130 interrupted, 143
+terminated.";
 
 pub(crate) const HELP_ON_DISTANCE: &str = "\
 Lengths are those of the files; triples are x,y,z.

@@ -12,5 +12,6 @@ pub(crate) mod pages;
 pub(crate) mod reconstruct;
 pub(crate) mod survive;
 pub(crate) mod values;
+pub(crate) mod verify;
 #[cfg(feature = "viewer")]
 pub(crate) mod view;

@@ -12,5 +12,6 @@ pub(crate) mod reconstruct;
 pub(crate) mod segment;
 pub(crate) mod shell;
 pub(crate) mod store_contents;
+pub(crate) mod verify;
 #[cfg(feature = "viewer")]
 pub(crate) mod view;

@@ -7,7 +7,7 @@ pub mod cubes;
 pub mod mesh;
 pub mod multilabel;
 
-pub use cubes::marching_cubes::{MarchingCubes, cells_of_brick};
+pub use cubes::marching_cubes::{MarchingCubes, cells_of_brick, fraction};
 pub use mesh::clustering::{Clustered, Clustering};
 pub use mesh::components::Components;
 pub use mesh::edge_tally::EdgeTally;

@@ -124,7 +124,8 @@ struct Tile<'a> {
 /// Where the level is crossed on the way from the lower to the upper voxel, at least [`MARGIN`] off both.
 ///
 /// Both values and their order are the same for every brick that shares the edge, and so are the bits.
-fn fraction(lower: f32, upper: f32, level: f32) -> f64 {
+#[must_use]
+pub fn fraction(lower: f32, upper: f32, level: f32) -> f64 {
     let [lower, upper, level] = [lower, upper, level].map(f64::from);
     let at = (level - lower) / (upper - lower);
     if at.is_nan() { 0.5 } else { at.clamp(MARGIN, 1.0 - MARGIN) }
