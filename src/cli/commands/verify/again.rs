@@ -37,7 +37,7 @@ const OURS: [&str; 16] = [
     "brick",
     "resume",
     "checkpoint",
-    "checkpoints",
+    "checkpoint_every",
 ];
 /// Between two looks at the child.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
