@@ -7,8 +7,8 @@ import signal
 import subprocess
 import time
 
-# What tells times or the folder, and no result.
-VARYING = {"report.json", "report.html"}
+# What tells times or the folder, and no result, and the checksums of that.
+VARYING = {"report.json", "report.html", "checksums.txt"}
 # What a run may say that cannot go on: its checkpoint is none, and it says so.
 REFUSED = 2
 # A run that is terminated takes a checkpoint within so many seconds.
