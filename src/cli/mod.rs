@@ -42,7 +42,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         terminal::log::be_json();
     }
     let typed: Vec<String> = arguments.iter().map(|a| a.to_string_lossy().into_owned()).collect();
-    let ended = catch_unwind(AssertUnwindSafe(|| execute(cli, &typed)));
+    let ended = catch_unwind(AssertUnwindSafe(|| {
+        terminal::signals::listen_for_wishes()?;
+        execute(cli, &typed)
+    }));
     if !terminal::signals::speak_last() {
         // The process ends in another thread, which says so.
         loop {

@@ -294,7 +294,12 @@ fn a_second_signal_ends_what_runs() {
         let found = rows(&bench, "summary");
         let states: Vec<&str> = found.values().map(|row| row["state"].as_str().unwrap()).collect();
         assert_eq!(states, ["interrupted", "interrupted", "skipped"], "{said}");
-        assert!(!bench.entries("out").iter().any(|name| name.contains("zarr")), "{:?}", bench.entries("out"));
+        // One that is terminated may leave a checkpoint.
+        assert!(
+            !bench.entries("out").iter().any(|name| name.contains("zarr") && !name.ends_with(".zarr.checkpoint")),
+            "{:?}",
+            bench.entries("out")
+        );
         assert!(bench.entries("scratch").is_empty());
         bench.write("jobs.toml", LIST);
         assert_eq!(batch(&bench, "").2, ["a", "b", "c"]);

@@ -33,7 +33,7 @@ fn threads_and_memory_change_no_bit() {
     let cloud = random_cloud(&geometry, 40, 3);
     for method in Method::all() {
         let first = front::<f32>(&Lab::new(1), &geometry, &cloud, 16, method);
-        for (threads, window) in [(1, 512 << 10), (2, 512 << 10), (2, 1 << 30), (4, 1 << 30), (4, 512 << 10)] {
+        for (threads, window) in [(1, 64 << 10), (2, 64 << 10), (2, 1 << 30), (4, 1 << 30), (4, 64 << 10)] {
             let found = front::<f32>(&Lab::with_window(threads, window), &geometry, &cloud, 16, method);
             let what = format!("{}, {threads} threads, a window of {window} bytes", method.name());
             assert!(ranks(&found.values) == ranks(&first.values), "{what}: values differ");

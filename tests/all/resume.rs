@@ -91,6 +91,26 @@ fn other_runs_are_refused_with_the_difference() {
 }
 
 #[test]
+fn nothing_of_others_goes_without_leave() {
+    let bench = bench();
+    let run = RUNS[1];
+    terminated(&bench, run, 1);
+    bench.succeed("distance a.xyz --spacing 0.1 -o out/other.zarr");
+    let before = contents(&bench.path("out/other.zarr"));
+    let at = "--checkpoint out/x.zarr.checkpoint";
+    let told = bench.fail(&format!("{run} {at} -o out/other.zarr --resume"), 2);
+    assert!(told.contains("other.zarr: the output exists already"), "{told}");
+    bench.write("mine.json", "{}");
+    let told = bench.fail(&format!("{run} -o out/x.zarr --report mine.json --resume"), 2);
+    assert!(told.contains("mine.json: exists already"), "{told}");
+    same(&before, &contents(&bench.path("out/other.zarr")), "another run's store");
+    let told = bench.fail(&format!("{run} --checkpoint out/y.zarr/c -o out/y.zarr"), 2);
+    assert!(told.contains("lies in the store that the run writes"), "{told}");
+    let told = bench.fail("distance - --spacing 0.1 -o out/y.zarr --resume", 2);
+    assert!(told.contains("reads standard input"), "{told}");
+}
+
+#[test]
 fn a_checkpoint_can_be_asked_for() {
     let bench = bench();
     let run = RUNS[0];
@@ -142,7 +162,7 @@ fn there_may_be_nothing_to_go_on_with() {
     let before = contents(&bench.path("out/x.zarr"));
     // As a run leaves it that is ended while it removes its checkpoints.
     fs::create_dir(bench.path("out/x.zarr.checkpoint")).unwrap();
-    bench.write("out/x.zarr.checkpoint/lock", "");
+    bench.write("out/x.zarr.checkpoint/strandline.lock", "");
     bench.write("out/x.zarr.checkpoint/000007-0.bricks", "x");
     let report = fs::read(bench.path("out/x.zarr/report.json")).unwrap();
     bench.succeed(&format!("{run} -o out/x.zarr --resume"));
@@ -153,7 +173,7 @@ fn there_may_be_nothing_to_go_on_with() {
     assert!(told.contains("is complete, and of another run: --spacing was 0.02 and is 0.04"), "{told}");
     let folder = bench.path("held.checkpoint");
     fs::create_dir(&folder).unwrap();
-    let lock = fs::File::create(folder.join("lock")).unwrap();
+    let lock = fs::File::create(folder.join("strandline.lock")).unwrap();
     lock.lock().unwrap();
     let told = bench.fail(&format!("{run} -o out/y.zarr --checkpoint held.checkpoint"), 2);
     assert!(told.contains("belongs to a run that goes on"), "{told}");

@@ -31,9 +31,13 @@ pub(crate) enum Checkpoint {
 }
 
 impl FromStr for Checkpoint {
-    type Err = std::convert::Infallible;
+    type Err = &'static str;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(if text == "off" { Self::Off } else { Self::Folder(text.into()) })
+        match text {
+            "" => Err("an empty name; give a folder, or off"),
+            "off" => Ok(Self::Off),
+            folder => Ok(Self::Folder(folder.into())),
+        }
     }
 }

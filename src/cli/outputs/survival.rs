@@ -7,7 +7,7 @@ use crate::cli::args::common::OutputArgs;
 use crate::cli::args::survive::Checkpoint;
 use crate::cli::inputs::identity::identity;
 use crate::cli::terminal::console::{Console, Voice};
-use crate::cli::terminal::signals::wish_on_signal;
+use crate::cli::terminal::signals::wish;
 use crate::error::{Error, Result};
 use crate::exec::{Progress, SavePoints};
 use crate::io::ome_zarr::{LiveState, is_store, live};
@@ -40,6 +40,17 @@ pub(crate) fn checkpoints_of(store: &Path) -> PathBuf {
 pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>], typed: &[String]) -> Result<bool> {
     let folder = folder(output);
     let has_checkpoints = folder.as_deref().is_some_and(Checkpoints::lie_in);
+    if let (Some(folder), Some(store)) = (&folder, output.store())
+        && std::path::absolute(folder)
+            .ok()
+            .zip(std::path::absolute(store).ok())
+            .is_some_and(|(at, of)| at.starts_with(of))
+    {
+        return Err(Error::usage(
+            "is for checkpoints and lies in the store that the run writes; name another with --checkpoint",
+        )
+        .at(folder));
+    }
     if !output.survive.resume {
         return match &folder {
             Some(folder) if has_checkpoints && !output.overwrite => Err(Checkpoints::would_be_lost(folder)),
@@ -50,6 +61,11 @@ pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]
         let what = "--resume needs to know where the checkpoints are: give the store with -o that the run was to write, or their folder with --checkpoint";
         return Err(Error::usage(what));
     }
+    if identity(typed)?.is_none() {
+        let what =
+            "a run that reads standard input or a pipe takes no checkpoints and cannot be gone on with; give it a file";
+        return Err(Error::usage(what));
+    }
     let is_whole = |store: &Path| is_store(store) && live(store).is_none_or(|live| live.state == LiveState::Complete);
     let is_there = |file: &Option<PathBuf>| file.as_ref().is_none_or(|file| file.exists());
     if let Some(store) = output.store().filter(|store| is_whole(store) && !has_checkpoints)
@@ -58,7 +74,7 @@ pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]
         check_same(store, typed)?;
         // That run may have been ended while it removed its checkpoints.
         if let Some((rest, _)) =
-            folder.as_ref().and_then(|folder| Checkpoints::resume(folder, identity(typed).ok()?).ok())
+            folder.as_ref().and_then(|folder| Checkpoints::resume(folder, identity(typed).ok()??).ok())
         {
             rest.clear();
         }
@@ -66,8 +82,13 @@ pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]
         console.note(&format!("{} is complete; there is nothing to go on with", store.display()));
         return Ok(true);
     }
+    // Only what the run that is gone on with has begun or made may go without leave.
     let was_cut_off = |store: &Path| live(store).is_some_and(|live| live.state == LiveState::Interrupted);
-    output.overwrite |= has_checkpoints || output.store().is_some_and(was_cut_off);
+    let has_files = files.iter().flatten().any(|file| file.exists());
+    let may_go = |store: &Path| {
+        (was_cut_off(store) && !has_files) || (has_checkpoints && is_whole(store) && check_same(store, typed).is_ok())
+    };
+    output.overwrite |= output.store().is_some_and(may_go);
     Ok(false)
 }
 
@@ -76,8 +97,8 @@ fn check_same(store: &Path, typed: &[String]) -> Result<()> {
     let report = std::fs::read(store.join("report.json")).unwrap_or_default();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap_or_default();
     let made: Option<Vec<String>> = serde_json::from_value(report["arguments"].clone()).ok();
-    let then = made.map(|made| identity(&made)).transpose()?.unwrap_or_default();
-    let Some(difference) = difference(&then, &identity(typed)?) else { return Ok(()) };
+    let then = made.map(|made| identity(&made)).transpose()?.flatten().unwrap_or_default();
+    let Some(difference) = difference(&then, &identity(typed)?.unwrap_or_default()) else { return Ok(()) };
     let what = format!(
         "is complete, and of another run: {difference}; choose another output, or give --overwrite in place of --resume"
     );
@@ -94,7 +115,7 @@ pub(crate) fn save_points(
     console: &dyn Progress,
 ) -> Result<Option<Arc<SavePoints>>> {
     let Some(folder) = folder(output) else { return Ok(None) };
-    let identity = identity(typed)?;
+    let Some(identity) = identity(typed)? else { return Ok(None) };
     let checkpoints = if output.survive.resume {
         let (checkpoints, found) = Checkpoints::resume(&folder, identity)?;
         found.torn.iter().for_each(|torn| console.note(&format!("a checkpoint is passed over: {torn}")));
@@ -106,5 +127,5 @@ pub(crate) fn save_points(
     } else {
         Checkpoints::begin(&folder, identity, output.overwrite)?
     };
-    Ok(Some(Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish_on_signal()?))))
+    Ok(Some(Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish()))))
 }

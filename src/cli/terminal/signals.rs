@@ -3,9 +3,9 @@
 //! removed. A signal in the midst of that ends the process at once.
 
 use std::process::exit;
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::{Arc, LazyLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -68,11 +68,21 @@ pub(crate) fn cancel_on_signals() -> Result<Cancel> {
     Ok(cancel)
 }
 
-/// A flag that SIGUSR1 sets, with which schedulers say that the end is near: a checkpoint is wanted, and the run goes on.
-pub(crate) fn wish_on_signal() -> Result<Arc<AtomicBool>> {
-    let wish = Arc::new(AtomicBool::new(false));
-    flag::register(SIGUSR1, wish.clone()).map_err(|error| Error::from_io("cannot listen to signals", &error))?;
-    Ok(wish)
+/// Set by SIGUSR1, with which schedulers say that the end is near: a checkpoint is wanted, and the run goes on.
+static WISH: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+
+/// From now on SIGUSR1 ends nothing, whether or not there is something to put by.
+///
+/// # Errors
+/// When the system does not allow it.
+pub(crate) fn listen_for_wishes() -> Result<()> {
+    let listening = flag::register(SIGUSR1, WISH.clone());
+    listening.map(drop).map_err(|error| Error::from_io("cannot listen to signals", &error))
+}
+
+/// The flag that SIGUSR1 sets.
+pub(crate) fn wish() -> Arc<AtomicBool> {
+    WISH.clone()
 }
 
 /// Whether whoever started the process asked that a signal be passed over, as `nohup` does.

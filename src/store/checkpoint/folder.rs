@@ -1,13 +1,14 @@
 //! The folder of a run's checkpoints: what is written into it, and what a later run finds there.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
+use super::lock::{LOCK, lock};
 use super::payload::{self, SavedField};
 use super::record;
 use crate::error::{Error, Result};
@@ -65,6 +66,8 @@ pub struct Checkpoints {
 #[derive(Default)]
 struct State {
     lock: Option<File>,
+    /// Whether this run made the folder.
+    is_made: bool,
     /// Of the last manifest.
     number: u64,
     entries: BTreeMap<String, Entry>,
@@ -81,6 +84,9 @@ impl Checkpoints {
         let there = numbers(folder);
         if !there.is_empty() && !replace {
             return Err(Self::would_be_lost(folder));
+        }
+        if folder.symlink_metadata().is_ok() && !folder.is_dir() {
+            return Err(Error::usage("is no folder; name one for checkpoints").at(folder));
         }
         let state = State { lock: lock(folder)?, ..State::default() };
         let checkpoints = Self { folder: folder.to_path_buf(), identity, state: Mutex::new(state) };
@@ -163,8 +169,13 @@ impl Checkpoints {
     ) -> io::Result<u64> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if state.lock.is_none() {
+            state.is_made = !self.folder.is_dir();
             fs::create_dir_all(&self.folder)?;
             state.lock = lock(&self.folder).map_err(io::Error::other)?;
+            if !numbers(&self.folder).is_empty() {
+                state.lock = None;
+                return Err(io::Error::other("another run has put checkpoints into the same folder meanwhile"));
+            }
         }
         let number = state.number + 1;
         // What a number that was not finished has left must not stand in the way of the next.
@@ -218,41 +229,18 @@ impl Checkpoints {
     pub fn clear(&self) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         (state.entries, state.kept) = (BTreeMap::new(), BTreeMap::new());
-        if state.lock.is_none() && !self.folder.is_dir() {
+        // What lies there without this run's lock is another one's.
+        if state.lock.is_none() {
             return;
         }
         self.drop_older(&mut state);
         remove_abandoned(&self.folder);
         let _ = fs::remove_file(self.folder.join(LOCK));
-        let _ = fs::remove_dir(&self.folder);
+        if state.is_made || self.folder.extension().is_some_and(|ending| ending == "checkpoint") {
+            let _ = fs::remove_dir(&self.folder);
+        }
         state.lock = None;
     }
-}
-
-const LOCK: &str = "lock";
-
-/// Takes the lock of a folder that is there. It goes with the process.
-fn lock(folder: &Path) -> Result<Option<File>> {
-    if !folder.is_dir() {
-        return Ok(None);
-    }
-    let path = folder.join(LOCK);
-    let failed = |error: &io::Error| {
-        Error::from_io("cannot be written; name another folder with --checkpoint", error).at(folder)
-    };
-    let mut file = File::options().create(true).truncate(false).write(true).open(&path).map_err(|e| failed(&e))?;
-    // A disk without locks has none for others either.
-    if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
-        let who = fs::read_to_string(&path).unwrap_or_default();
-        let what = format!("belongs to a run that goes on ({}); wait for it, or name another output", who.trim());
-        return Err(Error::usage(what).at(folder));
-    }
-    let read = |path: &str| fs::read_to_string(path).unwrap_or_default().trim().to_owned();
-    let (host, boot) = (read("/proc/sys/kernel/hostname"), read("/proc/sys/kernel/random/boot_id"));
-    file.set_len(0)
-        .and_then(|()| writeln!(file, "host {host}, process {}, boot {boot}", std::process::id()))
-        .map_err(|e| failed(&e))?;
-    Ok(Some(file))
 }
 
 fn manifest_name(number: u64) -> String {
@@ -269,9 +257,11 @@ fn numbers(folder: &Path) -> Vec<u64> {
 
 /// The names in a folder that are those of checkpoints.
 fn names(folder: &Path) -> Vec<String> {
+    let is_number = |digits: &str| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
     let is_ours = |name: &String| {
-        let is_number = |stem: &str| !stem.is_empty() && stem.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
-        ENDINGS.iter().any(|ending| name.strip_suffix(ending).is_some_and(is_number))
+        let of_field = name.strip_suffix(ENDINGS[1]).and_then(|stem| stem.split_once('-'));
+        let is_field = of_field.is_some_and(|(number, n)| number.len() >= 6 && is_number(number) && is_number(n));
+        is_field || name.strip_suffix(ENDINGS[0]).is_some_and(|number| number.len() >= 6 && is_number(number))
     };
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     entries.filter_map(|entry| entry.file_name().into_string().ok()).filter(is_ours).collect()
@@ -335,7 +325,7 @@ mod tests {
     #[test]
     fn a_run_goes_on_from_the_last_whole_checkpoint() {
         let dir = tempfile::tempdir().unwrap();
-        let folder = dir.path().join("c");
+        let folder = dir.path().join("c.checkpoint");
         let scratch = Scratch::new(dir.path(), 1 << 30);
         made(&folder, &scratch);
         assert_eq!(numbers(&folder), [3, 4]);
@@ -383,8 +373,28 @@ mod tests {
         assert!(error.contains("give --resume to go on with it"), "{error}");
         let (_, found) = Checkpoints::resume(&dir.path().join("nowhere"), identity("2")).unwrap();
         assert_eq!(found, Found::default());
-        fs::write(folder.join("mine.txt"), "x").unwrap();
+        let mine = ["mine.txt", "2024-11-05.bricks", "lock"];
+        for name in mine {
+            fs::write(folder.join(name), "x").unwrap();
+        }
         drop(Checkpoints::begin(&folder, identity("3"), true).unwrap());
-        assert!(numbers(&folder).is_empty() && folder.join("mine.txt").exists());
+        assert!(numbers(&folder).is_empty() && mine.iter().all(|name| folder.join(name).exists()));
+    }
+
+    #[test]
+    fn runs_that_began_in_one_folder_leave_each_others_checkpoints() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("c");
+        let [first, second] = ["2", "3"].map(|spacing| Checkpoints::begin(&folder, identity(spacing), false).unwrap());
+        first.save("moving", vec![1], &[], &|| Ok(())).unwrap();
+        let refused = second.save("moving", vec![2], &[], &|| Ok(())).unwrap_err().to_string();
+        assert!(refused.contains("belongs to a run that goes on"), "{refused}");
+        second.clear();
+        assert_eq!(numbers(&folder), [1]);
+        drop(first);
+        let refused = second.save("moving", vec![2], &[], &|| Ok(())).unwrap_err().to_string();
+        assert!(refused.contains("another run has put checkpoints"), "{refused}");
+        second.clear();
+        assert_eq!(numbers(&folder), [1]);
     }
 }

@@ -1,7 +1,7 @@
 //! Checkpoints: what a run has solved so far, kept in a folder of files so that a run after it goes on from there with the same
 //! bits.
 //!
-//!     DIR/lock                    held by the run that works in the folder
+//!     DIR/strandline.lock         held by the run that works in the folder
 //!     DIR/000007.checkpoint       a manifest: who made it, and its entries (record)
 //!     DIR/000006-1-0.bricks       the bricks of a field (payload); manifests that follow each other share those that did not change
 //!
@@ -10,6 +10,7 @@
 //! one before is taken.
 
 mod folder;
+mod lock;
 mod payload;
 mod record;
 

@@ -13,7 +13,8 @@ use crate::cli::args::command_line::{Cli, Command};
 use crate::cli::args::common::ResourceArgs;
 
 /// Keys that are the batch's to give.
-const ITS_OWN: [&str; 8] = ["output", "overwrite", "report", "log", "dry_run", "quiet", "verbose", "resume"];
+const ITS_OWN: [&str; 9] =
+    ["output", "overwrite", "report", "log", "dry_run", "quiet", "verbose", "resume", "checkpoint"];
 
 /// A command that an item may be of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
