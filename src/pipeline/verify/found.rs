@@ -21,7 +21,7 @@ pub struct Check {
     pub name: String,
     /// What was compared, and what this check cannot decide.
     pub told: String,
-    /// What is wrong, at most [`MOST`].
+    /// What is wrong, at most `MOST`.
     pub faults: Vec<Fault>,
     /// How many more are wrong.
     pub more: u64,

@@ -121,7 +121,7 @@ struct Tile<'a> {
     part: Box3,
 }
 
-/// Where the level is crossed on the way from the lower to the upper voxel, at least [`MARGIN`] off both.
+/// Where the level is crossed on the way from the lower to the upper voxel, at least `MARGIN` off both.
 ///
 /// Both values and their order are the same for every brick that shares the edge, and so are the bits.
 #[must_use]
