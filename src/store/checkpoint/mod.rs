@@ -1,9 +1,11 @@
 //! Checkpoints: what a run has solved so far, kept in a folder of files so that a run after it goes on from there with the same
 //! bits.
 //!
-//!     DIR/strandline.lock         held by the run that works in the folder
-//!     DIR/000007.checkpoint       a manifest: who made it, and its entries (record)
-//!     DIR/000006-1-0.bricks       the bricks of a field (payload); manifests that follow each other share those that did not change
+//! ```text
+//! DIR/strandline.lock         held by the run that works in the folder
+//! DIR/000007.checkpoint       a manifest: who made it, and its entries (record)
+//! DIR/000006-1-0.bricks       the bricks of a field (payload); manifests that follow each other share those that did not change
+//! ```
 //!
 //! An entry is one stage: what it knows, packed, and the fields that it works on. Everything is written beside, flushed and
 //! renamed, never in place; the last two manifests are kept with what they name. A torn one is known by its checksums, and the
