@@ -1,5 +1,5 @@
 //! What an input is: its length, its times, and what it holds, as a hash. Files whose length and times are what they were are
-//! taken for unchanged and not read again; of others the hash decides. A folder (a store, slices) is all the files in it.
+//! taken for unchanged and not read again; of others the hash decides. An input of several files is all of them.
 
 use std::fs::{self, File, Metadata};
 use std::io::{self, Read};
@@ -9,6 +9,8 @@ use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
 use serde::{Deserialize, Serialize};
+
+use crate::cli::inputs::content::files_of;
 
 /// Bytes that are read at a time.
 const PIECE: usize = 1 << 18;
@@ -25,7 +27,7 @@ pub(crate) struct Input {
 }
 
 /// What can be told of an input without reading it: bytes, and when its content and its entry changed last, in seconds and
-/// nanoseconds; of a folder the sum, the latest, and a hash of those of all its files.
+/// nanoseconds; of several files the sum, the latest, and a hash of those of all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Looks {
     pub(crate) length: u64,
@@ -50,12 +52,12 @@ impl Looks {
     /// # Errors
     /// When it is not there or cannot be looked at.
     pub(crate) fn of(path: &Path) -> io::Result<Self> {
-        let is = fs::metadata(path)?;
-        if !is.is_dir() {
-            return Ok(Self::of_file(&is));
+        let files = files_of(path)?;
+        if let [(_, file)] = files.as_slice() {
+            return Ok(Self::of_file(&fs::metadata(file)?));
         }
         let (mut all, mut hasher) = (Self::default(), blake3::Hasher::new());
-        for (name, file) in files(path)? {
+        for (name, file) in files {
             let one = Self::of_file(&fs::metadata(&file)?);
             hasher.update(format!("{}\0{}\0{:?}{:?}\n", name.display(), one.length, one.mtime, one.ctime).as_bytes());
             all.length += one.length;
@@ -71,17 +73,17 @@ impl Looks {
 /// When it cannot be read.
 pub(crate) fn hash(path: &Path, stop: &AtomicBool) -> io::Result<Option<String>> {
     let mut hasher = blake3::Hasher::new();
-    let is_whole = if fs::metadata(path)?.is_dir() {
-        let mut is_whole = true;
-        for (name, file) in files(path)? {
+    let files = files_of(path)?;
+    let mut is_whole = true;
+    if let [(_, file)] = files.as_slice() {
+        is_whole = take(&mut hasher, file, stop)?;
+    } else {
+        for (name, file) in files {
             let mut one = blake3::Hasher::new();
             is_whole &= take(&mut one, &file, stop)?;
             hasher.update(format!("{}\0{}\n", name.display(), one.finalize().to_hex()).as_bytes());
         }
-        is_whole
-    } else {
-        take(&mut hasher, path, stop)?
-    };
+    }
     Ok(is_whole.then(|| hasher.finalize().to_hex().to_string()))
 }
 
@@ -97,25 +99,6 @@ fn take(hasher: &mut blake3::Hasher, path: &Path, stop: &AtomicBool) -> io::Resu
             n => hasher.update(&piece[..n]),
         };
     }
-}
-
-/// All files below a folder, by their paths in it, in order.
-fn files(folder: &Path) -> io::Result<Vec<(PathBuf, PathBuf)>> {
-    let (mut found, mut left) = (Vec::new(), vec![PathBuf::new()]);
-    while let Some(within) = left.pop() {
-        for entry in fs::read_dir(folder.join(&within))? {
-            let entry = entry?;
-            let name = within.join(entry.file_name());
-            // Links to folders are not followed: they may go round.
-            if entry.file_type()?.is_dir() {
-                left.push(name);
-            } else if fs::metadata(entry.path()).is_ok_and(|is| is.is_file()) {
-                found.push((name, entry.path()));
-            }
-        }
-    }
-    found.sort();
-    Ok(found)
 }
 
 /// Reads the inputs of an item that runs meanwhile. What changes under it has no hash, and is taken for changed next time.

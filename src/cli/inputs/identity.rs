@@ -1,23 +1,23 @@
 //! What tells one run from another: the program's version, what was asked for, and what its inputs hold. A run is gone on with only
 //! by its equal.
 
-use std::fs::{self, File, Metadata};
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::UNIX_EPOCH;
 
 use clap::CommandFactory;
 use clap::builder::ValueParser;
 use clap::parser::ValueSource;
 
+use super::content::files_of;
 use crate::cli::args::command_line::Cli;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::sources::is_standard_input;
-use crate::job::resources::folder_of;
 use crate::store::checkpoint::Identity;
 
 /// What changes neither what is solved nor on which bricks: how it is run, told and written.
-const WITHOUT_EFFECT: [&str; 20] = [
+const WITHOUT_EFFECT: [&str; 19] = [
     "checkpoint",
     "checkpoint_every",
     "compress",
@@ -37,16 +37,15 @@ const WITHOUT_EFFECT: [&str; 20] = [
     "scratch",
     "threads",
     "verbose",
-    "vti",
 ];
 
-/// Files are read in pieces of so many bytes, all of them up to so many.
-const PIECE: u64 = 1 << 20;
-const WHOLE: u64 = 1 << 10;
-/// Of a larger file so many pieces are looked at, beside its length and time.
+/// Files of so many bytes are read whole.
+const WHOLE: u64 = 1 << 30;
+/// Of larger ones so many pieces of so many bytes are, beside their length and time.
 const PIECES: u64 = 64;
-/// No header is longer.
-const HEADER: u64 = 1 << 16;
+const PIECE: usize = 1 << 20;
+/// Digits of a hash that are told.
+const HASH_DIGITS: usize = 16;
 
 /// The identity of the run that was typed.
 ///
@@ -90,95 +89,48 @@ fn told(value: &Path) -> Result<Option<String>> {
         return Ok(None);
     }
     let name = value.file_name().unwrap_or(value.as_os_str()).to_string_lossy();
-    let digest = digest(value, &metadata).map_err(|error| Error::from_io("cannot be read", &error).at(value))?;
+    let digest = digest(value).map_err(|error| Error::from_io("cannot be read", &error).at(value))?;
     Ok(Some(format!("{name} ({digest})")))
 }
 
-fn digest(path: &Path, metadata: &Metadata) -> io::Result<String> {
-    let mut sum = 0;
-    let mut bytes = 0;
-    if metadata.is_dir() {
-        add_folder(path, &mut sum, &mut bytes)?;
-    } else if metadata.is_file() {
-        bytes = metadata.len();
-        sum = add_file(path, sum, metadata)?;
-        // Values that lie in other files than their header.
-        for other in detached(path)? {
-            let metadata = other.metadata()?;
-            bytes += metadata.len();
-            sum = add_file(&other, sum, &metadata)?;
-        }
+/// The names, lengths and contents of an input's files.
+fn digest(input: &Path) -> io::Result<String> {
+    let (mut hasher, mut bytes) = (blake3::Hasher::new(), 0);
+    for (name, path) in files_of(input)? {
+        hasher.update(name.as_os_str().as_encoded_bytes());
+        bytes += add_file(&mut hasher, &path)?;
     }
-    Ok(format!("{bytes} bytes, checksum {sum:08x}"))
+    Ok(format!("{bytes} bytes, hash {}", &hasher.finalize().to_hex()[..HASH_DIGITS]))
 }
 
-/// The names and lengths of the files in a folder, and what small ones hold, in the order of their names.
-fn add_folder(folder: &Path, sum: &mut u32, bytes: &mut u64) -> io::Result<()> {
-    let mut entries: Vec<_> = fs::read_dir(folder)?.collect::<io::Result<_>>()?;
-    entries.sort_by_key(fs::DirEntry::file_name);
-    for entry in entries {
-        let path = entry.path();
-        let metadata = fs::metadata(&path)?;
-        *sum = crc32c::crc32c_append(*sum, entry.file_name().as_encoded_bytes());
-        if metadata.is_dir() {
-            add_folder(&path, sum, bytes)?;
-        } else if metadata.is_file() {
-            *bytes += metadata.len();
-            *sum = add_file(&path, *sum, &metadata)?;
-        }
-    }
-    Ok(())
-}
-
-/// What a file holds: all of it, or, of a large one, its time and pieces from its first byte to its last.
-fn add_file(path: &Path, sum: u32, metadata: &Metadata) -> io::Result<u32> {
+/// What a file holds: all of it, or, of a large one, its time and pieces from its first byte to its last. Returns its bytes.
+fn add_file(hasher: &mut blake3::Hasher, path: &Path) -> io::Result<u64> {
     let mut file = File::open(path)?;
+    let metadata = file.metadata()?;
     let bytes = metadata.len();
-    let mut sum = crc32c::crc32c_append(sum, &bytes.to_le_bytes());
-    let all = bytes.div_ceil(PIECE);
-    let (count, step) = if all <= WHOLE { (all, PIECE) } else { (PIECES, (bytes - PIECE) / (PIECES - 1)) };
-    if all > WHOLE {
-        let time = metadata.modified()?.duration_since(UNIX_EPOCH).unwrap_or_default();
-        sum = crc32c::crc32c_append(sum, &time.as_nanos().to_le_bytes());
+    hasher.update(&bytes.to_le_bytes());
+    if bytes <= WHOLE {
+        hasher.update_reader(file)?;
+        return Ok(bytes);
     }
-    let mut piece = Vec::new();
-    for n in 0..count {
+    let time = metadata.modified()?.duration_since(UNIX_EPOCH).unwrap_or_default();
+    hasher.update(&time.as_nanos().to_le_bytes());
+    let mut piece = vec![0; PIECE];
+    for n in 0..PIECES {
         // The last one ends with the file.
-        let at = if all > WHOLE && n + 1 == count { bytes - PIECE } else { n * step };
-        file.seek(SeekFrom::Start(at))?;
-        piece.clear();
-        file.by_ref().take(PIECE).read_to_end(&mut piece)?;
-        sum = crc32c::crc32c_append(sum, &piece);
+        file.seek(SeekFrom::Start((bytes - PIECE as u64) / (PIECES - 1) * n))?;
+        if n + 1 == PIECES {
+            file.seek(SeekFrom::End(-(PIECE as i64)))?;
+        }
+        file.read_exact(&mut piece)?;
+        hasher.update(&piece);
     }
-    Ok(sum)
-}
-
-/// The files that an NRRD header names as those of its values; of a list or a pattern all files beside it.
-fn detached(header: &Path) -> io::Result<Vec<PathBuf>> {
-    let mut start = Vec::new();
-    File::open(header)?.take(HEADER).read_to_end(&mut start)?;
-    if !start.starts_with(b"NRRD") {
-        return Ok(Vec::new());
-    }
-    let text = String::from_utf8_lossy(&start);
-    let text = text.split("\n\n").next().unwrap_or_default();
-    let named = text.lines().find_map(|line| {
-        let (key, value) = line.split_once(':')?;
-        matches!(key.trim().to_lowercase().as_str(), "data file" | "datafile").then(|| value.trim())
-    });
-    let Some(named) = named else { return Ok(Vec::new()) };
-    let folder = folder_of(header);
-    if !named.starts_with("LIST") && !named.contains('%') {
-        return Ok(vec![folder.join(named)].into_iter().filter(|path| path.is_file()).collect());
-    }
-    let entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
-    let mut files: Vec<_> = entries.into_iter().map(|entry| entry.path()).filter(|path| path.is_file()).collect();
-    files.sort();
-    Ok(files)
+    Ok(bytes)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
     use std::os::unix::fs::FileExt;
 
     use super::*;
@@ -210,7 +162,8 @@ mod tests {
             |words: &[&str]| ["strandline"].iter().chain(words).map(|word| (*word).to_owned()).collect::<Vec<_>>();
         assert!(identity(&typed(&["distance", "-", "-o", "a.zarr"])).unwrap().is_none());
         let (header, values) = (dir.path().join("v.nhdr"), dir.path().join("v.raw"));
-        fs::write(&header, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 2\ndata file: v.raw\n").unwrap();
+        fs::write(&header, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 2\nencoding: raw\ndata file: v.raw\n\n")
+            .unwrap();
         fs::write(&values, [1, 2]).unwrap();
         let marks = dir.path().join("30");
         fs::write(&marks, "1").unwrap();
@@ -226,22 +179,31 @@ mod tests {
     fn large_files_are_looked_at_from_the_first_byte_to_the_last() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("large");
-        let length = (WHOLE + 5) * PIECE + 12_345;
+        let length = WHOLE + 5_012_345;
         let file = File::options().create_new(true).read(true).write(true).open(&path).unwrap();
         file.set_len(length).unwrap();
         let time = fs::metadata(&path).unwrap().modified().unwrap();
-        let sum = |file: &File| {
+        let hash = |time| {
             file.set_modified(time).unwrap();
-            add_file(&path, 0, &fs::metadata(&path).unwrap()).unwrap()
+            digest(&path).unwrap()
         };
-        let before = sum(&file);
+        let before = hash(time);
         for at in [0, length - 1] {
             file.write_all_at(&[8], at).unwrap();
-            assert_ne!(sum(&file), before, "byte {at}");
+            assert_ne!(hash(time), before, "byte {at}");
             file.write_all_at(&[0], at).unwrap();
         }
-        assert_eq!(sum(&file), before);
-        file.set_modified(time + std::time::Duration::from_secs(1)).unwrap();
-        assert_ne!(add_file(&path, 0, &fs::metadata(&path).unwrap()).unwrap(), before, "its time");
+        assert_eq!(hash(time), before);
+        assert_ne!(hash(time + std::time::Duration::from_secs(1)), before, "its time");
+    }
+
+    #[test]
+    fn what_has_no_effect_is_a_flag_of_some_command() {
+        let command = Cli::command();
+        let is_flag =
+            |id: &str| command.get_subcommands().any(|one| one.get_arguments().any(|flag| flag.get_id() == id));
+        for id in WITHOUT_EFFECT {
+            assert!(is_flag(id), "{id}");
+        }
     }
 }

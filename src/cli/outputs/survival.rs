@@ -11,7 +11,7 @@ use crate::cli::terminal::signals::wish;
 use crate::error::{Error, Result};
 use crate::exec::{Progress, SavePoints};
 use crate::io::ome_zarr::{LiveState, is_store, live};
-use crate::store::checkpoint::{Checkpoints, difference};
+use crate::store::checkpoint::{Checkpoints, Identity, difference};
 
 /// What follows the name of a store in that of the folder of its run's checkpoints.
 const ENDING: &str = ".checkpoint";
@@ -40,17 +40,7 @@ pub(crate) fn checkpoints_of(store: &Path) -> PathBuf {
 pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>], typed: &[String]) -> Result<bool> {
     let folder = folder(output);
     let has_checkpoints = folder.as_deref().is_some_and(Checkpoints::lie_in);
-    if let (Some(folder), Some(store)) = (&folder, output.store())
-        && std::path::absolute(folder)
-            .ok()
-            .zip(std::path::absolute(store).ok())
-            .is_some_and(|(at, of)| at.starts_with(of))
-    {
-        return Err(Error::usage(
-            "is for checkpoints and lies in the store that the run writes; name another with --checkpoint",
-        )
-        .at(folder));
-    }
+    check_apart(folder.as_deref(), output.store())?;
     if !output.survive.resume {
         return match &folder {
             Some(folder) if has_checkpoints && !output.overwrite => Err(Checkpoints::would_be_lost(folder)),
@@ -61,21 +51,19 @@ pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]
         let what = "--resume needs to know where the checkpoints are: give the store with -o that the run was to write, or their folder with --checkpoint";
         return Err(Error::usage(what));
     }
-    if identity(typed)?.is_none() {
+    let Some(identity) = identity(typed)? else {
         let what =
             "a run that reads standard input or a pipe takes no checkpoints and cannot be gone on with; give it a file";
         return Err(Error::usage(what));
-    }
+    };
     let is_whole = |store: &Path| is_store(store) && live(store).is_none_or(|live| live.state == LiveState::Complete);
     let is_there = |file: &Option<PathBuf>| file.as_ref().is_none_or(|file| file.exists());
     if let Some(store) = output.store().filter(|store| is_whole(store) && !has_checkpoints)
         && files.iter().all(is_there)
     {
-        check_same(store, typed)?;
+        check_same(store, &identity)?;
         // That run may have been ended while it removed its checkpoints.
-        if let Some((rest, _)) =
-            folder.as_ref().and_then(|folder| Checkpoints::resume(folder, identity(typed).ok()??).ok())
-        {
+        if let Some((rest, _)) = folder.and_then(|folder| Checkpoints::resume(&folder, identity).ok()) {
             rest.clear();
         }
         let console = Console::new(Voice::of_run(output));
@@ -85,20 +73,30 @@ pub(crate) fn finished_before(output: &mut OutputArgs, files: &[Option<PathBuf>]
     // Only what the run that is gone on with has begun or made may go without leave.
     let was_cut_off = |store: &Path| live(store).is_some_and(|live| live.state == LiveState::Interrupted);
     let has_files = files.iter().flatten().any(|file| file.exists());
-    let may_go = |store: &Path| {
-        (was_cut_off(store) && !has_files) || (has_checkpoints && is_whole(store) && check_same(store, typed).is_ok())
-    };
-    output.overwrite |= output.store().is_some_and(may_go);
+    let was_made = |store: &Path| has_checkpoints && is_whole(store) && check_same(store, &identity).is_ok();
+    output.overwrite |= output.store().is_some_and(|store| (was_cut_off(store) && !has_files) || was_made(store));
     Ok(false)
 }
 
+/// Refuses checkpoints within the store that the run writes.
+fn check_apart(folder: Option<&Path>, store: Option<&Path>) -> Result<()> {
+    let full = |path: Option<&Path>| path.and_then(|path| std::path::absolute(path).ok());
+    match full(folder).zip(full(store)) {
+        Some((folder, store)) if folder.starts_with(&store) => {
+            let what = "is for checkpoints and lies in the store that the run writes; name another with --checkpoint";
+            Err(Error::usage(what).at(&folder))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Refuses to take a finished store for that of the run that was typed where another one made it.
-fn check_same(store: &Path, typed: &[String]) -> Result<()> {
+fn check_same(store: &Path, now: &Identity) -> Result<()> {
     let report = std::fs::read(store.join("report.json")).unwrap_or_default();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap_or_default();
     let made: Option<Vec<String>> = serde_json::from_value(report["arguments"].clone()).ok();
     let then = made.map(|made| identity(&made)).transpose()?.flatten().unwrap_or_default();
-    let Some(difference) = difference(&then, &identity(typed)?.unwrap_or_default()) else { return Ok(()) };
+    let Some(difference) = difference(&then, now) else { return Ok(()) };
     let what = format!(
         "is complete, and of another run: {difference}; choose another output, or give --overwrite in place of --resume"
     );

@@ -10,3 +10,5 @@ pub(super) mod units;
 pub mod volume;
 pub mod write;
 pub mod zarr;
+
+pub(crate) use raw::nrrd::file_of_voxels;

@@ -41,6 +41,12 @@ pub(crate) fn open(path: &Path, select: Select) -> Result<Box<dyn Stack>> {
     Ok(Box::new(RawVolume::new(path, info(&fields, volumes), stored)?))
 }
 
+/// The file in which a header says that its voxels lie, where that is another one; none where the file is no such header.
+pub(crate) fn file_of_voxels(path: &Path) -> Option<PathBuf> {
+    let fields = nrrd_fields::parse(BufReader::new(File::open(path).ok()?)).ok()?;
+    voxels(path, &fields).ok()?.0
+}
+
 fn info(fields: &Fields, volumes: u64) -> StackInfo {
     StackInfo {
         shape: [0, 1, 2].map(|axis| fields.sizes[axis] as i64),
