@@ -28,16 +28,22 @@ const BUFFER: usize = 1 << 20;
 #[derive(Serialize, Deserialize)]
 struct Manifest {
     identity: Identity,
-    entries: Vec<Entry>,
+    /// By stage.
+    entries: BTreeMap<String, Entry>,
+}
+
+impl Manifest {
+    /// The files that it names.
+    fn files(&self) -> impl Iterator<Item = &FileOf> {
+        self.entries.values().flat_map(|entry| &entry.files)
+    }
 }
 
 /// What a stage has put by.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Entry {
-    /// The stage.
-    pub key: String,
-    /// What it knows, [packed](super::pack).
-    pub facts: Vec<u8>,
+struct Entry {
+    /// What it knows, packed.
+    facts: Vec<u8>,
     files: Vec<FileOf>,
 }
 
@@ -133,15 +139,18 @@ impl Checkpoints {
                 );
                 return Err(Error::usage(what).at(folder));
             }
-            let files = || manifest.entries.iter().flat_map(|entry| &entry.files);
-            if let Some((name, error)) = files().find_map(|file| Some((&file.name, whole(folder, file).err()?))) {
+            // Of those before the one that is taken nothing is read.
+            if state.entries.is_empty()
+                && let Some((name, error)) =
+                    manifest.files().find_map(|file| Some((&file.name, whole(folder, file).err()?)))
+            {
                 found.torn.push(format!("{}: {error}", folder.join(name).display()));
                 continue;
             }
-            state.kept.insert(number, files().map(|file| file.name.clone()).collect());
+            state.kept.insert(number, manifest.files().map(|file| file.name.clone()).collect());
             if state.entries.is_empty() {
                 found.stages = manifest.entries.len();
-                state.entries = manifest.entries.into_iter().map(|entry| (entry.key.clone(), entry)).collect();
+                state.entries = manifest.entries;
             }
         }
         Ok((Self { folder: folder.to_path_buf(), identity, state: Mutex::new(state) }, found))
@@ -188,14 +197,13 @@ impl Checkpoints {
         }
         let bytes = files.iter().map(|file| file.bytes).sum();
         let mut entries = state.entries.clone();
-        entries.insert(key.to_owned(), Entry { key: key.to_owned(), facts, files });
-        let manifest = Manifest { identity: self.identity.clone(), entries: entries.values().cloned().collect() };
+        entries.insert(key.to_owned(), Entry { facts, files });
+        let manifest = Manifest { identity: self.identity.clone(), entries };
         self.put(&manifest_name(number), &mut |out| record::write(&mut &mut *out, &manifest))?;
         // A name is safe when its folder is.
         File::open(&self.folder).and_then(|folder| folder.sync_all())?;
-        let named = manifest.entries.iter().flat_map(|entry| &entry.files).map(|file| file.name.clone());
-        state.kept.insert(number, named.collect());
-        state.entries = entries;
+        state.kept.insert(number, manifest.files().map(|file| file.name.clone()).collect());
+        state.entries = manifest.entries;
         self.drop_older(&mut state);
         Ok(bytes)
     }

@@ -16,6 +16,6 @@ mod lock;
 mod payload;
 mod record;
 
-pub use folder::{Checkpoints, Entry, Found, Identity, difference};
+pub use folder::{Checkpoints, Found, Identity, difference};
 pub use payload::{SavedField, restore};
 pub use record::{pack, unpack};
