@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::run_report::{Distances, Hausdorff, Hole, SimplifiedCopy};
-use super::settings::Moves;
+use super::settings::{Moved, Moves};
 use crate::cli::args::reconstruct::ReconstructArgs;
 use crate::pipeline::output::viewer_mesh::Simplified;
 use crate::pipeline::reconstruct::{ReconstructSettings, Reconstruction};
@@ -67,12 +67,8 @@ pub(crate) struct Found {
     beta: f64,
     hole: Option<Hole>,
     band_voxels: u64,
-    time_steps: u32,
-    sor_iterations: u64,
-    stopped_by: &'static str,
-    residual: f64,
-    /// What the rule that ends the motion looked at after each time step.
-    residuals: Vec<f64>,
+    #[serde(flatten)]
+    moved: Moved,
 }
 
 impl Found {
@@ -94,11 +90,7 @@ impl Found {
             beta: found.beta,
             hole: found.hole.map(Into::into),
             band_voxels: found.band_voxels,
-            time_steps: found.evolution.steps,
-            sor_iterations: found.evolution.sor_iterations,
-            stopped_by: found.evolution.stopped_by,
-            residual: found.evolution.residual,
-            residuals: found.evolution.residuals.clone(),
+            moved: Moved::from(&found.evolution),
         }
     }
 }

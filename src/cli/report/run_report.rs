@@ -7,6 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::neighbours::{Contact, Neighbours};
+use super::settings::Moved;
 use crate::cli::terminal::console::Console;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, StageReport, peak_resident};
@@ -85,12 +86,8 @@ struct Object {
     beta: f64,
     hole: Option<Hole>,
     band_voxels: u64,
-    time_steps: u32,
-    sor_iterations: u64,
-    stopped_by: &'static str,
-    residual: f64,
-    /// What the rule that ends the motion looked at after each time step.
-    residuals: Vec<f64>,
+    #[serde(flatten)]
+    moved: Moved,
     /// What was taken from the image, and how much marks and image weighed.
     image_model: &'static str,
     theta: f64,
@@ -236,11 +233,7 @@ impl Object {
             beta: object.beta,
             hole: object.hole.map(Into::into),
             band_voxels: object.band_voxels,
-            time_steps: object.evolution.steps,
-            sor_iterations: object.evolution.sor_iterations,
-            stopped_by: object.evolution.stopped_by,
-            residual: object.evolution.residual,
-            residuals: object.evolution.residuals.clone(),
+            moved: Moved::from(&object.evolution),
             image_model: object.image_model,
             theta: object.theta,
             rho: object.rho,

@@ -1,4 +1,4 @@
-//! The settings of a segmentation, and those of how a surface moves, as reports tell them.
+//! The settings of a segmentation, and how a surface was to move and did, as reports tell them.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::cli::report::neighbours::fill_gaps;
 use crate::grid::Geometry;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::level_set::motion::Motion;
-use crate::pipeline::level_set::time_loop::Stop;
+use crate::pipeline::level_set::time_loop::{Evolution, Stop};
 use crate::pipeline::segment::{Overlap, SegmentSettings};
 
 /// Every setting, also those that nobody gave; lengths physical.
@@ -113,6 +113,29 @@ impl Moves {
             stop: motion.stop.name(),
             tol,
             max_steps: motion.max_steps,
+        }
+    }
+}
+
+/// How its motion ended.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Moved {
+    time_steps: u32,
+    sor_iterations: u64,
+    stopped_by: &'static str,
+    residual: f64,
+    /// What the rule that ends the motion looked at after each time step.
+    residuals: Vec<f64>,
+}
+
+impl From<&Evolution> for Moved {
+    fn from(evolution: &Evolution) -> Self {
+        Self {
+            time_steps: evolution.steps,
+            sor_iterations: evolution.sor_iterations,
+            stopped_by: evolution.stopped_by,
+            residual: evolution.residual,
+            residuals: evolution.residuals.clone(),
         }
     }
 }
