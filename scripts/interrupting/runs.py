@@ -115,10 +115,9 @@ class Ended:
         return found
 
 
-def start(program, arguments, folder):
-    """A run in an empty folder, with a folder of its own for temporary fields."""
-    (folder / "scratch").mkdir(parents=True)
-    environment = {**os.environ, "TMPDIR": str(folder / "scratch")}
+def start(program, arguments, folder, scratch):
+    """A run in a folder that is there, with another one for temporary fields."""
+    environment = {**os.environ, "TMPDIR": str(scratch)}
     return subprocess.Popen(
         [program, *arguments],
         cwd=folder,
@@ -131,6 +130,12 @@ def start(program, arguments, folder):
     )
 
 
+def start_alone(program, arguments, folder):
+    """A run in an empty folder, with a folder in it for temporary fields."""
+    (folder / "scratch").mkdir(parents=True)
+    return start(program, arguments, folder, folder / "scratch")
+
+
 def left_in(folder):
     """What lies in the folder of a run: entries of it and of the one for temporary fields."""
     places = [*folder.iterdir(), *(folder / "scratch").iterdir()]
@@ -140,7 +145,7 @@ def left_in(folder):
 def whole(program, arguments, folder):
     """Seconds that the run takes when it is left alone."""
     started = time.monotonic()
-    child = start(program, arguments, folder)
+    child = start_alone(program, arguments, folder)
     _, said = child.communicate()
     if child.returncode != 0:
         raise SystemExit(f"a run that nobody ended failed ({child.returncode}): {said.strip()}")
@@ -149,7 +154,7 @@ def whole(program, arguments, folder):
 
 def ended(program, name, arguments, folder, moment, sent, twice):
     """The run, sent a signal a while after its start, or two in a hurry."""
-    child = start(program, arguments, folder)
+    child = start_alone(program, arguments, folder)
     try:
         child.wait(timeout=moment)
     except subprocess.TimeoutExpired:

@@ -1,9 +1,9 @@
 """scripts/try_resume: runs that are ended at random moments and gone on with.
 
-Of each command runs are ended by SIGKILL (kill), by SIGTERM (term), by a disk that is full (disk, needs root), or by SIGKILL with a
-bit of a checkpoint flipped or a file of it cut short afterwards (damage), once to three times, and gone on with by --resume. The
-result must have the same bits as that of a run that nobody ended, with nothing left behind; after damage a clear refusal will do. Exit
-code 1 when one had not.
+Of each command runs are ended by SIGKILL (kill), by SIGTERM (term), by a disk that is full (disk, needs root), or by
+SIGKILL with a bit of a checkpoint flipped or a file of it cut short afterwards (damage), once to three times, and gone on
+with by --resume. The result must have the same bits as that of a run that nobody ended, with nothing left behind; after
+damage a clear refusal will do. Exit code 1 when one had not.
 """
 
 import argparse
@@ -113,7 +113,8 @@ def main():
                 told = Counter("refused" if trial.steps[-1].endswith(": 2") else "done" for trial in found)
                 faults = sum(bool(trial.faults) for trial in found)
                 print(
-                    f"{name}, {how}: {seconds:.1f} s whole; {len(found)} trials, {went_on} went on from a checkpoint, {dict(told)}, {faults} at fault",
+                    f"{name}, {how}: {seconds:.1f} s whole; {len(found)} trials, {went_on} went on from a checkpoint, "
+                    f"{dict(told)}, {faults} at fault",
                     flush=True,
                 )
                 bad, counted = bad + faults, counted + len(found)

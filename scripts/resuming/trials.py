@@ -1,11 +1,12 @@
 """One trial: a run that is ended, maybe several times, and gone on with until it is done."""
 
 import hashlib
-import os
 import shutil
 import signal
 import subprocess
 import time
+
+from interrupting import runs
 
 # What tells times or the folder, and no result, and the checksums of that.
 VARYING = {"report.json", "report.html", "checksums.txt"}
@@ -16,18 +17,8 @@ LATEST = 10.0
 
 
 def start(program, arguments, folder, scratch, every):
-    """The run, in a folder of its own."""
-    environment = {**os.environ, "TMPDIR": str(scratch)}
-    return subprocess.Popen(
-        [program, *arguments, "--checkpoint-every", every],
-        cwd=folder,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-    )
+    """The run, which takes checkpoints so often."""
+    return runs.start(program, [*arguments, "--checkpoint-every", every], folder, scratch)
 
 
 def digests(folder):
