@@ -109,6 +109,15 @@ impl Box3 {
         let [x, y, z]: [i64; 3] = std::array::from_fn(|a| voxel[a] - self.lo[a]);
         ((z * shape[1] + y) * shape[0] + x) as usize
     }
+
+    /// The voxel at a place of a dense `[z][y][x]` array over this box, which is not empty: the inverse of
+    /// [`Box3::offset_of`].
+    #[must_use]
+    pub fn voxel_at(&self, offset: usize) -> [i64; 3] {
+        let [nx, ny, _] = self.shape().map(|n| n as usize);
+        let inside = [offset % nx, offset / nx % ny, offset / (nx * ny)];
+        std::array::from_fn(|a| self.lo[a] + inside[a] as i64)
+    }
 }
 
 #[cfg(test)]
@@ -119,6 +128,15 @@ mod tests {
     fn volume_passes_32_bits() {
         assert_eq!(Box3::from_shape([4096, 4096, 4096]).volume(), 1 << 36);
         assert_eq!(Box3::new([0; 3], [-1, 5, 5]).volume(), 0);
+    }
+
+    #[test]
+    fn places_in_an_array_are_those_of_their_voxels() {
+        let part = Box3::new([-3, 5, 2], [4, 8, 7]);
+        let voxels = part.rows().flat_map(|(y, z)| (part.lo[0]..part.hi[0]).map(move |x| [x, y, z]));
+        for (offset, voxel) in voxels.enumerate() {
+            assert_eq!((part.offset_of(voxel), part.voxel_at(offset)), (offset, voxel));
+        }
     }
 
     #[test]

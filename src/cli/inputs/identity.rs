@@ -6,12 +6,8 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::time::UNIX_EPOCH;
 
-use clap::CommandFactory;
-use clap::builder::ValueParser;
-use clap::parser::ValueSource;
-
 use super::content::files_of;
-use crate::cli::args::command_line::Cli;
+use super::typed::{Given, Typed};
 use crate::error::{Error, Result};
 use crate::io::geometry::read::sources::is_standard_input;
 use crate::store::checkpoint::Identity;
@@ -53,21 +49,13 @@ const HASH_DIGITS: usize = 16;
 /// When an input cannot be read.
 pub(crate) fn identity(typed: &[String]) -> Result<Option<Identity>> {
     let mut identity: Identity = vec![("the version".into(), env!("CARGO_PKG_VERSION").into())];
-    let command = Cli::command();
-    let Ok(matches) = command.clone().try_get_matches_from(typed) else { return Ok(Some(identity)) };
-    let Some((name, given)) = matches.subcommand() else { return Ok(Some(identity)) };
-    identity.push(("the command".into(), name.to_owned()));
-    let Some(flags) = command.find_subcommand(name) else { return Ok(Some(identity)) };
-    let mut flags: Vec<_> = flags.get_arguments().collect();
-    flags.sort_by_key(|flag| flag.get_id().to_string());
-    for flag in flags {
-        let id = flag.get_id().as_str();
-        if WITHOUT_EFFECT.contains(&id) || given.value_source(id) != Some(ValueSource::CommandLine) {
-            continue;
-        }
-        let name = flag.get_long().map_or_else(|| id.to_uppercase(), |long| format!("--{long}"));
-        let is_path = flag.get_value_parser().type_id() == ValueParser::path_buf().type_id();
-        let values = given.get_raw(id).into_iter().flatten().map(Path::new);
+    let Ok(Typed { command, mut given }) = Typed::read(typed) else { return Ok(Some(identity)) };
+    identity.push(("the command".into(), command));
+    given.retain(|given| !WITHOUT_EFFECT.contains(&given.id.as_str()));
+    given.sort_by(|a, b| a.id.cmp(&b.id));
+    for Given { id, flag, is_path, values, .. } in given {
+        let name = flag.map_or_else(|| id.to_uppercase(), |flag| format!("--{flag}"));
+        let values = values.iter().map(Path::new);
         let values = if is_path {
             let Some(values) = values.map(told).collect::<Result<Option<Vec<_>>>>()? else { return Ok(None) };
             values
@@ -133,7 +121,10 @@ mod tests {
     use std::fs;
     use std::os::unix::fs::FileExt;
 
+    use clap::CommandFactory;
+
     use super::*;
+    use crate::cli::args::command_line::Cli;
 
     fn of(words: &[&str]) -> Identity {
         let typed: Vec<String> = ["strandline"].iter().chain(words).map(|word| (*word).to_owned()).collect();

@@ -8,3 +8,4 @@ pub(crate) mod marks;
 pub(crate) mod noted;
 pub(crate) mod settings;
 pub(crate) mod sources;
+pub(crate) mod typed;

@@ -15,6 +15,29 @@ pub fn paint<T: Element>(u: &[f32], from: &Box3, label: T, to: &Box3, out: &mut 
     }
 }
 
+/// Which objects claim a voxel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Claims {
+    /// How many.
+    pub count: u32,
+    /// The last of them; 0 where none does.
+    pub last: u32,
+    /// Whether the one whose label the voxel has is among them.
+    pub own: bool,
+}
+
+/// Adds the claims of an object, at the voxels that [`paint`] would give its label. `labels` and `claims` are dense over `to`.
+pub fn claim(u: &[f32], from: &Box3, label: u32, to: &Box3, labels: &[u32], claims: &mut [Claims]) {
+    let width = from.shape()[0] as usize;
+    for (row, (y, z)) in u.chunks_exact(width).zip(from.rows()) {
+        let start = to.offset_of([from.lo[0], y, z]);
+        let voxels = claims[start..][..width].iter_mut().zip(&labels[start..]);
+        for ((claims, own), _) in voxels.zip(row).filter(|(_, u)| **u >= 0.5) {
+            *claims = Claims { count: claims.count + 1, last: label, own: claims.own || *own == label };
+        }
+    }
+}
+
 /// 1 where voxels have a label, else 0.
 #[must_use]
 pub fn mask(labels: &[u32], label: u32) -> Vec<f32> {
@@ -58,6 +81,23 @@ pub fn labelled<'a>(labels: &'a [u32], part: &'a Box3) -> impl Iterator<Item = (
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn claims_are_where_paint_paints() {
+        let all = Box3::from_shape([6, 5, 4]);
+        let boxes = [Box3::new([1, 0, 1], [5, 4, 3]), Box3::new([0, 2, 0], [6, 5, 4])];
+        let u = |part: &Box3, seed: usize| (0..part.len()).map(|n| ((n * seed) % 7) as f32 / 6.0).collect::<Vec<f32>>();
+        let mut labels = vec![0_u32; all.len()];
+        boxes.iter().zip(1..).for_each(|(part, label)| paint(&u(part, 3), part, label, &all, &mut labels));
+        let mut claims = vec![Claims::default(); all.len()];
+        for (part, label) in boxes.iter().zip(1..) {
+            claim(&u(part, 3), part, label, &all, &labels, &mut claims);
+        }
+        assert!(claims.iter().any(|claims| claims.count == 2));
+        for (claims, label) in claims.iter().zip(&labels) {
+            assert_eq!((claims.last, claims.own), (*label, *label > 0), "who is painted last is the last to claim");
+        }
+    }
 
     #[test]
     fn objects_are_painted_from_one_half_on() {

@@ -1,6 +1,7 @@
 //! Image terms, labels and pictures: grey range, presmoothing, edge detector, pyramid, slices with contours.
 
 pub mod border;
+pub mod difference;
 pub mod filter;
 pub mod grey;
 pub mod labels;

@@ -7,10 +7,12 @@ use serde_json::Value;
 
 use super::found::{Check, at};
 use super::structure::Image;
-use super::voxels::{EDGE, read, same, voxel_at};
+use super::voxels::{EDGE, read};
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::Box3;
+use crate::kernel::distance::features::closest_distance::{Off, Slack, first_off};
+use crate::kernel::image::difference::{first_difference, same_number};
 use crate::kernel::image::labels;
 
 /// The images of a distance.
@@ -116,8 +118,8 @@ impl Images<'_> {
         let Some(stored) = read::<u32>(border, 0, part, found) else { return };
         let mut expected = vec![0; part.len()];
         labels::border(&values, &around, part, &mut expected);
-        if let Some(place) = (0..stored.len()).find(|&n| stored[n] != expected[n]) {
-            let voxel = voxel_at(part, place);
+        if let Some((place, _)) = first_difference(&stored, &expected, u32::eq) {
+            let voxel = part.voxel_at(place);
             let text = format!("is {} where the labels around make it {}", stored[place], expected[place]);
             found.add(at(border.file(0, voxel), voxel, text));
         }
@@ -127,32 +129,17 @@ impl Images<'_> {
     fn compare_closest(&self, part: &Box3, distances: &[f64], found: &mut Check) {
         let Some(images) = self.closest.filter(|_| self.is_euclidean) else { return };
         let geometry = &self.distance.reader.levels()[0].geometry;
-        let mut coordinates = Vec::new();
-        for image in images {
-            let Some(values) = read::<f64>(image, 0, part, found) else { return };
-            coordinates.push(values);
-        }
-        for (place, &distance) in distances.iter().enumerate() {
-            let point = [0, 1, 2].map(|a| coordinates[a][place]);
-            if point.iter().any(|v| !v.is_finite()) || self.farthest.is_some_and(|farthest| distance.abs() >= farthest)
-            {
-                continue;
-            }
-            let voxel = voxel_at(part, place);
-            let here = geometry.position(voxel);
-            let is = (0..3).map(|a| (here[a] - point[a]).powi(2)).sum::<f64>().sqrt();
-            let reach = (0..3).map(|a| here[a].abs() + point[a].abs()).fold(0.0, f64::max);
-            let slack = self.eps * (is + distance.abs()) + f64::from(f32::EPSILON) * reach;
-            if (distance.abs() - is).abs() > slack {
-                let text = format!("is {distance}, and its closest point {point:?} is {is} away");
-                found.add(at(self.distance.file(0, voxel), voxel, text));
-                return;
-            }
+        let [Some(x), Some(y), Some(z)] = images.map(|image| read::<f64>(image, 0, part, found)) else { return };
+        let slack = Slack { relative: self.eps, farthest: self.farthest.unwrap_or(f64::INFINITY) };
+        if let Some(Off { place, point, away }) = first_off(geometry, part, distances, &[x, y, z], slack) {
+            let voxel = part.voxel_at(place);
+            let text = format!("is {}, and its closest point {point:?} is {away} away", distances[place]);
+            found.add(at(self.distance.file(0, voxel), voxel, text));
         }
     }
 
     fn count(&self, all: &Part, result: &Value, found: &mut Check) {
-        if !result["max"].as_f64().is_some_and(|told| same(told, all.max)) {
+        if !result["max"].as_f64().is_some_and(|told| same_number(told, all.max)) {
             found.wrong_in(
                 "report.json",
                 format!("says that the largest distance is {}; it is {}", result["max"], all.max),

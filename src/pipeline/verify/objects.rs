@@ -2,8 +2,9 @@
 //!
 //! An object claims the voxels where its u is at least 1/2. A voxel that nobody claims has no label, one that one object claims has
 //! its label, and of several claimants one has it: the first, last or largest where `--overlap` asked for that; which of them else
-//! follows from how deep the voxel lies in each (`crate::pipeline::segment::neighbours::overlaps`), which is not computed once more. Where gaps were shared out, voxels that have another label than their claimant are counted and compared
-//! with what the report counts.
+//! follows from how deep the voxel lies in each (`crate::pipeline::segment::neighbours::overlaps`), which is not computed once more.
+//! Where gaps were shared out, voxels that have another label than their claimant are counted and compared with what the report
+//! counts.
 
 use std::collections::BTreeMap;
 
@@ -11,11 +12,11 @@ use serde_json::Value;
 
 use super::found::{Check, at};
 use super::structure::Image;
-use super::voxels::{EDGE, read, voxel_at};
+use super::voxels::{EDGE, read};
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::Box3;
-use crate::kernel::image::labels;
+use crate::kernel::image::labels::{self, Claims};
 
 /// An object's level set, where it lies in the label image.
 struct Object<'a> {
@@ -110,8 +111,7 @@ fn judge(image: &Image, objects: &[Object<'_>], part: &Box3, decided: bool, fill
     let mut judged = Part::default();
     let Some(labels) = read::<u32>(image, 0, part, &mut judged.found) else { return judged };
     judged.counts = labels::count(&labels);
-    // Of each voxel how many objects claim it, the last of them, and whether its own is among them.
-    let mut claims = vec![(0_u32, 0_u32, false); part.len()];
+    let mut claims = vec![Claims::default(); part.len()];
     for object in objects {
         let domain = object.u.reader.levels()[0].geometry.domain().translate(object.first);
         let shared = domain.intersect(part);
@@ -120,16 +120,9 @@ fn judge(image: &Image, objects: &[Object<'_>], part: &Box3, decided: bool, fill
         }
         let own = shared.translate(object.first.map(|v| -v));
         let Some(u) = read::<f32>(object.u, 0, &own, &mut judged.found) else { return judged };
-        for (row, (y, z)) in u.chunks_exact(shared.shape()[0] as usize).zip(shared.rows()) {
-            let start = part.offset_of([shared.lo[0], y, z]);
-            for (n, _) in row.iter().enumerate().filter(|(_, u)| **u >= 0.5) {
-                let (count, last, own) = &mut claims[start + n];
-                (*count, *last) = (*count + 1, object.label);
-                *own |= labels[start + n] == object.label;
-            }
-        }
+        labels::claim(&u, &shared, object.label, part, &labels, &mut claims);
     }
-    for (place, (&label, &(count, last, own))) in labels.iter().zip(&claims).enumerate() {
+    for (place, (&label, &Claims { count, last, own })) in labels.iter().zip(&claims).enumerate() {
         judged.several += u64::from(count > 1);
         let due = (count < 2 || decided).then_some(last);
         if due.map_or(own, |due| due == label) {
@@ -140,7 +133,7 @@ fn judge(image: &Image, objects: &[Object<'_>], part: &Box3, decided: bool, fill
                 (judged.filled + u64::from(count == 0), judged.moved + u64::from(count > 0));
             continue;
         }
-        let voxel = voxel_at(part, place);
+        let voxel = part.voxel_at(place);
         let claimed = match (count, due) {
             (0, _) => "no level set claims it".to_owned(),
             (1, _) => format!("the level set of object {last} alone claims it"),

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use super::found::{Check, at};
 use super::structure::{self, Image};
-use super::voxels::{EDGE, read, same, voxel_at};
+use super::voxels::{EDGE, read};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Footprint, Workers};
 use crate::grid::Box3;
 use crate::io::ome_zarr::{FileSum, store_files};
+use crate::kernel::image::difference::{first_difference, same_bits};
 
 /// Compares the finest levels of all images of a store, and its meshes and tables, with those of another; coarser levels follow
 /// from them, reports hold times.
@@ -47,9 +48,8 @@ fn compare(engine: &Engine, image: &Image, other: &Image) -> Result<Check> {
         let mut found = Check::default();
         let Some(first) = read::<f64>(image, 0, part, &mut found) else { return Ok(found) };
         let Some(second) = read::<f64>(other, 0, part, &mut found) else { return Ok(found) };
-        let mut differs = (0..first.len()).filter(|&n| !same(first[n], second[n]));
-        if let Some(place) = differs.next() {
-            let (voxel, others) = (voxel_at(part, place), differs.count());
+        if let Some((place, others)) = first_difference(&first, &second, |a, b| same_bits(*a, *b)) {
+            let voxel = part.voxel_at(place);
             let (is, then) = (first[place], second[place]);
             let text = format!("is {is}, in the second run {then}, and {others} more voxels around differ");
             found.add(at(image.file(0, voxel), voxel, text));

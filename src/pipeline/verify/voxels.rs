@@ -5,6 +5,7 @@ use super::structure::{Image, factors};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Workers};
 use crate::grid::Box3;
+use crate::kernel::image::difference::{first_difference, same_number};
 use crate::kernel::image::filter::downsample::{self, coarse_box, coarse_shape};
 use crate::store::{Element, ElementType};
 
@@ -94,10 +95,9 @@ fn compare<T: Element>(image: &Image, level: usize, (fine, part): (&[T], &Box3),
     }
     debug_assert_eq!(coarse.shape(), coarse_shape(part.shape(), factors));
     let Some(stored) = read::<T>(image, level, &coarse, found) else { return };
-    let mut wrong = stored.iter().zip(&expected).enumerate().filter(|(_, (a, b))| !same(a.to_f64(), b.to_f64()));
-    let Some((place, (is, should))) = wrong.next() else { return };
-    let (voxel, others) = (voxel_at(&coarse, place), wrong.count());
-    let (is, should) = (is.to_f64(), should.to_f64());
+    let same = |a: &T, b: &T| same_number(a.to_f64(), b.to_f64());
+    let Some((place, others)) = first_difference(&stored, &expected, same) else { return };
+    let (voxel, is, should) = (coarse.voxel_at(place), stored[place].to_f64(), expected[place].to_f64());
     let text = format!("is {is} where the finer level gives {should}, and {others} more voxels around differ");
     found.add(at(image.file(level, voxel), voxel, text));
 }
@@ -117,16 +117,4 @@ fn unreadable(error: &Error) -> String {
     use std::error::Error as _;
     let why = error.source().map_or_else(|| error.to_string(), ToString::to_string);
     format!("cannot be decoded: {why}")
-}
-
-/// Equal as numbers, or both none.
-pub(super) fn same(a: f64, b: f64) -> bool {
-    a == b || (a.is_nan() && b.is_nan())
-}
-
-/// The voxel at a place of a dense box.
-pub(super) fn voxel_at(part: &Box3, place: usize) -> [i64; 3] {
-    let [nx, ny, _] = part.shape().map(|n| n as usize);
-    let inside = [place % nx, place / nx % ny, place / (nx * ny)];
-    std::array::from_fn(|a| part.lo[a] + inside[a] as i64)
 }

@@ -6,12 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use clap::parser::ValueSource;
-use clap::{ArgMatches, CommandFactory};
 use serde_json::Value;
 
-use crate::cli::args::command_line::Cli;
 use crate::cli::args::verify::VerifyArgs;
+use crate::cli::inputs::typed::{Given, Typed};
 use crate::cli::terminal::console::Console;
 use crate::error::{Error, Result};
 use crate::exec::{Cancel, Engine, Progress};
@@ -145,39 +143,26 @@ fn command_line(report: &Value, store: &Path) -> Result<Vec<OsString>> {
         let first = error.to_string().lines().next().unwrap_or_default().to_owned();
         Error::input(format!("the command in its report.json is not understood: {first}")).at(store)
     };
-    let matches = Cli::command().try_get_matches_from(&typed).map_err(|error| unknown(&error))?;
-    let Some((name, given)) = matches.subcommand().filter(|(name, _)| report["command"] == **name) else {
+    let Typed { command, given } = Typed::read(&typed).map_err(|error| unknown(&error))?;
+    if report["command"] != *command {
         return Err(unknown(&"it is not the one that the report is of"));
-    };
-    let command = Cli::command();
-    let known = command.find_subcommand(name).ok_or_else(|| unknown(&"there is no such command"))?;
-    let (mut line, mut inputs) = (vec![OsString::from(name)], Vec::new());
-    for argument in known.get_arguments() {
-        let id = argument.get_id().as_str();
-        let is_given =
-            given.try_contains_id(id).unwrap_or(false) && given.value_source(id) == Some(ValueSource::CommandLine);
-        if !is_given || OURS.contains(&id) {
-            continue;
-        }
-        match argument.get_long() {
-            None => inputs.extend(raw(given, id)),
-            Some(long) if argument.get_action().takes_values() => {
-                for value in raw(given, id) {
-                    let mut flag = OsString::from(format!("--{long}="));
-                    flag.push(value);
-                    line.push(flag);
-                }
-            }
-            Some(long) => line.push(format!("--{long}").into()),
+    }
+    let (mut line, mut inputs) = (vec![OsString::from(command)], Vec::new());
+    for Given { id, flag, takes_values, values, .. } in given {
+        match flag {
+            _ if OURS.contains(&id.as_str()) => {}
+            None => inputs.extend(values),
+            Some(flag) if takes_values => line.extend(values.iter().map(|value| {
+                let mut word = OsString::from(format!("--{flag}="));
+                word.push(value);
+                word
+            })),
+            Some(flag) => line.push(format!("--{flag}").into()),
         }
     }
     line.push("--".into());
     line.extend(inputs);
     Ok(line)
-}
-
-fn raw(given: &ArgMatches, id: &str) -> Vec<OsString> {
-    given.get_raw(id).into_iter().flatten().map(ToOwned::to_owned).collect()
 }
 
 /// Runs this program; what it says when it fails is the error.
