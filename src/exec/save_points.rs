@@ -44,6 +44,8 @@ pub struct SavePoints {
     stages: Mutex<HashMap<String, u32>>,
     /// Time and bytes of all checkpoints so far.
     spent: Mutex<(Duration, u64)>,
+    /// Why the last one could not be taken, where it was told.
+    failure: Mutex<String>,
 }
 
 impl SavePoints {
@@ -58,6 +60,7 @@ impl SavePoints {
             wishes: AtomicUsize::new(0),
             stages: Mutex::default(),
             spent: Mutex::default(),
+            failure: Mutex::default(),
         }
     }
 
@@ -87,6 +90,12 @@ impl SavePoints {
         let (spent, written) = *self.spent.lock().unwrap_or_else(PoisonError::into_inner);
         let rate = if written > 0 { written as f64 / spent.as_secs_f64().max(1e-6) } else { RATE };
         (spent + Duration::from_secs_f64(more as f64 / rate)) * SHARE <= self.begun.elapsed()
+    }
+
+    /// Whether why a checkpoint could not be taken is another reason than the last time.
+    fn is_new(&self, failure: &str) -> bool {
+        let mut last = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::replace(&mut *last, failure.to_owned()) != failure
     }
 
     fn spend(&self, time: Duration, written: u64) {
@@ -141,7 +150,11 @@ impl SavePoint<'_> {
             Ok(_) => {}
             Err(error) => {
                 let what = if is_last { "before the end" } else { "the run goes on without" };
-                self.progress.note(&format!("no checkpoint could be taken, {what}: {error}"));
+                let failure = format!("no checkpoint could be taken, {what}: {error}");
+                // One that was asked for is answered each time.
+                if self.points.is_new(&failure) || is_wished {
+                    self.progress.note(&failure);
+                }
             }
         }
         self.cancel.end()

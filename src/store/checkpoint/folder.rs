@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-use super::lock::{LOCK, lock};
+use super::lock::{LOCK, lock, worker};
 use super::payload::{self, SavedField};
 use super::record;
 use crate::error::{Error, Result};
@@ -111,6 +111,9 @@ impl Checkpoints {
     /// What is said where they would go without leave.
     #[must_use]
     pub fn would_be_lost(folder: &Path) -> Error {
+        if let Some(error) = worker(folder) {
+            return error;
+        }
         let what =
             "holds checkpoints of a run that was ended; give --resume to go on with it, or --overwrite to begin anew";
         Error::usage(what).at(folder)
@@ -272,7 +275,8 @@ fn names(folder: &Path) -> Vec<String> {
         is_field || name.strip_suffix(ENDINGS[0]).is_some_and(|number| number.len() >= 6 && is_number(number))
     };
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.filter_map(|entry| entry.file_name().into_string().ok()).filter(is_ours).collect()
+    let files = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_file()));
+    files.filter_map(|entry| entry.file_name().into_string().ok()).filter(is_ours).collect()
 }
 
 /// Checks a file of bricks from its beginning to its end.
@@ -340,8 +344,10 @@ mod tests {
         let facts = |run: &Checkpoints| run.entry("moving").map(|(facts, files)| (facts, files.len()));
         let (run, found) = Checkpoints::resume(&folder, identity("2")).unwrap();
         assert_eq!((found.stages, found.torn.len(), facts(&run)), (2, 0, Some((vec![3], 1))));
-        let busy = Checkpoints::resume(&folder, identity("2")).err().unwrap().to_string();
-        assert!(busy.contains("belongs to a run that goes on (host"), "{busy}");
+        let busy = [Checkpoints::resume(&folder, identity("2")).err().unwrap(), Checkpoints::would_be_lost(&folder)];
+        for busy in busy.map(|error| error.to_string()) {
+            assert!(busy.contains("belongs to a run that goes on (host"), "{busy}");
+        }
         drop(run);
         let file = folder.join("000004.checkpoint");
         let whole = fs::read(&file).unwrap();
