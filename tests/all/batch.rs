@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -194,6 +195,10 @@ fn what_changed_is_run_again() {
     assert_eq!(batch(&bench, "").2, ["a"]);
     fs::remove_dir_all(bench.path("out/b.zarr")).unwrap();
     assert_eq!(batch(&bench, "").2, ["b"]);
+    fs::write(bench.path("out/a.zarr/marks.csv"), "cut off").unwrap();
+    let told = bench.succeed("batch jobs.toml -o out --dry-run");
+    assert!(told.contains("a: damaged: marks.csv in its store is gone or has another length"), "{told}");
+    assert_eq!(batch(&bench, "").2, ["a"]);
     assert_eq!(batch(&bench, "").2, [""; 0]);
 }
 
@@ -304,6 +309,22 @@ fn a_second_signal_ends_what_runs() {
         bench.write("jobs.toml", LIST);
         assert_eq!(batch(&bench, "").2, ["a", "b", "c"]);
     }
+}
+
+/// What schedulers send before the end: each item takes a checkpoint and goes on.
+#[test]
+fn items_are_asked_for_checkpoints() {
+    let bench = bench(&["a"], ENDLESS);
+    let run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 1"));
+    until_moving(&bench, &["a"]);
+    let is_taken = || fs::read_to_string(bench.path("out/a.log")).is_ok_and(|log| log.contains("a checkpoint of"));
+    // One that has just begun is not asked.
+    while !is_taken() {
+        run.signal("USR1");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    run.signal("TERM");
+    assert_eq!(run.finish().status.code(), Some(143), "it had gone on");
 }
 
 #[test]

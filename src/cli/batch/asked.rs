@@ -1,5 +1,6 @@
 //! Signals to a batch. The first SIGINT lets what runs end and starts nothing more; the second one, and SIGTERM and SIGHUP, are
-//! passed on to all that runs.
+//! passed on to all that runs, as is SIGUSR1, which asks for checkpoints. A SIGHUP that whoever started the batch passes over
+//! is passed over here too.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -8,10 +9,11 @@ use std::thread;
 
 use crossbeam_channel::{Receiver, unbounded};
 use rustix::process::Signal;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals;
 
-use super::child::signal_all;
+use super::child::{ask_for_checkpoints, signal_all};
+use crate::cli::terminal::signals::is_ignored;
 use crate::error::{Error, Result};
 
 /// What was asked so far.
@@ -32,12 +34,17 @@ impl Asked {
     /// When the system does not let it.
     pub(crate) fn listen() -> Result<Self> {
         let fault = |error: std::io::Error| Error::from_io("cannot listen to signals", &error);
-        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).map_err(fault)?;
+        let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+        let mut signals = Signals::new([SIGINT, SIGTERM, SIGUSR1].into_iter().chain(hang_up)).map_err(fault)?;
         let (tell, heard) = unbounded();
         let asked = Self { signal: Arc::default(), ends: Arc::default(), heard };
         let (signal, ends) = (asked.signal.clone(), asked.ends.clone());
         let watch = move || {
             for one in signals.forever() {
+                if one == SIGUSR1 {
+                    ask_for_checkpoints();
+                    continue;
+                }
                 let is_first = signal.compare_exchange(0, one, Relaxed, Relaxed).is_ok();
                 if one != SIGINT || !is_first {
                     ends.store(true, Relaxed);

@@ -8,6 +8,7 @@ use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process, waitid};
 
@@ -19,8 +20,10 @@ const LOG_END: u64 = 1 << 16;
 /// How the program's own errors begin.
 const ERROR: &str = "strandline: ";
 
-/// Runs that go on.
-static RUNNING: Mutex<Vec<Pid>> = Mutex::new(Vec::new());
+/// Runs that go on, and since when.
+static RUNNING: Mutex<Vec<(Pid, Instant)>> = Mutex::new(Vec::new());
+/// After so long a process listens to signals that would end it else.
+const LISTENS: Duration = Duration::from_secs(1);
 
 /// What an item may use.
 #[derive(Clone, Debug)]
@@ -108,7 +111,7 @@ pub(crate) fn ask(item: &Item, arguments: &[OsString]) -> io::Result<(ExitStatus
 fn spawn(command: &mut Command) -> io::Result<Child> {
     let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
     let child = command.spawn()?;
-    running.extend(Pid::from_raw(child.id() as i32));
+    running.extend(Pid::from_raw(child.id() as i32).map(|pid| (pid, Instant::now())));
     Ok(child)
 }
 
@@ -121,7 +124,7 @@ pub(crate) fn wait(child: &mut Child) -> io::Result<ExitStatus> {
             Err(rustix::io::Errno::INTR)
         ) {}
         let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
-        running.retain(|other| *other != pid);
+        running.retain(|(other, _)| *other != pid);
         return child.wait();
     }
     child.wait()
@@ -129,9 +132,17 @@ pub(crate) fn wait(child: &mut Child) -> io::Result<ExitStatus> {
 
 /// Sends all runs that go on a signal.
 pub(crate) fn signal_all(signal: Signal) {
-    for pid in RUNNING.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+    for (pid, _) in RUNNING.lock().unwrap_or_else(PoisonError::into_inner).iter() {
         // One that ends by itself at this moment needs none.
         let _ = kill_process(*pid, signal);
+    }
+}
+
+/// Asks all runs that go on for a checkpoint. One that has just begun has nothing to put by.
+pub(crate) fn ask_for_checkpoints() {
+    let running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+    for (pid, _) in running.iter().filter(|(_, since)| since.elapsed() >= LISTENS) {
+        let _ = kill_process(*pid, Signal::USR1);
     }
 }
 

@@ -13,6 +13,7 @@ use super::content::{Input, Looks, changed};
 use super::list::items::Item;
 use crate::cli::outputs::files::write_whole;
 use crate::error::{Error, Result};
+use crate::io::ome_zarr::{CHECKSUMS, first_misfit};
 
 /// The version whose results are in a folder.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -175,6 +176,9 @@ pub(crate) fn reasons(folder: &Folder, item: &Item, keeps: bool, stop: &AtomicBo
     if !is_whole(&folder.store(&item.name)) {
         return Ok(vec!["missing: its store is gone".into()]);
     }
+    if let Some(path) = misfit(&folder.store(&item.name)) {
+        return Ok(vec![format!("damaged: {path} in its store is gone or has another length")]);
+    }
     let mut why = state.changed_settings(item);
     let (names, now) = changed(&item.files, &state.inputs, stop);
     let is_other_list = now.iter().map(|input| &input.path).ne(state.inputs.iter().map(|input| &input.path));
@@ -202,6 +206,11 @@ pub(crate) fn done_meanwhile(folder: &Folder, item: &Item) -> Option<State> {
 /// Whether a store is there, under its name.
 fn is_whole(store: &Path) -> bool {
     store.join("report.json").is_file()
+}
+
+/// What in a store is not as it was written, as far as is seen without reading it (`strandline verify` does).
+fn misfit(store: &Path) -> Option<String> {
+    first_misfit(store).unwrap_or_else(|_| Some(CHECKSUMS.into()))
 }
 
 /// What a run reports of its result, its seconds and its memory; none where there is no report.

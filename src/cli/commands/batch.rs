@@ -34,6 +34,11 @@ pub(crate) fn run(args: &BatchArgs) -> Result<()> {
     let (Some(jobs), Some(output)) = (&args.jobs, &args.output) else {
         return Err(Error::usage("give JOBS.toml and -o DIR, or --init FOLDER"));
     };
+    if output.as_os_str() == "none" {
+        return Err(Error::usage(
+            "a batch keeps its results and what it knows of them in a folder; name one with -o (./none if it is to be called that)",
+        ));
+    }
     let mut problems = Problems::default();
     let list = manifest::read(jobs, &mut problems)?;
     let all = items(&list, output, &mut problems);

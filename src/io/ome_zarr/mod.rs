@@ -30,5 +30,5 @@ pub use read::{ImageReader, StoredLevel};
 pub use root::{Live, LiveState, Root, live};
 pub use shard::{joined_bytes, shard_bytes};
 pub use store::{ImageWriter, StoreWriter};
-pub use sums::{CHECKSUMS, FileSum, listed_sums, store_files};
+pub use sums::{CHECKSUMS, FileSum, first_misfit, listed_sums, store_files};
 pub use version::OmeVersion;

@@ -139,6 +139,19 @@ pub fn store_files(folder: &Path) -> io::Result<Vec<String>> {
     Ok(found)
 }
 
+/// The first file of a store's list that is gone or has another length: what is seen without reading any. Nothing where there is
+/// no list.
+///
+/// # Errors
+/// When the list cannot be read or a line of it names no file.
+pub fn first_misfit(folder: &Path) -> Result<Option<String>> {
+    let fits = |(path, line): &(String, String)| {
+        let length = fs::metadata(folder.join(path)).ok().map(|found| found.len().to_string());
+        length.as_deref() == line.split(' ').nth(1)
+    };
+    Ok(listed_sums(folder)?.unwrap_or_default().into_iter().find(|file| !fits(file)).map(|(path, _)| path))
+}
+
 /// The lines of a store's list by path; nothing where there is no list.
 ///
 /// # Errors
