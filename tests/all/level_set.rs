@@ -64,7 +64,7 @@ fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
     let stage = lab.engine.stage("sponge", 0);
     let distance =
         cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, f32::INFINITY).expect("room in scratch");
-    let tagging = tag(&stage, &lab.engine, &sources, &distance, PERSISTENCE).expect("room in scratch");
+    let tagging = tag(&stage, &lab.engine, &sources, &distance, PERSISTENCE, |_| true).expect("room in scratch");
     let inside = tagging.inside(&stage, &lab.engine, 0.25).expect("room in scratch");
     let reaches = Reaches { inner: 0.5, outer: 0.5 };
     let mut band = make_band(&stage, &lab.engine, &distance, &inside, reaches).expect("room in scratch");

@@ -4,10 +4,11 @@
 //! Where the flood from outside reaches at that radius, the ball's centre may be; pockets are farther than the radius
 //! from there and not reached themselves.
 
+use super::needs::POINT_BYTES;
 use super::tagging::level_of;
 use super::watershed::WALL_VOXELS;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
+use crate::exec::{Boundary, Engine, HaloPlan, Hold, Reach, Stage, Workers, one_wave};
 use crate::grid::{Geometry, PointBins};
 use crate::kernel::level_set::initial::flood::shore;
 use crate::kernel::level_set::initial::pocket;
@@ -34,7 +35,7 @@ pub(crate) fn pockets(
 ) -> Result<BrickArray<f32>> {
     let set = distance.set();
     let level = level_of(stage, engine, distance)?;
-    let centres = centres(stage, geometry, &level, radius as f32)?;
+    let (centres, _held) = centres(stage, engine, geometry, &level, radius as f32)?;
     let bins = PointBins::new(*set.grid(), geometry, &centres);
     let sources = Sources::cloud(geometry, &centres, &bins);
     let away = cloud_distance(stage, engine, &sources, set, Method::VDT, f32::INFINITY)?;
@@ -53,8 +54,14 @@ pub(crate) fn pockets(
     Ok(away)
 }
 
-/// The outermost places that the ball's centre may be at.
-fn centres(stage: &Stage<'_>, geometry: &Geometry, level: &BrickArray<f32>, radius: f32) -> Result<Vec<[f64; 3]>> {
+/// The outermost places that the ball's centre may be at, and what holds the memory that they take.
+fn centres(
+    stage: &Stage<'_>,
+    engine: &Engine,
+    geometry: &Geometry,
+    level: &BrickArray<f32>,
+    radius: f32,
+) -> Result<(Vec<[f64; 3]>, Vec<Hold>)> {
     let set = level.set();
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
     let edge = set.grid().edge() as usize;
@@ -62,7 +69,10 @@ fn centres(stage: &Stage<'_>, geometry: &Geometry, level: &BrickArray<f32>, radi
         plan.gather(level, slot, Boundary::Constant(f32::INFINITY), tile);
         let lo = set.grid().brick_box(set.id(slot)).lo;
         let place = |at: [usize; 3]| geometry.position(std::array::from_fn(|a| lo[a] + at[a] as i64));
-        Ok(shore(tile, radius).into_iter().map(place).collect::<Vec<_>>())
+        let centres: Vec<_> = shore(tile, radius).into_iter().map(place).collect();
+        let held = engine.hold(centres.len() as u64 * POINT_BYTES)?;
+        Ok((centres, held))
     })?;
-    Ok(found.concat())
+    let (found, held): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    Ok((found.concat(), held))
 }

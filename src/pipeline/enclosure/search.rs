@@ -211,7 +211,8 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         let stage = around.tagging(engine, search);
         // Whoever names a beta knows how deep the inside is.
         let ratio = if search.beta.is_some() { 1.0 } else { PERSISTENCE };
-        let mut tagging = tag(&stage, engine, &around.sources(search), &around.distance, ratio)?;
+        let wanted = |basin: &Basin| search.beta.is_none_or(|beta| search.holds(basin, beta));
+        let mut tagging = tag(&stage, engine, &around.sources(search), &around.distance, ratio, wanted)?;
         let beta = search.beta.or_else(|| automatic_beta(&tagging.basins, grid));
         let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|basin| search.holds(basin, beta))) else {
             stage.finish();
@@ -292,7 +293,7 @@ impl Around {
     /// The deepest space of a cloud that encloses nothing: what a given beta could start from.
     fn deepest(&self, engine: &Engine, search: &Search<'_>) -> Result<Option<Deepest>> {
         let stage = self.tagging(engine, search);
-        let tagging = tag(&stage, engine, &self.sources(search), &self.distance, 1.0)?;
+        let tagging = tag(&stage, engine, &self.sources(search), &self.distance, 1.0, |_| false)?;
         stage.finish();
         Ok(Deepest::of(&tagging.basins, &self.region.geometry))
     }

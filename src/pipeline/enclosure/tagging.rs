@@ -10,7 +10,7 @@ use crate::grid::{FACES, Face, Slot};
 use crate::kernel::level_set::initial::basins;
 use crate::kernel::level_set::initial::basins::Piece;
 use crate::kernel::level_set::initial::flood;
-use crate::kernel::level_set::initial::persistence::Joins;
+use crate::kernel::level_set::initial::persistence::{Joins, PIECE_BYTES};
 use crate::pipeline::distance::Sources;
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -58,7 +58,8 @@ impl Tagging {
     }
 }
 
-/// Floods the grid from its border and finds the basins that are so many times as deep as their saddle.
+/// Floods the grid from its border and finds the basins that are so many times as deep as their saddle. Of these the deepest and
+/// those that are `wanted` are kept: noise has as many as a cloud has points, and each is looked for at every voxel.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
@@ -68,10 +69,13 @@ pub fn tag(
     sources: &Sources<'_>,
     distance: &BrickArray<f32>,
     ratio: f32,
+    wanted: impl Fn(&Basin) -> bool,
 ) -> Result<Tagging> {
     let mut far = FarRegions::new(distance.set(), distance.absent(0));
     let level = flood_all(stage, engine, distance, &mut far)?;
-    let (mut basins, pieces) = find_basins(stage, engine, [distance, &level], &far, ratio)?;
+    let (mut basins, mut pieces) = find_basins(stage, engine, [distance, &level], &far, ratio)?;
+    let deepest = basins.iter().map(|basin| basin.depth).fold(0.0, f32::max);
+    pieces.keep(&mut basins, |basin| basin.depth == deepest || wanted(basin));
     locate_saddles(stage, sources, [distance, &level], &pieces, &mut basins)?;
     basins.sort_by(|a, b| b.depth.total_cmp(&a.depth).then(b.voxels.cmp(&a.voxels)));
     Ok(Tagging { level, basins })
@@ -166,11 +170,13 @@ fn find_basins(
         let pieces =
             distance.read(slot, |d| level.read(slot, |b| labels.write(slot, |l| basins::label(d, b, edge, valid, l))));
         labels.refresh_faces(slot);
-        Ok(pieces)
+        let held = engine.hold(pieces.len() as u64 * PIECE_BYTES)?;
+        Ok((pieces, held))
     })?;
+    let (found, _held): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     let first: Vec<u32> = found
         .iter()
-        .scan(0u32, |next, pieces| {
+        .scan(0u32, |next, pieces: &Vec<Piece>| {
             let at = *next;
             *next += pieces.len() as u32;
             Some(at)
@@ -232,6 +238,21 @@ struct Pieces {
 }
 
 impl Pieces {
+    /// Keeps some of the basins.
+    fn keep(&mut self, basins: &mut Vec<Basin>, kept: impl Fn(&Basin) -> bool) {
+        let mut count = 0;
+        let names: Vec<Option<u32>> = basins
+            .iter()
+            .map(|basin| {
+                let name = kept(basin).then_some(count);
+                count += u32::from(name.is_some());
+                name
+            })
+            .collect();
+        basins.retain(|basin| kept(basin));
+        self.basin.iter_mut().for_each(|basin| *basin = basin.and_then(|name| names[name as usize]));
+    }
+
     /// The basin that a label of a slot's brick belongs to.
     fn basin(&self, slot: Slot, label: u16) -> Option<u32> {
         (label != 0).then(|| self.basin[(self.first[slot as usize] + u32::from(label) - 1) as usize]).flatten()

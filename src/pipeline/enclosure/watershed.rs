@@ -10,7 +10,9 @@ use std::sync::Arc;
 use super::far_regions::FarRegions;
 use super::tagging::Basin;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, FixedPoint, HaloPlan, Reach, Stage, Workers, one_wave, relax_to_fixed_point};
+use crate::exec::{
+    Boundary, Engine, FixedPoint, HaloPlan, Hold, Reach, Stage, Workers, one_wave, relax_to_fixed_point,
+};
 use crate::grid::{Box3, BrickId, BrickSet, Face, Slot};
 use crate::kernel::level_set::initial::ascent::{Ascent, OUTSIDE, renumber};
 use crate::kernel::level_set::initial::contacts::{Contact, contacts, count};
@@ -67,10 +69,11 @@ pub fn watershed(
         plan: HaloPlan::new(*set.grid(), Reach::Faces),
         workers: Workers::new(make),
     };
-    let (of_voxel, mut regions) = flood.peaks(engine, &far)?;
+    // A cloud of noise has regions and contacts by the million: what they take is held until they are gone.
+    let (of_voxel, mut regions, _of_regions) = flood.peaks(engine, &far)?;
     let mut descent = Descent { watershed: &flood, of_voxel: &of_voxel };
     relax_to_fixed_point(stage, Reach::Faces, &flood.workers, &mut descent)?;
-    let contacts = flood.contacts(&of_voxel, &mut regions)?;
+    let (contacts, _of_contacts) = flood.contacts(engine, &of_voxel, &mut regions)?;
     let least = |voxels: f64| (voxels * sources.geometry.min_spacing()) as f32;
     let (is_inside, found) =
         spaces::inside(&regions, &contacts, least(LEAST_DEPTH_VOXELS), least(LEAST_POCKET_VOXELS), least(WALL_VOXELS));
@@ -99,7 +102,7 @@ impl Watershed<'_> {
     }
 
     /// Numbers the maxima of all bricks, in grid order after the far regions; the others' voxels are unknown yet.
-    fn peaks(&self, engine: &Engine, far: &FarRegions) -> Result<(BrickArray<u32>, Vec<Region>)> {
+    fn peaks(&self, engine: &Engine, far: &FarRegions) -> Result<(BrickArray<u32>, Vec<Region>, Vec<Hold>)> {
         let set = self.set();
         let mut of_voxel = BrickArray::with_faces(engine.scratch(), set)?;
         let peaks = self.stage.run(&one_wave(set), &self.workers, |w, &slot| {
@@ -107,10 +110,12 @@ impl Watershed<'_> {
             let mut peaks = |pockets: Option<&[f32]>| {
                 of_voxel.write(slot, |dense| w.ascent.peaks(&w.d, self.spacing, 0, pockets, dense))
             };
-            Ok(match self.pockets {
+            let peaks = match self.pockets {
                 Some(pockets) => pockets.read(slot, |pockets| peaks(Some(pockets))),
                 None => peaks(None),
-            })
+            };
+            let held = engine.hold(peaks.len() as u64 * spaces::REGION_BYTES)?;
+            Ok((peaks, held))
         })?;
         let mut regions = vec![Region::default()];
         let mut of_far = Vec::with_capacity(far.bricks.len());
@@ -129,7 +134,7 @@ impl Watershed<'_> {
             }
         }
         let mut first = Vec::with_capacity(set.len());
-        for peaks in &peaks {
+        for (peaks, _) in &peaks {
             first.push(regions.len() as u32);
             regions.extend(peaks.iter().map(|peak| Region { depth: peak.depth, voxels: 0, pocket: peak.pocket }));
         }
@@ -138,27 +143,37 @@ impl Watershed<'_> {
             of_voxel.refresh_faces(slot);
             Ok(())
         })?;
-        Ok((of_voxel, regions))
+        let held = peaks.into_iter().map(|(_, held)| held).collect();
+        Ok((of_voxel, regions, held))
     }
 
     /// Where regions meet, with the brick each place is in; counts the voxels of all regions.
-    fn contacts(&self, of_voxel: &BrickArray<u32>, regions: &mut [Region]) -> Result<Vec<(Contact, BrickId)>> {
+    fn contacts(
+        &self,
+        engine: &Engine,
+        of_voxel: &BrickArray<u32>,
+        regions: &mut [Region],
+    ) -> Result<(Vec<(Contact, BrickId)>, Vec<Hold>)> {
         let set = self.set();
         let found = self.stage.run(&one_wave(set), &self.workers, |w, &slot| {
             self.gather_distance(slot, &mut w.d);
             self.plan.gather(of_voxel, slot, Boundary::Constant(OUTSIDE), &mut w.regions);
             let stored = |face: Face| set.neighbour(slot, face.offset()).is_some();
             let lower = [0, 1, 2].map(|axis| !stored(Face { axis, upper: false }));
-            Ok((contacts(&w.d, &w.regions, lower), count(&w.regions)))
+            let (contacts, counts) = (contacts(&w.d, &w.regions, lower), count(&w.regions));
+            let held = engine.hold(contacts.len() as u64 * spaces::CONTACT_BYTES)?;
+            Ok((contacts, counts, held))
         })?;
-        let mut all = Vec::new();
-        for (slot, (contacts, counts)) in found.into_iter().enumerate() {
+        let mut all = Vec::with_capacity(found.iter().map(|(contacts, ..)| contacts.len()).sum());
+        let mut held = Vec::with_capacity(found.len());
+        for (slot, (contacts, counts, of_brick)) in found.into_iter().enumerate() {
+            held.push(of_brick);
             all.extend(contacts.into_iter().map(|contact| (contact, set.id(slot as Slot))));
             for (region, voxels) in counts {
                 regions[region as usize].voxels += voxels;
             }
         }
-        Ok(spaces::joined(all))
+        Ok((spaces::joined(all), held))
     }
 
     fn sides(&self, engine: &Engine, of_voxel: &BrickArray<u32>, is_inside: &[bool]) -> Result<BrickArray<u8>> {

@@ -8,15 +8,13 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
+use super::identity::{Identity, difference};
 use super::lock::{LOCK, lock, worker};
 use super::payload::{self, SavedField};
 use super::record;
 use crate::error::{Error, Result};
 use crate::store::HiddenFile;
 use crate::store::hidden::remove_abandoned;
-
-/// Who makes checkpoints: program, settings, inputs, by name. Of another run's nothing is taken.
-pub type Identity = Vec<(String, String)>;
 
 /// The names of manifests and fields end like this.
 const ENDINGS: [&str; 2] = [".checkpoint", ".bricks"];
@@ -286,22 +284,6 @@ fn whole(folder: &Path, file: &FileOf) -> io::Result<()> {
         return Err(io::Error::new(io::ErrorKind::InvalidData, "has not the length that it had"));
     }
     payload::check(&mut BufReader::with_capacity(BUFFER, opened), file.bytes)
-}
-
-/// The first thing in which two runs differ, in words.
-#[must_use]
-pub fn difference(then: &Identity, now: &Identity) -> Option<String> {
-    let of = |identity: &Identity, name: &str| {
-        identity.iter().find(|(known, _)| known == name).map(|(_, value)| value.clone())
-    };
-    let names = then.iter().chain(now).map(|(name, _)| name);
-    names.map(|name| (name, of(then, name), of(now, name))).find(|(_, then, now)| then != now).map(
-        |(name, then, now)| match (then, now) {
-            (Some(then), Some(now)) => format!("{name} was {then} and is {now}"),
-            (Some(then), None) => format!("{name} was {then} and is not given"),
-            (None, now) => format!("{name} was not given and is {}", now.unwrap_or_default()),
-        },
-    )
 }
 
 #[cfg(test)]

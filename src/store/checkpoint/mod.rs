@@ -4,7 +4,7 @@
 //! ```text
 //! DIR/strandline.lock         held by the run that works in the folder
 //! DIR/000007.checkpoint       a manifest: who made it, and its entries (record)
-//! DIR/000006-1-0.bricks       the bricks of a field (payload); manifests that follow each other share those that did not change
+//! DIR/000006-0.bricks         the bricks of a field (payload); manifests that follow each other share those that did not change
 //! ```
 //!
 //! An entry is one stage: what it knows, packed, and the fields that it works on. Everything is written beside, flushed and
@@ -12,10 +12,12 @@
 //! one before is taken.
 
 mod folder;
+mod identity;
 mod lock;
 mod payload;
 mod record;
 
-pub use folder::{Checkpoints, Found, Identity, difference};
+pub use folder::{Checkpoints, Found};
+pub use identity::{Identity, difference};
 pub use payload::{SavedField, restore};
 pub use record::{pack, unpack};

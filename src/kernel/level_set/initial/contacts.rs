@@ -45,6 +45,7 @@ pub fn contacts(d: &HaloTile<f32>, regions: &HaloTile<u32>, lower: [bool; 3]) ->
             }
         }
     }
+    found.shrink_to_fit();
     found
 }
 

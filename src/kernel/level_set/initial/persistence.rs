@@ -8,6 +8,10 @@ use crate::kernel::topology::union_find::Forest;
 /// A basin persists when its depth is at least this many times its saddle; noise stays below 1.5.
 pub const PERSISTENCE: f32 = 2.0;
 
+/// Bytes that a piece takes until it is known which basins persist: itself, twice while it is added up, its place among trees and
+/// roots, its basin.
+pub const PIECE_BYTES: u64 = 128;
+
 /// Pieces that are being joined.
 #[derive(Clone, Debug)]
 pub struct Joins {

@@ -39,7 +39,9 @@ pub struct Space {
 /// Sorts contacts by their regions and makes those between the same two one; of equal passes the first stays.
 #[must_use]
 pub fn joined(mut contacts: Vec<(Contact, u64)>) -> Vec<(Contact, u64)> {
-    contacts.sort_by(|(a, m), (b, n)| a.regions.cmp(&b.regions).then(b.pass.total_cmp(&a.pass)).then(m.cmp(n)));
+    // No two of a brick are of the same regions, so that none are equal.
+    contacts
+        .sort_unstable_by(|(a, m), (b, n)| a.regions.cmp(&b.regions).then(b.pass.total_cmp(&a.pass)).then(m.cmp(n)));
     contacts.dedup_by(|(next, _), (kept, _)| {
         let same = next.regions == kept.regions;
         if same {
@@ -90,6 +92,11 @@ pub fn inside(
     let spaces = spaces_of(regions, &roots, &inside, contacts);
     (inside, spaces)
 }
+
+/// Bytes that a region takes until its side is known: itself, what it is merged to, its side, and its row of neighbours.
+pub const REGION_BYTES: u64 = 64;
+/// Bytes that a contact takes: in its brick and in the list of all, then there with its place in the order and in two rows.
+pub const CONTACT_BYTES: u64 = 64;
 
 /// Tells each voxel its side, 1 inside and 0 outside, from its region.
 pub fn mark_sides(regions: &[u32], is_inside: &[bool], side: &mut [u8]) {
@@ -149,16 +156,46 @@ enum Side {
     Outside,
 }
 
+/// The spaces beside each space, with the faces between them: in rows, since a cloud of noise has millions.
+struct Beside {
+    /// Where the row of each root begins.
+    start: Vec<usize>,
+    rows: Vec<(u32, u32)>,
+}
+
+impl Beside {
+    fn new(roots: &[u32], contacts: &[(Contact, u64)]) -> Self {
+        let pairs = || {
+            let of_roots =
+                contacts.iter().map(|(contact, _)| (contact.regions.map(|n| roots[n as usize]), contact.faces));
+            of_roots.filter(|([a, b], _)| a != b)
+        };
+        // The row of a root ends where that of the next begins; counted one place further on, it begins there.
+        let mut start = vec![0; roots.len() + 2];
+        for ([a, b], _) in pairs() {
+            start[a as usize + 2] += 1;
+            start[b as usize + 2] += 1;
+        }
+        (2..start.len()).for_each(|n| start[n] += start[n - 1]);
+        let mut rows = vec![(0, 0); start.last().copied().unwrap_or(0)];
+        for ([a, b], faces) in pairs() {
+            for (from, to) in [(a, b), (b, a)] {
+                let place = &mut start[from as usize + 1];
+                rows[*place] = (to, faces);
+                *place += 1;
+            }
+        }
+        Self { start, rows }
+    }
+
+    fn of(&self, root: u32) -> &[(u32, u32)] {
+        &self.rows[self.start[root as usize]..self.start[root as usize + 1]]
+    }
+}
+
 /// The side of each space, by its root: one after the other, the one whose border says most clearly.
 fn sides_of(roots: &[u32], contacts: &[(Contact, u64)]) -> Vec<Side> {
-    let mut beside: Vec<Vec<(u32, i64)>> = vec![Vec::new(); roots.len()];
-    for Contact { regions, faces, .. } in contacts.iter().map(|(contact, _)| contact) {
-        let [a, b] = regions.map(|region| roots[region as usize]);
-        if a != b {
-            beside[a as usize].push((b, i64::from(*faces)));
-            beside[b as usize].push((a, i64::from(*faces)));
-        }
-    }
+    let beside = Beside::new(roots, contacts);
     let mut sides = vec![Side::Unknown; roots.len()];
     // Faces beside the outside less those beside the inside, of the spaces that are next.
     let mut votes: std::collections::BTreeMap<u32, i64> = std::collections::BTreeMap::new();
@@ -167,10 +204,8 @@ fn sides_of(roots: &[u32], contacts: &[(Contact, u64)]) -> Vec<Side> {
         sides[space as usize] = side;
         votes.remove(&space);
         let sign = if side == Side::Outside { 1 } else { -1 };
-        for &(other, faces) in
-            beside[space as usize].iter().filter(|(other, _)| sides[*other as usize] == Side::Unknown)
-        {
-            *votes.entry(other).or_default() += sign * faces;
+        for &(other, faces) in beside.of(space).iter().filter(|(other, _)| sides[*other as usize] == Side::Unknown) {
+            *votes.entry(other).or_default() += sign * i64::from(faces);
         }
         let clearest = votes.iter().max_by_key(|(name, vote)| (vote.abs(), std::cmp::Reverse(**name)));
         next = clearest.map(|(&name, &vote)| (name, if vote > 0 { Side::Inside } else { Side::Outside }));
