@@ -12,7 +12,7 @@ use super::ready::Ready;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::point_file::PointFile;
 use crate::io::geometry::read::points::{LengthUnit, read_points};
-use crate::io::ome_zarr::{GROWING, Live, LiveState, live};
+use crate::io::ome_zarr::{GROWING, Live, LiveState, TIMES, live};
 use crate::pipeline::output::viewer_mesh::{PRECOMPUTED, SIMPLIFIED};
 use crate::pipeline::segment::MARKS;
 
@@ -178,9 +178,13 @@ impl Shown {
     /// Adds the marks of a store, every n-th where there are more than a page can hold.
     fn add_marks(&mut self, path: &Path) {
         // A store without marks, or with a table of another program, is shown without.
-        let Ok(PointFile { cloud, .. }) = read_points(path) else { return };
-        let every = cloud.positions.len().div_ceil(MOST_MARKS).max(1);
-        self.marks.extend(cloud.positions.iter().step_by(every));
+        let Ok(PointFile { cloud, times, .. }) = read_points(path) else { return };
+        // Those of other times lie where the objects are then.
+        let is_of_first = |n: usize| times.get(n) == times.first();
+        let shown: Vec<[f64; 3]> =
+            cloud.positions.iter().enumerate().filter(|(n, _)| is_of_first(*n)).map(|(_, place)| *place).collect();
+        let every = shown.len().div_ceil(MOST_MARKS).max(1);
+        self.marks.extend(shown.iter().step_by(every));
     }
 
     fn add_mesh(&mut self, path: &Path) -> Result<()> {
@@ -264,9 +268,16 @@ impl Shown {
                 self.push_mesh(format!("{path}/{}", file_name(&file)), file, &ready);
             }
         }
-        // Those hold the same meshes once more.
-        let is_looked_into =
-            |below: &PathBuf| depth > 0 && !below.ends_with(PRECOMPUTED) && !below.ends_with(SIMPLIFIED);
+        // Those hold the same meshes once more; fields and surfaces of single times of a series cannot be told from each other.
+        let is_series = folder.join(TIMES).is_dir() && multiscale(folder).is_some_and(|found| found.has_time());
+        let is_of_time = |below: &Path| {
+            let name = file_name(below);
+            let is_time = name.strip_prefix('t').is_some_and(|digits| digits.parse::<u32>().is_ok());
+            (is_series && below.ends_with(TIMES)) || (is_time && folder.ends_with("meshes"))
+        };
+        let is_looked_into = |below: &PathBuf| {
+            depth > 0 && !below.ends_with(PRECOMPUTED) && !below.ends_with(SIMPLIFIED) && !is_of_time(below)
+        };
         for below in folders(folder).into_iter().filter(is_looked_into) {
             self.add_group(&format!("{path}/{}", file_name(&below)), &below, depth - 1);
         }
@@ -277,6 +288,13 @@ impl Shown {
 struct Multiscale {
     attributes: Value,
     is_version_2: bool,
+}
+
+impl Multiscale {
+    /// Whether its first axis is one of time.
+    fn has_time(&self) -> bool {
+        self.attributes["multiscales"][0]["axes"][0]["type"] == "time"
+    }
 }
 
 fn multiscale(folder: &Path) -> Option<Multiscale> {

@@ -60,6 +60,8 @@ mod resume;
 mod room_circles;
 #[cfg(target_os = "linux")]
 mod segment_notes;
+#[cfg(target_os = "linux")]
+mod series;
 mod shell;
 mod signals;
 mod slice_folders;

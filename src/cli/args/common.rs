@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::pages::{PagesArgs, VolumeArgs};
+use super::pages::{PagesArgs, VolumesArgs};
 use super::survive::SurviveArgs;
+use super::times::Times;
 use super::values::{
     Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
     solvers_help,
@@ -20,7 +21,7 @@ use crate::pipeline::segment::FillGaps;
 pub(crate) struct SegmentArgs {
     /// TIFF stack, a folder with one TIFF file for each slice, an OME-Zarr image, or an NRRD or VTI volume
     pub(crate) image: PathBuf,
-    /// Border points: CSV (x,y,z and optionally object,contour; or tables of napari, Imaris and others), XYZ, PLY,
+    /// Border points: CSV (x,y,z and optionally object,contour,t; or tables of napari, Imaris and others), XYZ, PLY,
     /// ROIs (.roi, .zip); - reads standard input. Given several times, the n-th file is object n, and objects named in
     /// later files are numbered on from those of the earlier ones
     #[arg(long, required_unless_present = "seed", value_name = "CLOUD")]
@@ -54,7 +55,11 @@ pub(crate) struct SegmentArgs {
 #[command(next_help_heading = "Image")]
 pub(crate) struct ImageArgs {
     #[command(flatten)]
-    pub(crate) volume: VolumeArgs,
+    pub(crate) volume: VolumesArgs,
+    /// Time point of the image, counted from 0; all of them, or A:B for those from A up to B - 1: then one store with an axis of time,
+    /// and each object from the marks of the nearest time at which it is marked (column t), moved as the image around it moved
+    #[arg(long, value_name = "N|all|A:B", default_value_t = Times::One(0))]
+    pub(crate) time: Times,
     /// Part of the image in voxels, ends excluded; an end left out is the image's [default: all of it]
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1", value_parser = parse_crop, allow_hyphen_values = true)]
     pub(crate) crop: Option<Crop>,
@@ -231,7 +236,7 @@ impl OutputArgs {
 #[command(next_help_heading = "Output")]
 pub(crate) struct DrawnArgs {
     /// Write the surface once more, in a file of its own, in the format of its name; with several objects FILE-1.ply,
-    /// FILE-2.ply, ...
+    /// FILE-2.ply, ..., with several times FILE-t0000.ply or FILE-t0000-1.ply, ...
     #[arg(long, value_name = "FILE.ply|obj|stl|vtp")]
     pub(crate) mesh: Option<PathBuf>,
     /// Draw three slices through the objects with their outlines

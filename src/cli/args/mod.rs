@@ -11,6 +11,7 @@ pub(crate) mod middle;
 pub(crate) mod pages;
 pub(crate) mod reconstruct;
 pub(crate) mod survive;
+pub(crate) mod times;
 pub(crate) mod values;
 pub(crate) mod verify;
 #[cfg(feature = "viewer")]

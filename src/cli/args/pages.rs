@@ -31,15 +31,12 @@ impl PagesArgs {
     }
 }
 
-/// Which of the volumes in a file is read.
+/// Which of the volumes in a file is read, whatever its time.
 #[derive(Clone, Debug, Default, Args)]
-pub(crate) struct VolumeArgs {
+pub(crate) struct VolumesArgs {
     /// Channel of the image, or of label volumes, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) channel: u32,
-    /// Time point of the image, or of label volumes, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) time: u32,
     /// Resolution of an OME-Zarr image or of a TIFF with smaller copies of its pages, 0 the finest
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) level: u32,
@@ -47,9 +44,26 @@ pub(crate) struct VolumeArgs {
     pub(crate) pages: PagesArgs,
 }
 
+impl VolumesArgs {
+    /// What to read: a channel at a time, at a level of a multiscale image.
+    pub(crate) fn select_at(&self, time: u32) -> Select {
+        Select { channel: self.channel, time, level: self.level, ..self.pages.select() }
+    }
+}
+
+/// Which of the volumes in a file is read.
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct VolumeArgs {
+    #[command(flatten)]
+    pub(crate) of_time: VolumesArgs,
+    /// Time point of the image, or of label volumes, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) time: u32,
+}
+
 impl VolumeArgs {
     /// What to read: a channel at a time, at a level of a multiscale image.
     pub(crate) fn select(&self) -> Select {
-        Select { channel: self.channel, time: self.time, level: self.level, ..self.pages.select() }
+        self.of_time.select_at(self.time)
     }
 }

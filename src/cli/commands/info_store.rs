@@ -31,8 +31,10 @@ pub(crate) fn store(path: &Path, image: Option<u32>) -> Result<(Value, Lines)> {
                 let mut levels: Vec<Value> = image.levels.iter().map(level_json).collect();
                 match range(&path.join(&group), chosen, &image.levels) {
                     Ok(Some((level, [low, high]))) => {
-                        let of =
+                        let mut of =
                             if level == 0 { String::new() } else { format!(" on level {}", image.levels[level].path) };
+                        of +=
+                            if image.axes.first().is_some_and(|axis| axis == "t") { " at the first time" } else { "" };
                         lines
                             .push(line(&format!("{name}, values"), format!("{} to {}{of}", number(low), number(high))));
                         levels[level]["range"] = json!([low, high]);
@@ -133,6 +135,24 @@ fn summary(report: &Value) -> Lines {
         line("from", made_from(&report["settings"])),
         line("seconds", report["seconds"].as_f64().map_or("?".into(), number)),
     ];
+    let mut over_time: Vec<(u64, Vec<f64>)> = Vec::new();
+    for object in report["result"]["times"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .flat_map(|time| time["objects"].as_array().into_iter().flatten())
+    {
+        let (Some(label), Some(volume)) = (object["label"].as_u64(), object["volume"].as_f64()) else { continue };
+        match over_time.iter_mut().find(|(known, _)| *known == label) {
+            Some((_, volumes)) => volumes.push(volume),
+            None => over_time.push((label, vec![volume])),
+        }
+    }
+    for (label, volumes) in over_time {
+        let [low, high] = [f64::min, f64::max].map(|of| volumes.iter().copied().reduce(of).map_or("?".into(), number));
+        let text = format!("volume {low} to {high} ({unit} cubed) at {} times (volumes.csv)", volumes.len());
+        lines.push(line(&format!("object {label}"), text));
+    }
     for object in report["result"]["objects"].as_array().into_iter().flatten() {
         let value = |name: &str| object[name].as_f64().map_or("?".into(), number);
         lines.push(line(

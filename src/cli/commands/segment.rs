@@ -2,20 +2,23 @@
 
 mod notes;
 mod plan;
+mod series;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use crate::cli::args::common::SegmentArgs;
-use crate::cli::inputs::image::{chosen_notes, crop_box, open_stack};
-use crate::cli::inputs::marks::{Marks, Objects, Reading, check_all_marks, read_marks};
+use crate::cli::inputs::image::{OpenStack, chosen_notes, crop_box, open_stack};
+use crate::cli::inputs::marks::{Objects, Reading, check_all_marks, read_marks};
+use crate::cli::inputs::over_time::MarksAt;
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::{Outputs, numbered};
 use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
-use crate::cli::outputs::survival::{finished_before, save_points};
+use crate::cli::outputs::survival::{finished_before, save_points, save_points_of};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -36,6 +39,7 @@ use crate::pipeline::segment::{
     segment,
 };
 use crate::store::HiddenFolder;
+use crate::store::checkpoint::Identity;
 use notes::refusal;
 
 /// A segmentation that is ready to start: all inputs are open and checked.
@@ -50,11 +54,20 @@ pub(crate) struct Job {
     /// The grid of the part that is segmented.
     geometry: Geometry,
     crop: Box3,
-    marks: Marks,
+    /// The marks, and where they are from where they are those of a series.
+    marks: MarksAt,
     objects: Objects,
     console: Arc<Console>,
     cancel: Cancel,
     started: Instant,
+    /// The image's time, counted from 0.
+    time: u32,
+    /// What tells the run from others, where its inputs have been looked at before.
+    identity: Option<Identity>,
+    /// Whether the store gets a page of its report.
+    has_page: bool,
+    /// Whether what was found is printed at the end, and not with that of other times.
+    prints: bool,
 }
 
 /// How the command and its inputs are called.
@@ -66,13 +79,15 @@ pub(crate) struct Names {
 
 /// Runs the command.
 pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
-    let points = args.points.iter().map(|path| path.display().to_string()).collect();
+    if args.picture.time.one().is_none() {
+        return series::run(args, typed);
+    }
     let mut args = args.clone();
     let files = [&args.output.report, &args.drawn.mesh, &args.drawn.picture].map(Clone::clone);
     if finished_before(&mut args.output, &files, typed)? {
         return Ok(());
     }
-    let names = Names { command: "segment", image: args.image.display().to_string(), points };
+    let names = Names::of(&args);
     let job = Job::new(names, args.clone(), typed, signals::cancel_on_signals()?)?;
     let estimate = job.estimate();
     if args.output.dry_run {
@@ -82,9 +97,38 @@ pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     job.run(&estimate).map(|_| ())
 }
 
+impl Names {
+    /// Those of a segmentation.
+    fn of(args: &SegmentArgs) -> Self {
+        let points = args.points.iter().map(|path| path.display().to_string()).collect();
+        Self { command: "segment", image: args.image.display().to_string(), points }
+    }
+}
+
+/// Where a job's marks come from: they are read when its image is open.
+type Marking<'a> = &'a mut dyn FnMut(&OpenStack, &Console) -> Result<MarksAt>;
+
 impl Job {
     /// Understands what was typed and opens the inputs.
     pub(crate) fn new(names: Names, args: SegmentArgs, typed: &[String], cancel: Cancel) -> Result<Self> {
+        let console = Console::new(Voice::of_run(&args.output));
+        let (points, points_in, time) = (args.points.clone(), args.points_in, args.picture.time.first());
+        let mut marking = |opened: &OpenStack, console: &Console| {
+            let reading = Reading { image: &opened.geometry, points_in, time: Some(time) };
+            Ok(MarksAt { marks: read_marks(&points, &reading, console)?, origins: BTreeMap::new() })
+        };
+        Self::of_time(names, args, typed, (cancel, console), time, &mut marking)
+    }
+
+    /// The same for a time of the image, with marks from somewhere.
+    fn of_time(
+        names: Names,
+        args: SegmentArgs,
+        typed: &[String],
+        (cancel, console): (Cancel, Console),
+        time: u32,
+        marking: Marking<'_>,
+    ) -> Result<Self> {
         let started = Instant::now();
         let settings = settings::settings(&args)?;
         let spacing = settings::spacing("--image-spacing", args.picture.image_spacing)?;
@@ -103,19 +147,22 @@ impl Job {
         args.drawn.mesh.as_deref().map(mesh_format).transpose()?;
         args.drawn.picture.as_deref().map(picture::check_name).transpose()?;
         let resources = settings::resources(&args.resources, args.output.store())?;
-        let console = Arc::new(Console::new(Voice::of_run(&args.output)));
-        let picture = &args.picture;
-        let select = picture.volume.select();
+        let console = Arc::new(console);
+        let select = args.picture.volume.select_at(time);
         let opened = open_stack(&args.image, select, spacing)?;
-        let chosen = chosen_notes(&args.image, opened.stack.info(), select);
-        opened.notes.iter().chain(&chosen).for_each(|note| console.note(note));
+        let mut notes = opened.notes.clone();
+        notes.extend(chosen_notes(&args.image, opened.stack.info(), select));
+        // Who asks for all times need not be told that there are several.
+        notes.retain(|note| args.picture.time.one().is_some() || !note.contains("--time"));
+        for note in &notes {
+            console.note(note);
+        }
         let crop = crop_box(args.picture.crop, opened.geometry.shape)?;
-        let reading = Reading { image: &opened.geometry, points_in: args.points_in, time: select.time };
-        let marks = read_marks(&args.points, &reading, &console)?;
+        let marks = marking(&opened, &console)?;
         let geometry = opened.geometry.crop(&crop);
         check_lengths(&settings, &geometry)?;
         let grids = Grids { whole: &opened.geometry, part: &geometry, guessed: opened.guessed };
-        let objects = check_all_marks(&marks, &grids, &args.seed, &console)?;
+        let objects = check_all_marks(&marks.marks, &grids, &args.seed, &console)?;
         let numbers = objects.numbers();
         if let Some(path) = args.drawn.mesh.as_deref().filter(|_| numbers.len() > 1) {
             let meshes: Vec<PathBuf> = numbers.iter().map(|&object| numbered(path, object)).collect();
@@ -141,6 +188,10 @@ impl Job {
             console,
             cancel,
             started,
+            time,
+            identity: None,
+            has_page: true,
+            prints: true,
         })
     }
 
@@ -156,7 +207,12 @@ impl Job {
     /// Runs the segmentation and writes all that was asked for; returns what was found.
     pub(crate) fn run(&self, estimate: &Estimate) -> Result<Outcome> {
         self.fits(estimate)?;
-        self.console.say(&format!(
+        let tell = |line: &str| {
+            if self.prints {
+                self.console.say(line);
+            }
+        };
+        tell(&format!(
             "{}: {}, about {}; memory up to {}, {} of temporary fields in {}",
             self.names.image,
             match self.objects.numbers().len() {
@@ -171,18 +227,21 @@ impl Job {
         if self.console.is_verbose() {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
-        let saving = save_points(&self.args.output, &self.typed, self.console.as_ref())?;
+        let saving = match &self.identity {
+            Some(known) => save_points_of(&self.args.output, known, self.console.as_ref())?,
+            None => save_points(&self.args.output, &self.typed, self.console.as_ref())?,
+        };
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_save_points(saving);
         let (voxels, threads, writes) = (self.crop.volume(), self.resources.threads, self.needs_store());
         engine.outlook().expect(with_page(
             plan(estimate, &self.guides(), voxels, threads, writes),
-            self.args.output.store().is_some(),
+            self.has_page && self.args.output.store().is_some(),
         ));
         let result = self.solve_and_write(&engine);
         self.console.clear();
         engine.settle_save_points(&result);
         let outcome = result?;
-        if !self.args.output.quiet {
+        if self.prints && !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())))?;
         }
         match outcome.refused.as_slice() {
@@ -210,7 +269,7 @@ impl Job {
         let taken = meshes.as_ref().map(|meshes| meshes as &dyn ObjectMeshes);
         let out = (store.as_ref(), taken);
         let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, out)
-            .map_err(|error| self.marks.named_in(error))?;
+            .map_err(|error| self.marks.marks.named_in(error))?;
         self.note_findings(&outcome);
         note_anchor(self.args.drawn.mesh.as_deref(), &self.geometry, &self.console);
         if let Some(store) = &store {
@@ -226,7 +285,11 @@ impl Job {
                 points: "marks",
             };
             let written = Written { store, engine, console: self.console.as_ref() };
-            written.write(&evidence, || self.report(engine, &outcome))?;
+            if self.has_page {
+                written.write(&evidence, || self.report(engine, &outcome))?;
+            } else {
+                self.report(engine, &outcome).write(&store.file("report.json")?, true)?;
+            }
         }
         engine.check()?;
         drop(telling);
@@ -271,7 +334,7 @@ impl Job {
     /// The middle of all marks, kept inside the image.
     fn centre(&self) -> [f64; 3] {
         let seed = self.args.seed.first().map_or([0.0; 3], |seed| seed.centre);
-        let (low, high) = self.marks.cloud.bounds().unwrap_or((seed, seed));
+        let (low, high) = self.marks.marks.cloud.bounds().unwrap_or((seed, seed));
         std::array::from_fn(|a| 0.5 * (low[a] + high[a]))
     }
 
@@ -298,7 +361,7 @@ impl Job {
             channel: volume.channel,
             axes: volume.pages.axes.map(|axes| axes.to_string()),
             image_index: volume.pages.image_index,
-            time: volume.time,
+            time: self.time,
             level: volume.level,
             crop_xyz: crop_xyz(&self.crop),
             image_type: outcome.element.name(),
@@ -314,6 +377,6 @@ impl Job {
             ranks: engine.comm().ranks(),
             started: self.started,
         };
-        Report::new(&ran, settings, &outcome.geometry, Found::new(outcome))
+        Report::new(&ran, settings, &outcome.geometry, Found::new(outcome, &self.marks.origins))
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::terminal::text::{bytes, grouped};
 use crate::error::Result;
-use crate::io::ome_zarr::is_store;
+use crate::io::ome_zarr::{TIMES, is_store};
 use crate::io::stack::volume::Select;
 use crate::io::stack::zarr::{LevelDescription, ZarrImage};
 use crate::pipeline::image::value_range::value_range;
@@ -28,7 +28,9 @@ pub(crate) fn groups(store: &Path) -> Vec<String> {
         let depth = if group.is_empty() { 0 } else { group.split('/').count() };
         let below = |path: PathBuf| {
             let name = path.file_name()?.to_string_lossy().into_owned();
-            is_group(&path).then(|| if group.is_empty() { name } else { format!("{group}/{name}") })
+            // Those of single times are told as one.
+            let is_told = is_group(&path) && !(group.is_empty() && name == TIMES);
+            is_told.then(|| if group.is_empty() { name } else { format!("{group}/{name}") })
         };
         if depth < DEEPEST {
             let here = found.len();
@@ -64,7 +66,10 @@ pub(crate) fn range(path: &Path, image: Option<u32>, levels: &[LevelDescription]
 
 /// The files beside the images, and what each holds.
 pub(crate) fn contents(store: &Path) -> Vec<(String, String)> {
-    files(store).iter().filter_map(|file| described(store, file)).collect()
+    let times = entries(&store.join(TIMES)).into_iter().filter(|path| is_group(path)).count();
+    let what = || format!("level sets, distances, marks and report of each of {times} times; surfaces in meshes");
+    let of_times = (times > 0).then(|| (TIMES.to_owned(), what()));
+    files(store).iter().filter_map(|file| described(store, file)).chain(of_times).collect()
 }
 
 /// The files of the root and its folders without arrays, by name.

@@ -24,21 +24,24 @@ pub(crate) struct Reading<'a> {
     pub(crate) image: &'a Geometry,
     /// What was asked for, in place of what the file's form says.
     pub(crate) points_in: Option<PointsIn>,
-    /// The time of the image, counted from 0.
-    pub(crate) time: u32,
+    /// The time of the image, counted from 0; none where points of all times are wanted.
+    pub(crate) time: Option<u32>,
 }
 
 /// The marks of all files, and which file each object is from.
+#[derive(Default)]
 pub(crate) struct Marks {
     pub(crate) cloud: PointCloud,
     pub(crate) files: BTreeMap<u32, PathBuf>,
+    /// The time of each point, where points of all times were wanted; none of those whose file names no times.
+    pub(crate) times: Vec<Option<i64>>,
     /// The objects whose numbers were read as lengths though nothing says that they are.
     unsure: Vec<u32>,
 }
 
 /// Reads all files of marks. A file that names no objects is one object; those of later files are numbered on.
 pub(crate) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Console) -> Result<Marks> {
-    let mut marks = Marks { cloud: PointCloud::default(), files: BTreeMap::new(), unsure: Vec::new() };
+    let mut marks = Marks::default();
     for (n, path) in paths.iter().enumerate() {
         if path.as_os_str() == "-" && paths[..n].contains(path) {
             return Err(Error::usage("--points - is given twice; standard input holds one file"));
@@ -52,7 +55,12 @@ pub(crate) fn read_marks(paths: &[PathBuf], reading: &Reading<'_>, console: &Con
         file.notes.iter().for_each(|told| note(told));
         let is_given = |axis: usize| file.scales[axis] != Scale::Physical || file.units[axis].is_some();
         let is_sure = reading.points_in.is_some() || (0..3).all(is_given);
+        let times = file.times.clone();
         let cloud = placed(file, reading, note).map_err(|error| error.at(path))?;
+        if reading.time.is_none() {
+            let known = times.into_iter().map(Some);
+            marks.times.extend(known.chain(std::iter::repeat(None)).take(cloud.len()));
+        }
         if !marks.cloud.is_empty() && marks.cloud.contours.is_empty() != cloud.contours.is_empty() {
             let (this, other) =
                 if cloud.contours.is_empty() { ("no contours", "does") } else { ("contours", "does not") };
@@ -88,7 +96,10 @@ fn is_same(a: &Path, b: &Path) -> bool {
 pub(crate) fn placed(file: PointFile, reading: &Reading<'_>, note: impl Fn(&str)) -> Result<PointCloud> {
     let image = reading.image;
     let (form, scales, units) = (file.form.clone(), file.scales, file.units);
-    let mut cloud = of_time(file, reading.time, &note)?;
+    let mut cloud = match reading.time {
+        Some(time) => of_time(file, time, &note)?,
+        None => file.cloud,
+    };
     let in_voxels: [bool; 3] = std::array::from_fn(|axis| match (scales[axis], reading.points_in) {
         (Scale::Slices, _) | (_, Some(PointsIn::Voxels)) => true,
         (_, Some(PointsIn::Physical)) => false,
@@ -168,6 +179,11 @@ impl Marks {
             Some(only) if error.kind() == ErrorKind::Input => error.at(only),
             _ => error,
         }
+    }
+
+    /// The marks of other points of the same objects and files.
+    pub(crate) fn with_cloud(&self, cloud: PointCloud) -> Self {
+        Self { cloud, files: self.files.clone(), times: Vec::new(), unsure: self.unsure.clone() }
     }
 
     /// Adds a file's marks; returns its objects that have another number now, with that.
@@ -259,7 +275,7 @@ mod tests {
 
     #[test]
     fn objects_of_later_files_are_numbered_on() {
-        let mut marks = Marks { cloud: PointCloud::default(), files: BTreeMap::new(), unsure: Vec::new() };
+        let mut marks = Marks::default();
         assert!(marks.add(cloud(&[2, 5, 2]), Path::new("a"), true).is_empty());
         assert!(marks.add(cloud(&[]), Path::new("b"), true).is_empty());
         assert_eq!(marks.add(cloud(&[9, 1, 9]), Path::new("c"), false), [(1, 7), (9, 8)]);

@@ -6,6 +6,7 @@ pub(crate) mod identity;
 pub(crate) mod image;
 pub(crate) mod marks;
 pub(crate) mod noted;
+pub(crate) mod over_time;
 pub(crate) mod settings;
 pub(crate) mod sources;
 pub(crate) mod typed;

@@ -101,7 +101,7 @@ fn read_placed(
             for text in &file.notes {
                 noted(text);
             }
-            let reading = Reading { image, points_in: args.points_in, time: args.volume.time };
+            let reading = Reading { image, points_in: args.points_in, time: Some(args.volume.time) };
             let cloud = placed(PointFile { cloud, ..file }, &reading, noted).map_err(|error| error.at(path))?;
             Ok(Source::Cloud(cloud))
         }

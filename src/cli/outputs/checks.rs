@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::io::geometry::read::sources::is_standard_input;
-use crate::io::ome_zarr::{LONGEST_ENDING, is_store};
+use crate::io::ome_zarr::{LONGEST_ENDING, is_store, time_name};
 use crate::job::resources::folder_of;
 
 /// What a run reads and writes.
@@ -168,6 +168,13 @@ fn slices_of(folder: &Path) -> impl Iterator<Item = Metadata> {
 fn store_around(input: &Path) -> Option<PathBuf> {
     let place = input.canonicalize().ok()?;
     place.ancestors().filter(|folder| is_store(folder)).last().map(Path::to_path_buf)
+}
+
+/// The path with a time in its name: `mesh.ply` is `mesh-t0003.ply`.
+pub(crate) fn of_time(path: &Path, time: u32) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
+    path.with_file_name(format!("{stem}-{}{extension}", time_name(time)))
 }
 
 /// The path with a number in its name: `mesh.ply` is `mesh-3.ply`.

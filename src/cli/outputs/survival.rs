@@ -17,7 +17,7 @@ use crate::store::checkpoint::{Checkpoints, Identity, difference};
 const ENDING: &str = ".checkpoint";
 
 /// The folder of a run's checkpoints, where it takes some.
-fn folder(output: &OutputArgs) -> Option<PathBuf> {
+pub(crate) fn folder(output: &OutputArgs) -> Option<PathBuf> {
     match (&output.survive.checkpoint, output.store()) {
         (Some(Checkpoint::Folder(folder)), _) => Some(folder.clone()),
         (None, Some(store)) => Some(checkpoints_of(store)),
@@ -112,9 +112,35 @@ pub(crate) fn save_points(
     typed: &[String],
     console: &dyn Progress,
 ) -> Result<Option<Arc<SavePoints>>> {
+    let found = checkpoints(output, || identity(typed), console)?;
+    Ok(found.map(|checkpoints| Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish()))))
+}
+
+/// The same of a run whose inputs have been looked at before.
+///
+/// # Errors
+/// As [`save_points`].
+pub(crate) fn save_points_of(
+    output: &OutputArgs,
+    known: &Identity,
+    console: &dyn Progress,
+) -> Result<Option<Arc<SavePoints>>> {
+    let found = checkpoints(output, || Ok(Some(known.clone())), console)?;
+    Ok(found.map(|checkpoints| Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish()))))
+}
+
+/// The checkpoints of a run, with what it goes on from; none where it takes none.
+///
+/// # Errors
+/// As [`save_points`].
+pub(crate) fn checkpoints(
+    output: &OutputArgs,
+    identity: impl FnOnce() -> Result<Option<Identity>>,
+    console: &dyn Progress,
+) -> Result<Option<Checkpoints>> {
     let Some(folder) = folder(output) else { return Ok(None) };
-    let Some(identity) = identity(typed)? else { return Ok(None) };
-    let checkpoints = if output.survive.resume {
+    let Some(identity) = identity()? else { return Ok(None) };
+    Ok(Some(if output.survive.resume {
         let (checkpoints, found) = Checkpoints::resume(&folder, identity)?;
         found.torn.iter().for_each(|torn| console.note(&format!("a checkpoint is passed over: {torn}")));
         console.note(&match found.stages {
@@ -124,6 +150,5 @@ pub(crate) fn save_points(
         checkpoints
     } else {
         Checkpoints::begin(&folder, identity, output.overwrite)?
-    };
-    Ok(Some(Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish()))))
+    }))
 }

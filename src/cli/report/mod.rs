@@ -7,5 +7,6 @@ pub(crate) mod page;
 pub(crate) mod picture;
 pub(crate) mod reconstruction;
 pub(crate) mod run_report;
+pub(crate) mod series;
 pub(crate) mod settings;
 pub(crate) mod table;

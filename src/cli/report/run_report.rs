@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::neighbours::{Contact, Neighbours};
 use super::settings::Moved;
+use crate::cli::inputs::over_time::Origin;
 use crate::cli::terminal::console::Console;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, StageReport, peak_resident};
@@ -75,6 +76,7 @@ struct Object {
     voxels: u64,
     volume: f64,
     area: f64,
+    centroid_xyz: [f64; 3],
     closed: bool,
     components: u64,
     triangles: u64,
@@ -95,6 +97,9 @@ struct Object {
     /// Marks farther than a voxel from the surface.
     marks_off: u64,
     cross_validation: Option<CrossValidation>,
+    /// Where its marks are from, of a series.
+    #[serde(flatten)]
+    origin: Option<Origin>,
 }
 
 /// What leaving out each outline tells; the slice is that across its axis, counted from 0.
@@ -217,12 +222,13 @@ impl From<StageReport> for Stage {
 }
 
 impl Object {
-    fn new(object: &ObjectReport, voxels: u64) -> Self {
+    fn new(object: &ObjectReport, voxels: u64, origin: Option<Origin>) -> Self {
         Self {
             label: object.label,
             voxels,
             volume: object.measures.volume,
             area: object.measures.area,
+            centroid_xyz: object.measures.centroid,
             closed: object.measures.is_closed(),
             components: object.measures.components,
             triangles: object.measures.triangles,
@@ -239,14 +245,17 @@ impl Object {
             rho: object.rho,
             marks_off: object.marks_off,
             cross_validation: object.cross_validation.map(Into::into),
+            origin,
         }
     }
 }
 
 impl Found {
-    pub(crate) fn new(outcome: &Outcome) -> Self {
+    /// Of a series, with the origin of the marks of each object.
+    pub(crate) fn new(outcome: &Outcome, origins: &BTreeMap<u32, Origin>) -> Self {
         let voxels = |label| outcome.label_voxels.get(&label).copied().unwrap_or(0);
-        let objects: Vec<Object> = outcome.objects.iter().map(|o| Object::new(o, voxels(o.label))).collect();
+        let objects: Vec<Object> =
+            outcome.objects.iter().map(|o| Object::new(o, voxels(o.label), origins.get(&o.label).copied())).collect();
         let single = if let [only] = objects.as_slice() { Some(only.clone()) } else { None };
         let label_voxels = outcome.objects.iter().map(|o| (o.label.to_string(), voxels(o.label))).collect();
         let contacts = outcome.contacts.iter().map(Contact::new).collect();

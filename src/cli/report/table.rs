@@ -148,7 +148,7 @@ fn neighbours(outcome: &Outcome) -> String {
 }
 
 /// Columns two blanks apart: the first flush left, the others flush right.
-fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
+pub(super) fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
     let widths: [usize; N] = std::array::from_fn(|c| rows.iter().map(|row| row[c].chars().count()).max().unwrap_or(0));
     let mut text = String::new();
     for row in rows {

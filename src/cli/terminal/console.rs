@@ -71,6 +71,8 @@ pub(crate) struct Console {
     due: AtomicU64,
     open: Mutex<Open>,
     notes: Mutex<Vec<String>>,
+    /// What runs before this one have said.
+    said: Vec<String>,
     outlook: OnceLock<Arc<Outlook>>,
 }
 
@@ -96,8 +98,14 @@ impl Console {
             due: AtomicU64::new(BETWEEN_LINES.as_millis() as u64),
             open: Mutex::default(),
             notes: Mutex::default(),
+            said: Vec::new(),
             outlook: OnceLock::new(),
         }
+    }
+
+    /// That of one of several runs of a kind: what those before it have noted is kept, and not said once more.
+    pub(crate) fn after(voice: Voice, said: Vec<String>) -> Self {
+        Self { said, ..Self::new(voice) }
     }
 
     /// True when settings and stages are to be told.
@@ -266,6 +274,9 @@ impl Progress for Console {
             notes.push(line.into());
             notes.len() - 1
         };
+        if self.said.iter().any(|said| said == line) {
+            return;
+        }
         if before == MOST_NOTES && self.voice != Voice::Json {
             self.say("more notes are in the report alone");
         }

@@ -17,6 +17,7 @@ pub struct ImageReader {
     folder: PathBuf,
     levels: Vec<StoredLevel>,
     kind: Option<String>,
+    times: Option<u64>,
 }
 
 /// One resolution level as its metadata tells it.
@@ -32,6 +33,8 @@ pub struct StoredLevel {
     pub shard: [i64; 3],
     /// What stands before the number of a shard in the path of its file.
     prefix: &'static str,
+    /// The time that is read, of an image with an axis of time.
+    time: Option<u64>,
 }
 
 impl StoredLevel {
@@ -39,7 +42,8 @@ impl StoredLevel {
     #[must_use]
     pub fn file_of(&self, voxel: [i64; 3]) -> String {
         let [x, y, z]: [i64; 3] = std::array::from_fn(|a| voxel[a] / self.shard[a]);
-        format!("{}/{}{z}/{y}/{x}", self.path, self.prefix)
+        let time = self.time.map_or(String::new(), |time| format!("{time}/"));
+        format!("{}/{}{time}{z}/{y}/{x}", self.path, self.prefix)
     }
 }
 
@@ -47,21 +51,47 @@ impl ImageReader {
     /// Opens the multiscale in a group: the store's folder itself, or one below it such as `labels/segmentation`.
     ///
     /// # Errors
-    /// When there is none, or not with the axes z, y, x.
+    /// When there is none, or not with the axes z, y, x, or t before them; of those the first time is read.
     pub fn open(group: &Path) -> Result<Self> {
         let is_version_2 = group.join(".zattrs").is_file();
         let document = read_json(&group.join(if is_version_2 { ".zattrs" } else { "zarr.json" }))?;
         let ome = if is_version_2 { &document } else { &document["attributes"]["ome"] };
         let multiscale = &ome["multiscales"][0];
         let read = |multiscale: &Value| {
-            let unit = axes(multiscale)?;
+            let axes = axes(multiscale)?;
             let datasets = multiscale["datasets"].as_array()?;
-            datasets.iter().map(|dataset| level(group, dataset, unit.clone())).collect::<Option<Vec<_>>>()
+            datasets.iter().map(|dataset| level(group, dataset, &axes)).collect::<Option<Vec<_>>>()
         };
         let levels = read(multiscale)
+            .filter(|levels| levels.iter().all(|(_, times)| *times != Some(0) && *times == levels[0].1))
             .filter(|levels| !levels.is_empty())
             .ok_or_else(|| Error::input("holds no OME-Zarr image with the axes z, y, x that can be read").at(group))?;
-        Ok(Self { folder: group.to_path_buf(), levels, kind: multiscale["type"].as_str().map(ToOwned::to_owned) })
+        let kind = multiscale["type"].as_str().map(ToOwned::to_owned);
+        let times = levels[0].1;
+        Ok(Self {
+            folder: group.to_path_buf(),
+            levels: levels.into_iter().map(|(level, _)| level).collect(),
+            kind,
+            times,
+        })
+    }
+
+    /// How many times the image has; none where it has no axis of time.
+    #[must_use]
+    pub fn times(&self) -> Option<u64> {
+        self.times
+    }
+
+    /// The same image, read at a time of its own, counted from 0.
+    ///
+    /// # Panics
+    /// When it has no such time.
+    #[must_use]
+    pub fn at(&self, time: u64) -> Self {
+        assert!(self.times.is_some_and(|times| time < times), "a time of the image");
+        let mut of_time = self.clone();
+        of_time.levels.iter_mut().for_each(|level| level.time = Some(time));
+        of_time
     }
 
     /// How coarser levels are made, as the metadata say it: `mean` or `mode` of those that we wrote.
@@ -103,7 +133,8 @@ impl ImageReader {
     fn read<T: ElementOwned + Into<f64>>(&self, level: &StoredLevel, part: &Box3) -> Result<Vec<f64>> {
         let store = FilesystemStore::new(&self.folder).map_err(|e| self.unreadable(e))?;
         let array = Array::open(Arc::new(store), &format!("/{}", level.path)).map_err(|e| self.unreadable(e))?;
-        let ranges = [2, 1, 0].map(|a| part.lo[a] as u64..part.hi[a] as u64);
+        let space = [2, 1, 0].map(|a| part.lo[a] as u64..part.hi[a] as u64);
+        let ranges: Vec<_> = level.time.map(|time| time..time + 1).into_iter().chain(space).collect();
         let subset = ArraySubset::new_with_ranges(&ranges);
         let values = array.retrieve_array_subset::<Vec<T>>(&subset).map_err(|e| self.unreadable(e))?;
         Ok(values.into_iter().map(Into::into).collect())
@@ -119,37 +150,49 @@ fn read_json(path: &Path) -> Result<Value> {
     serde_json::from_slice(&text).map_err(|e| Error::input(format!("is no JSON: {e}")).caused_by(e).at(path))
 }
 
-/// The unit of the axes, where they have one; none when the axes are not z, y, x.
-#[allow(clippy::option_option)]
-fn axes(multiscale: &Value) -> Option<Option<String>> {
-    let axes = multiscale["axes"].as_array()?;
-    let names: Vec<&str> = axes.iter().filter_map(|axis| axis["name"].as_str()).collect();
-    (names == ["z", "y", "x"]).then(|| axes[0]["unit"].as_str().map(ToOwned::to_owned))
+/// The axes of an image.
+struct Axes {
+    /// The unit of z, y, x, where they have one.
+    unit: Option<String>,
+    /// Whether t comes before them.
+    has_time: bool,
 }
 
-fn level(group: &Path, dataset: &Value, unit: Option<String>) -> Option<StoredLevel> {
+/// None when the axes are not z, y, x, nor t, z, y, x.
+fn axes(multiscale: &Value) -> Option<Axes> {
+    let axes = multiscale["axes"].as_array()?;
+    let names: Vec<&str> = axes.iter().filter_map(|axis| axis["name"].as_str()).collect();
+    let has_time = names == ["t", "z", "y", "x"];
+    let unit = axes.last().and_then(|axis| axis["unit"].as_str().map(ToOwned::to_owned));
+    (has_time || names == ["z", "y", "x"]).then_some(Axes { unit, has_time })
+}
+
+/// A level, and how many times it has where these are an axis.
+fn level(group: &Path, dataset: &Value, axes: &Axes) -> Option<(StoredLevel, Option<u64>)> {
     let path = dataset["path"].as_str()?.to_owned();
     let document = |name: &str| read_json(&group.join(&path).join(name)).ok();
     let (array, prefix) =
         document("zarr.json").map(|array| (array, "c/")).or_else(|| Some((document(".zarray")?, "")))?;
-    let shard = xyz(&array["chunk_grid"]["configuration"]["chunk_shape"], Value::as_i64)
-        .or_else(|| xyz(&array["chunks"], Value::as_i64))
+    let has_time = axes.has_time;
+    let shard = xyz(&array["chunk_grid"]["configuration"]["chunk_shape"], has_time, Value::as_i64)
+        .or_else(|| xyz(&array["chunks"], has_time, Value::as_i64))
         .filter(|shard: &[i64; 3]| shard.iter().all(|&n| n > 0))?;
     let transformations = dataset["coordinateTransformations"].as_array()?;
-    let vector = |kind: &str| transformations.iter().find_map(|t| xyz(&t[kind], Value::as_f64));
+    let vector = |kind: &str| transformations.iter().find_map(|t| xyz(&t[kind], has_time, Value::as_f64));
     let geometry = Geometry {
-        shape: xyz(&array["shape"], Value::as_i64)?,
+        shape: xyz(&array["shape"], has_time, Value::as_i64)?,
         spacing: vector("scale")?,
         origin: vector("translation").unwrap_or([0.0; 3]),
-        unit,
+        unit: axes.unit.clone(),
     };
     let element = array["data_type"].as_str().or_else(|| named_type(array["dtype"].as_str()?))?.to_owned();
-    Some(StoredLevel { path, geometry, element, shard, prefix })
+    let times = if has_time { Some(array["shape"][0].as_u64()?) } else { None };
+    Some((StoredLevel { path, geometry, element, shard, prefix, time: has_time.then_some(0) }, times))
 }
 
-/// A list of z, y, x as a triple.
-fn xyz<T: Copy>(list: &Value, number: impl Fn(&Value) -> Option<T>) -> Option<[T; 3]> {
-    let values: Vec<T> = list.as_array()?.iter().filter_map(number).collect();
+/// The z, y, x of a list, which may begin with t, as a triple.
+fn xyz<T: Copy>(list: &Value, has_time: bool, number: impl Fn(&Value) -> Option<T>) -> Option<[T; 3]> {
+    let values: Vec<T> = list.as_array()?.iter().skip(usize::from(has_time)).filter_map(number).collect();
     let [z, y, x] = values.try_into().ok()?;
     Some([x, y, z])
 }

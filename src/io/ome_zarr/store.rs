@@ -13,6 +13,7 @@ use super::place::{Place, check_target, put_back};
 use super::pyramid::{LevelPlan, plan_levels};
 use super::root::Root;
 use super::shard::ShardLayout;
+use super::sums::FileSum;
 use super::version::OmeVersion;
 use crate::error::{Error, Result};
 use crate::store::ElementType;
@@ -110,6 +111,21 @@ impl StoreWriter {
         self.place.folder()
     }
 
+    /// Where it will lie.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The version that it is written in.
+    pub(super) fn version(&self) -> OmeVersion {
+        self.root.version()
+    }
+
+    /// A file is there that another run has written, with the sum of its bytes.
+    pub(super) fn took_over(&self, file: &Path, sum: FileSum) {
+        self.root.wrote(file, sum);
+    }
+
     /// Where to write a further file of the store (`meshes/surface.ply`, `report.json`); its folder exists.
     ///
     /// # Errors
@@ -185,6 +201,25 @@ impl StoreWriter {
         self.place.finish(&self.path, self.overwrite, &self.root)
     }
 
+    /// Makes the groups above an image, and its own.
+    pub(super) fn begin_group(&self, group: &str) -> Result<()> {
+        self.ensure_groups(Path::new(group))
+    }
+
+    /// Says what the image of a group is, all of whose levels are there, and lists it where it is a label image.
+    pub(super) fn end_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
+        self.write_group(group, attributes)?;
+        group.strip_prefix("labels/").map_or(Ok(()), |name| self.list_labels(name))
+    }
+
+    /// Lists a label image. Under the lock until it is on disk: the list names what is there, whichever thread comes first.
+    fn list_labels(&self, name: &str) -> Result<()> {
+        let mut names = self.lock();
+        names.push(name.to_owned());
+        names.sort();
+        self.root.version().write(&self.inside("labels"), &metadata::group(Some(metadata::label_list(&names))))
+    }
+
     fn begin_labels(&self, spec: &LabelSpec<'_>) -> Result<ImageWriter> {
         assert!(
             matches!(spec.element, ElementType::U8 | ElementType::U16 | ElementType::U32),
@@ -195,11 +230,7 @@ impl StoreWriter {
         let attributes = metadata::labels(spec, &levels, true);
         let image =
             self.multiscale(&format!("labels/{}", spec.name), attributes, levels, (spec.element, Content::Repeated))?;
-        // Listed last, under the lock until it is on disk: the list names what is there, whichever thread comes first.
-        let mut names = self.lock();
-        names.push(spec.name.to_owned());
-        names.sort();
-        self.root.version().write(&self.inside("labels"), &metadata::group(Some(metadata::label_list(&names))))?;
+        self.list_labels(spec.name)?;
         Ok(image)
     }
 

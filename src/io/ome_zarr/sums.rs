@@ -48,6 +48,12 @@ impl FileSum {
         self.length += bytes.len() as u64;
     }
 
+    /// That of a line of the list.
+    pub(super) fn of_line(line: &str) -> Option<Self> {
+        let mut words = line.split(' ');
+        Some(Self { crc: u32::from_str_radix(words.next()?, 16).ok()?, length: words.next()?.parse().ok()? })
+    }
+
     /// The line of a file in the list.
     #[must_use]
     pub fn line(self, path: &str) -> String {

@@ -1,6 +1,7 @@
 //! Volumes in files: TIFF stacks and Zarr images, NRRD and VTI.
 
 pub mod formats;
+pub mod interval;
 pub mod label_volume;
 mod number;
 pub mod page_axes;

@@ -1,5 +1,6 @@
 //! What a stack is, whatever its file: shape, sample type, spacing, channels, and which part of it is read.
 
+use super::interval::Interval;
 use super::page_axes::PageAxes;
 use crate::store::{ElementType, VolumeSource};
 
@@ -22,6 +23,8 @@ pub struct StackInfo {
     pub origin: [f64; 3],
     /// The unit of `spacing` as OME-Zarr spells it, where the file tells it.
     pub unit: Option<String>,
+    /// The time from one time point to the next, where the file tells it.
+    pub interval: Option<Interval>,
     /// The axes as stored, slowest first, `S` for samples inside a pixel: `TZCYX`.
     pub axes: String,
     /// How the samples are compressed.

@@ -7,3 +7,4 @@ pub mod grey;
 pub mod labels;
 pub mod morphology;
 pub mod picture;
+pub mod shift;

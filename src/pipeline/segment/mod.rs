@@ -39,5 +39,5 @@ pub use neighbours::{FillGaps, Found as NeighboursFound, Joined, Joining, draw_f
 pub use object_report::Refused;
 pub use object_report::{CrossValidation, ObjectReport};
 pub use outlined::outlines::crossed;
-pub use output::{LARGEST_WHOLE, Outcome, segment, segment_kept};
+pub use output::{LARGEST_WHOLE, Outcome, image_alone, segment, segment_kept};
 pub use settings::{Guides, ImageModel, SegmentSettings, Start};

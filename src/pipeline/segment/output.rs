@@ -84,6 +84,45 @@ pub fn segment_kept(
     stack.element().with_samples(Job { engine, stack, crop, guides, settings, store, meshes: None, keeps: true })
 }
 
+/// Writes the part `crop` of a stack, whose grid is `geometry`, as the image of a store without objects: where none of them can be solved.
+///
+/// # Errors
+/// When the memory is too little, the stack cannot be read, the store cannot be written, scratch runs out, or the run is interrupted.
+pub fn image_alone(
+    engine: &Engine,
+    stack: &dyn VolumeSource,
+    crop: &Box3,
+    geometry: &Geometry,
+    settings: &SegmentSettings,
+    store: &StoreWriter,
+) -> Result<()> {
+    stack.element().with_samples(Alone { engine, stack, crop, geometry, settings, store })
+}
+
+struct Alone<'a> {
+    engine: &'a Engine,
+    stack: &'a dyn VolumeSource,
+    crop: &'a Box3,
+    geometry: &'a Geometry,
+    settings: &'a SegmentSettings,
+    store: &'a StoreWriter,
+}
+
+impl SampleWork for Alone<'_> {
+    type Output = Result<()>;
+
+    fn on<T: Sample>(self) -> Self::Output {
+        let Self { engine, stack, crop, geometry, settings, store } = self;
+        let nobody = Guides { geometry, objects: &[], refused: &[] };
+        let needs = estimate(stack, crop, &nobody, settings, engine.threads() as u64, true);
+        let _held = engine.reserve(needs.footprint)?;
+        let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
+        let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles, None)?;
+        stage.finish();
+        write_image(engine, geometry, &image, store)
+    }
+}
+
 /// What there is to segment, and where it goes.
 struct Job<'a> {
     engine: &'a Engine,
@@ -146,8 +185,10 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let early = shown_in.map(|store| begin_early(engine, guides, settings, store)).transpose()?;
     let early = early.as_deref();
     let Objects { solved, refused } = solve_all(engine, &picture, guides, settings, (store, meshes), early)?;
+    let marked = guides.objects.iter().map(|marks| marks.object);
+    let highest = marked.chain(refused.iter().map(|refused| refused.label)).max().unwrap_or(0);
     let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
-    let label_voxels = write_labels(engine, guides.geometry, &joined, &solved, (store, early))?;
+    let label_voxels = write_labels(engine, guides.geometry, (&joined, highest), &solved, (store, early))?;
     let contacts = match solved.len() {
         0 | 1 => Vec::new(),
         _ => write_faces(engine, guides.geometry, &joined, settings, store)?,

@@ -6,6 +6,7 @@ mod distances;
 mod found;
 mod objects;
 mod rerun;
+mod series;
 mod structure;
 mod sums;
 mod surface;
@@ -17,7 +18,7 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Footprint};
-use crate::io::ome_zarr::listed_sums;
+use crate::io::ome_zarr::{TIMES, listed_sums};
 use structure::Image;
 
 pub use found::{Check, Fault};
@@ -32,8 +33,12 @@ pub fn verify(engine: &Engine, store: &Path, tell: &mut dyn FnMut(Check)) -> Res
     tell(sums::check(engine, store)?);
     let (structure, images) = structure::check(store)?;
     tell(structure);
-    for image in &images {
+    let is_of_time = |image: &&Image| image.group.starts_with(&format!("{TIMES}/"));
+    for image in images.iter().filter(|image| !is_of_time(image)) {
         tell(voxels::check(engine, image)?);
+    }
+    if let Some(check) = voxels::check_all(engine, TIMES, images.iter().filter(is_of_time))? {
+        tell(check);
     }
     let mut told = Check::new("report.json");
     let report = read_report(store, &images, &mut told);
@@ -41,15 +46,14 @@ pub fn verify(engine: &Engine, store: &Path, tell: &mut dyn FnMut(Check)) -> Res
     let Some(report) = report else { return Ok(()) };
     let result = &report["result"];
     let of = |group: &str| images.iter().find(|image| image.group == group);
+    if result["times"].is_array() {
+        return series::check(engine, store, &images, &report, tell);
+    }
     match report["command"].as_str().unwrap_or_default() {
         "segment" | "demo" => {
             tell(objects::check(engine, &images, &report)?);
             for object in result["objects"].as_array().into_iter().flatten() {
-                let own = format!("object-{}", object["label"]);
-                let is_alone = of("levelset").is_some();
-                let mesh = if is_alone { "meshes/surface.ply".into() } else { format!("meshes/{own}.ply") };
-                let field = if is_alone { of("levelset") } else { of(&format!("levelset/{own}")) };
-                tell(surface::check(engine, store, &mesh, field, object)?);
+                tell(surface::check_object(engine, store, (&images, "meshes"), object)?);
             }
         }
         "reconstruct" => tell(surface::check(engine, store, "meshes/surface.ply", of(""), result)?),

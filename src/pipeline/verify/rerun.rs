@@ -42,7 +42,18 @@ fn compare(engine: &Engine, image: &Image, other: &Image) -> Result<Check> {
         found.wrong_in(image.name(), "has another grid or type in the second run");
         return Ok(found);
     }
-    let parts: Vec<Box3> = a.geometry.domain().tiles([EDGE; 3]).collect();
+    if image.reader.times() != other.reader.times() {
+        found.wrong_in(image.name(), "has other times in the second run");
+        return Ok(found);
+    }
+    for (image, other) in image.all_times().iter().zip(&other.all_times()) {
+        compare_at_one_time(engine, (image, other), &mut found)?;
+    }
+    Ok(found)
+}
+
+fn compare_at_one_time(engine: &Engine, (image, other): (&Image, &Image), found: &mut Check) -> Result<()> {
+    let parts: Vec<Box3> = image.reader.levels()[0].geometry.domain().tiles([EDGE; 3]).collect();
     let stage = engine.stage(&format!("compare {}", image.name()), parts.len() as u64);
     let faults = stage.run(&parts, &Workers::none(), |(), part| {
         let mut found = Check::default();
@@ -58,14 +69,14 @@ fn compare(engine: &Engine, image: &Image, other: &Image) -> Result<Check> {
     })?;
     stage.finish();
     found.take_all(faults);
-    Ok(found)
+    Ok(())
 }
 
 /// Compares files that are no arrays; how many there are.
 fn compare_meshes(store: &Path, again: &Path, found: &mut Check) -> Result<usize> {
     let list = |folder: &Path| -> Result<Vec<String>> {
         let files = store_files(folder).map_err(|e| Error::from_io("the store cannot be read", &e).at(folder))?;
-        let is_result = |file: &String| file.starts_with("meshes/") || file == "marks.csv";
+        let is_result = |file: &String| file.starts_with("meshes/") || ["marks.csv", "volumes.csv"].contains(&&**file);
         Ok(files.into_iter().filter(is_result).collect())
     };
     let (ours, theirs) = (list(store)?, list(again)?);

@@ -8,18 +8,47 @@ use serde_json::Value;
 
 use super::found::Check;
 use crate::error::{Error, Result};
-use crate::io::ome_zarr::{ImageReader, LiveState, StoredLevel, live, store_files};
+use crate::io::ome_zarr::{ImageReader, LiveState, StoredLevel, TIMES, live, store_files, time_name};
 
 /// An image of a store: its group, `""` for the root, and its levels.
 pub(super) struct Image {
+    /// Of a time of a series, that which it would have in a store of that time alone.
     pub(super) group: String,
+    /// Its group in the store.
+    folder: String,
     pub(super) reader: ImageReader,
+}
+
+/// The images of a time of a series, the `place`-th of its store, as a store of that time alone would have them.
+pub(super) fn of_time(images: &[Image], place: u64, time: u32) -> Vec<Image> {
+    let own = format!("{TIMES}/{}/", time_name(time));
+    let of = |image: &Image| match image.reader.times() {
+        Some(times) => (place < times).then(|| image.at(place)),
+        None => image.group.strip_prefix(&own).map(|group| {
+            let (folder, reader) = (image.folder.clone(), image.reader.clone());
+            Image { group: group.to_owned(), folder, reader }
+        }),
+    };
+    images.iter().filter_map(of).collect()
 }
 
 impl Image {
     /// The file of a voxel as a path in the store.
     pub(super) fn file(&self, level: usize, voxel: [i64; 3]) -> String {
-        joined(&self.group, &self.reader.levels()[level].file_of(voxel))
+        joined(&self.folder, &self.reader.levels()[level].file_of(voxel))
+    }
+
+    /// The same image at one of its times.
+    pub(super) fn at(&self, time: u64) -> Self {
+        Self { group: self.group.clone(), folder: self.folder.clone(), reader: self.reader.at(time) }
+    }
+
+    /// The image at each of its times; itself where it has no axis of time.
+    pub(super) fn all_times(&self) -> Vec<Self> {
+        match self.reader.times() {
+            Some(times) => (0..times).map(|time| self.at(time)).collect(),
+            None => vec![Self { group: self.group.clone(), folder: self.folder.clone(), reader: self.reader.clone() }],
+        }
     }
 
     /// What it is called.
@@ -82,7 +111,7 @@ fn walk(store: &Path, group: &str, found: &mut Check, images: &mut Vec<Image>) {
         match ImageReader::open(&folder) {
             Ok(reader) => {
                 check_levels(store, group, &document, &reader, found);
-                images.push(Image { group: group.to_owned(), reader });
+                images.push(Image { group: group.to_owned(), folder: group.to_owned(), reader });
             }
             Err(error) => found.wrong_in(group, error.to_string()),
         }
@@ -195,6 +224,14 @@ fn strays(files: &[String], images: &[Image], found: &mut Check) {
 fn is_shard(image: &Image, level: &StoredLevel, file: &str) -> bool {
     let mut numbers = file.rsplit('/').map(|part| part.parse::<i64>().ok());
     let [x, y, z] = [(); 3].map(|()| numbers.next().flatten());
+    let time = numbers.next().flatten().and_then(|time| u64::try_from(time).ok());
+    let of_time = match (image.reader.times(), time) {
+        (Some(times), Some(time)) if time < times => Some(image.at(time)),
+        (Some(_), _) => return false,
+        (None, _) => None,
+    };
+    let image = of_time.as_ref().unwrap_or(image);
+    let Some(level) = image.reader.levels().iter().find(|other| other.path == level.path) else { return false };
     let (Some(x), Some(y), Some(z)) = (x, y, z) else { return false };
     let place = [x, y, z];
     let voxel: Option<[i64; 3]> = (0..3)

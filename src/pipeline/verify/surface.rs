@@ -21,6 +21,24 @@ const EDGE: i64 = 63;
 /// Bytes in memory for each of the file: vertices in double precision, triangles, their edges, and numbers gathered by box.
 const MEMORY: u64 = 6;
 
+/// Compares the mesh of an object of a segmentation, in a folder, with its level set and with what is told of it.
+///
+/// # Errors
+/// As [`check`].
+pub(super) fn check_object(
+    engine: &Engine,
+    store: &Path,
+    (images, folder): (&[Image], &str),
+    object: &Value,
+) -> Result<Check> {
+    let of = |group: &str| images.iter().find(|image| image.group == group);
+    let own = format!("object-{}", object["label"]);
+    let alone = of("levelset");
+    let mesh = if alone.is_some() { format!("{folder}/surface.ply") } else { format!("{folder}/{own}.ply") };
+    let field = alone.or_else(|| of(&format!("levelset/{own}")));
+    check(engine, store, &mesh, field, object)
+}
+
 /// Compares a mesh with a field and with what is told of it.
 ///
 /// # Errors

@@ -29,11 +29,37 @@ const TYPES: [ElementType; 9] = [
     ElementType::F64,
 ];
 
-/// Decodes all of an image and makes its coarser levels once more.
+/// Decodes all of an image, at all of its times, and makes its coarser levels once more.
 ///
 /// # Errors
 /// When the run is interrupted.
 pub(super) fn check(engine: &Engine, image: &Image) -> Result<Check> {
+    let Some(times) = image.reader.times() else { return check_one(engine, image) };
+    let mut found = Check::new(format!("voxels of {}", image.name()));
+    for of_time in image.all_times() {
+        let part = check_one(engine, &of_time)?;
+        found.told = format!("{times} times; {}", part.told);
+        found.take(part);
+    }
+    Ok(found)
+}
+
+/// The same of many images that are told as one.
+pub(super) fn check_all<'a>(
+    engine: &Engine,
+    name: &str,
+    images: impl Iterator<Item = &'a Image>,
+) -> Result<Option<Check>> {
+    let (mut found, mut count) = (Check::new(format!("voxels of {name}")), 0);
+    for image in images {
+        count += 1;
+        found.take(check_one(engine, image)?);
+    }
+    found.told = format!("{count} images, every chunk decoded, coarser levels made once more");
+    Ok((count > 0).then_some(found))
+}
+
+fn check_one(engine: &Engine, image: &Image) -> Result<Check> {
     let mut found = Check::new(format!("voxels of {}", image.name()));
     let element = image.reader.levels()[0].element.as_str();
     let Some(element) = TYPES.into_iter().find(|known| known.name() == element) else {

@@ -100,6 +100,12 @@ impl Checkpoints {
         Ok(checkpoints)
     }
 
+    /// Who makes them.
+    #[must_use]
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
     /// Whether checkpoints of a run that was ended lie in a folder.
     #[must_use]
     pub fn lie_in(folder: &Path) -> bool {

@@ -55,9 +55,9 @@ impl Job {
 
     pub(crate) fn print_plan(&self, estimate: &Estimate) -> Result<()> {
         let (mut lines, mut objects) = (vec![self.describe()], Vec::new());
-        for object in split(&self.marks.cloud) {
+        for object in split(&self.marks.marks.cloud) {
             let points: usize = object.contours.iter().map(Vec::len).sum();
-            let file = self.marks.files[&object.object].display();
+            let file = self.marks.marks.files[&object.object].display();
             let contours = if object.drawn { format!(" on {} contours", object.contours.len()) } else { String::new() };
             objects.push(format!("object {}: {points} marks{contours}, {file}", object.object));
         }

@@ -263,7 +263,7 @@ fn xyz(zyx: &Value) -> Vec<Value> {
 }
 
 /// The command line as a shell takes it.
-fn command_line(typed: &[String]) -> String {
+pub(super) fn command_line(typed: &[String]) -> String {
     let quoted = |(n, word): (usize, &String)| {
         let word = if n == 0 { word.rsplit('/').next().unwrap_or(word) } else { word };
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);

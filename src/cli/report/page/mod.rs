@@ -8,6 +8,7 @@ pub(crate) mod html;
 mod objects;
 mod picture;
 mod plots;
+pub(crate) mod series;
 mod settings;
 mod slices;
 mod stages;

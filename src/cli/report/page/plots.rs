@@ -68,6 +68,40 @@ pub(super) fn motion(curves: &[(Vec<f64>, [u8; 3])], limit: f64) -> Result<Strin
     })
 }
 
+/// Places on a chart, and their colour.
+pub(super) type Curve = (Vec<(f64, f64)>, [u8; 3]);
+
+/// A number of each object over time, a line for each in its colour.
+pub(super) fn over_time(curves: &[Curve], [time, what]: [&str; 2]) -> Result<String> {
+    let places = || curves.iter().flat_map(|(curve, _)| curve.iter().copied());
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    };
+    let [first, last] = range(&mut places().map(|(at, _)| at));
+    let [low, high] = range(&mut places().map(|(_, value)| value));
+    // A change is seen as what it is of the whole only where the axis begins at nothing.
+    let across = Axis {
+        name: time.into(),
+        range: [first, if last > first { last } else { first + 1.0 }],
+        labels: 8,
+        form: |v| number(*v),
+    };
+    let up = Axis {
+        name: what.into(),
+        range: [low.min(0.0), 1.06 * high.max(f64::MIN_POSITIVE)],
+        labels: 5,
+        form: |v| number(*v),
+    };
+    plot([across, up], |chart| {
+        for (curve, [r, g, b]) in curves {
+            let color = RGBColor(*r, *g, *b);
+            chart.draw_series(LineSeries::new(curve.iter().copied(), color.stroke_width(2))).map_err(failed)?;
+            chart.draw_series(curve.iter().map(|&at| Circle::new(at, 2, color.filled()))).map_err(failed)?;
+        }
+        Ok(())
+    })
+}
+
 /// A number to two digits, as `0.032`.
 fn two_digits(value: f64) -> String {
     let last = libm::pow(10.0, libm::floor(libm::log10(value)) - 1.0);

@@ -57,6 +57,7 @@ fn info(fields: &Fields, volumes: u64) -> StackInfo {
         spacing: fields.spacing,
         origin: fields.origin,
         unit: fields.unit.clone(),
+        interval: None,
         axes: if fields.sizes.len() > 3 { "CZYX" } else { "ZYX" }.to_owned(),
         compression: if fields.is_gzip { "gzip" } else { "none" }.to_owned(),
         notes: fields.notes.clone(),

@@ -106,6 +106,7 @@ fn image_info(image: Node<'_, '_>) -> std::result::Result<(StackInfo, Number, u6
         // The first point of a grid that does not begin at 0; of cells their middles.
         origin: std::array::from_fn(|a| origin[a] + spacing[a] * (lo[a] as f64 + if is_cells { 0.5 } else { 0.0 })),
         unit: unit(image),
+        interval: None,
         axes: "ZYX".to_owned(),
         compression: "none".to_owned(),
         notes: if is_turned { vec![told.to_owned()] } else { Vec::new() },

@@ -215,6 +215,7 @@ pub(crate) fn info(page: &Page, dimensions: &Dimensions, description: Descriptio
         spacing: description.spacing,
         origin: [0.0; 3],
         unit: description.unit,
+        interval: description.interval,
         axes: dimensions.letters(page),
         compression: page.compression.name(),
         notes,

@@ -17,6 +17,7 @@ pub(crate) mod shard_index;
 
 use std::path::{Path, PathBuf};
 
+use super::interval::Interval;
 use super::volume::{Select, Stack, StackInfo};
 use crate::error::{Error, Result};
 use crate::grid::Box3;
@@ -79,6 +80,9 @@ impl ZarrImage {
         notes.extend(array.note());
         notes.extend(incomplete(&folder));
         let lengths = lengths(&axes, space, placed.as_ref(), &mut notes);
+        let time = axes.iter().position(|axis| axis.role == Role::Time);
+        let interval =
+            time.zip(placed.as_ref()).and_then(|(a, placed)| Interval::told(placed.scale[a], axes[a].unit.as_deref()?));
         let along = |role: Role| (0..axes.len()).find(|&a| axes[a].role == role).map_or(1, |a| array.shape[a]);
         let letters: String = axes.iter().filter_map(|axis| axis.name.chars().next()).collect();
         let info = StackInfo {
@@ -90,6 +94,7 @@ impl ZarrImage {
             spacing: lengths.spacing,
             origin: lengths.origin,
             unit: lengths.unit,
+            interval,
             axes: letters.to_uppercase(),
             compression: describe::codecs_of(&folder)?,
             notes,

@@ -11,6 +11,8 @@ pub struct SurfaceMeasure {
     centre: DVec3,
     /// Six times the volume.
     volume6: f64,
+    /// The volumes that are summed, 24 of each, times the centroids of their tetrahedra.
+    moment24: DVec3,
     /// Twice the area.
     area2: f64,
     triangles: u64,
@@ -23,6 +25,8 @@ pub struct SurfaceMeasure {
 pub struct Measures {
     /// Enclosed volume, positive for outward triangles; has a meaning only for a closed mesh.
     pub volume: f64,
+    /// Centroid of what it encloses; has a meaning only for a closed mesh.
+    pub centroid: [f64; 3],
     /// Area of all triangles.
     pub area: f64,
     /// Number of edges that no second triangle closes.
@@ -51,6 +55,7 @@ impl SurfaceMeasure {
         Self {
             centre: centre.into(),
             volume6: 0.0,
+            moment24: DVec3::ZERO,
             area2: 0.0,
             triangles: 0,
             edges: EdgeTally::default(),
@@ -62,7 +67,9 @@ impl SurfaceMeasure {
     pub fn add(&mut self, corners: [u32; 3], positions: [[f64; 3]; 3]) {
         let [a, b, c] = positions.map(|p| DVec3::from(p) - self.centre);
         // Divergence theorem: the tetrahedron from the centre to a triangle has the volume a . (b x c) / 6.
-        self.volume6 += a.dot(b.cross(c));
+        let volume6 = a.dot(b.cross(c));
+        self.volume6 += volume6;
+        self.moment24 += volume6 * (a + b + c);
         self.area2 += (b - a).cross(c - a).length();
         self.triangles += 1;
         self.edges.add(corners);
@@ -78,8 +85,11 @@ impl SurfaceMeasure {
     /// The measures of all triangles so far.
     #[must_use]
     pub fn measures(&self) -> Measures {
+        let centroid = self.centre + self.moment24 / (4.0 * self.volume6);
         Measures {
             volume: self.volume6 / 6.0,
+            // Of what encloses nothing there is none.
+            centroid: <[f64; 3]>::from(if centroid.is_finite() { centroid } else { self.centre }),
             area: self.area2 / 2.0,
             open_edges: self.edges.open(),
             components: self.components.count(),
@@ -103,6 +113,9 @@ mod tests {
         }
         let found = measure.measures();
         assert!((found.volume - 1.0).abs() < 1e-12);
+        for (found, expected) in found.centroid.into_iter().zip([0.25, 0.5, 0.75]) {
+            assert!((found - offset - expected).abs() < 1e-8);
+        }
         // Three right triangles and the slanted one: 1 + 1.5 + 3 + sqrt(36 + 9 + 4) / 2.
         assert!((found.area - 9.0).abs() < 1e-12);
         assert!(found.is_closed());

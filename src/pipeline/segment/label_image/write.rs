@@ -15,11 +15,12 @@ use crate::pipeline::segment::neighbours::Joined;
 use crate::pipeline::segment::object_report::ObjectReport;
 use crate::store::{BoxSource, Element, ElementType};
 
-/// Writes what is not written of the labels, and counts their voxels.
+/// Writes what is not written of the labels, and counts their voxels. The type of the image is that for the highest label of all
+/// objects, solved or not: so all times of a series have one.
 pub(crate) fn write_labels(
     engine: &Engine,
     geometry: &Geometry,
-    volume: &Joined<'_>,
+    (volume, highest): (&Joined<'_>, u32),
     solved: &[(Solution, ObjectReport)],
     (store, early): (Option<&StoreWriter>, Option<&dyn Early>),
 ) -> Result<BTreeMap<u32, u64>> {
@@ -29,7 +30,7 @@ pub(crate) fn write_labels(
         (_, Some(early)) => early.finish(&stage, engine, volume)?,
         (Some(store), None) => {
             let labels = || solved.iter().map(|(_, report)| report.label);
-            match type_for(labels().max().unwrap_or(0)) {
+            match type_for(highest) {
                 ElementType::U8 => {
                     write_as::<u8>(&stage, engine, begin_image::<u8>(store, geometry, labels())?, volume)
                 }

@@ -113,6 +113,7 @@ impl Columns {
                 columns.unit = one_column(&plain, "unit")?;
             }
             Form::ImageJ => columns.time = one_column(&plain, "frame")?.map(|column| (column, 1)),
+            _ if columns.time.is_none() => columns.time = one_column(&plain, "t")?.map(|column| (column, 0)),
             _ => {}
         }
         Ok(columns)

@@ -1,9 +1,11 @@
 //! The `ImageDescription` that ImageJ writes: lines of `key=value` after `ImageJ=version`.
 //!
-//! Keys as in ImageJ's `TiffDecoder`/`FileOpener`: `images, channels, slices, frames, spacing, unit, yunit, zunit`. Planes run
+//! Keys as in ImageJ's `TiffDecoder`/`FileOpener`: `images, channels, slices, frames, spacing, unit, yunit, zunit,
+//! finterval, tunit`. Planes run
 //! channel first, then slice, then frame. The xy spacing lies in the resolution tags, in pixels per unit.
 
 use super::layout::{Axis, Description, Dimensions};
+use crate::io::stack::interval::Interval;
 use crate::io::stack::units;
 use crate::io::stack::units::Unit;
 
@@ -48,7 +50,9 @@ pub(crate) fn parse(text: &str, pages: u64, xy: [Option<f64>; 2], tagged: Option
             .push(format!("channels, slices and frames do not multiply to {images} images: all were taken for slices"));
     }
     notes.extend(origin_note([value("xorigin"), value("yorigin"), value("zorigin")]));
+    let interval = value("finterval").and_then(|text| text.parse().ok());
     Description {
+        interval: interval.and_then(|step| Interval::told(step, value("tunit").unwrap_or("sec"))),
         dimensions: Some(dimensions),
         spacing: spacing.sizes,
         unit: spacing.unit,

@@ -1,6 +1,7 @@
 //! The order of planes in a file: from (channel, time, z) to the number of a plane.
 
 use crate::error::Result;
+use crate::io::stack::interval::Interval;
 pub(crate) use crate::io::stack::page_axes::Axis;
 use crate::io::stack::tiff::pages::ifd::TiffFile;
 use crate::io::stack::tiff::pages::page::Page;
@@ -74,6 +75,8 @@ pub(crate) struct Description {
     pub(crate) spacing: [Option<f64>; 3],
     /// The unit of `spacing` as OME-Zarr spells it.
     pub(crate) unit: Option<String>,
+    /// The time from one volume to the next, where it is known.
+    pub(crate) interval: Option<Interval>,
     /// True when the planes may follow the first one without pages of their own.
     pub(crate) single_page: bool,
     /// Why pages cannot be taken for planes of rows, unless the user says what they are.
@@ -90,6 +93,7 @@ impl Description {
             runs: None,
             spacing: [None; 3],
             unit: None,
+            interval: None,
             single_page: false,
             objection: None,
             notes: Vec::new(),

@@ -3,6 +3,7 @@
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::layout::{Axis, Description, Dimensions, Run};
+use crate::io::stack::interval::Interval;
 use crate::io::stack::tiff::pages::page::Page;
 use crate::io::stack::units;
 use crate::io::stack::volume::ImageSummary;
@@ -209,6 +210,9 @@ fn add_spacing(pixels: Node, description: &mut Description) {
     let spacing = units::spacing(written);
     (description.spacing, description.unit) = (spacing.sizes, spacing.unit);
     description.notes.extend(spacing.notes);
+    let increment = pixels.attribute("TimeIncrement").and_then(|text| text.trim().parse().ok());
+    let unit = pixels.attribute("TimeIncrementUnit").unwrap_or("s");
+    description.interval = increment.and_then(|step| Interval::told(step, unit));
 }
 
 #[cfg(test)]

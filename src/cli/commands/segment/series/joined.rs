@@ -1,0 +1,126 @@
+//! The stores of all times as one: images with an axis of time, what belongs to single times in groups of theirs, one report.
+//!
+//! `times/tNNNN` has the fields of a time, each object's in a box of its own, which is another at another time, its marks and its
+//! report; `meshes/tNNNN` its surfaces.
+
+use std::fmt::Write;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::Series;
+use super::work::Work;
+use crate::cli::outputs::files::write_whole;
+use crate::cli::report::page::series::page;
+use crate::cli::report::series::{TimeReport, Whole};
+use crate::error::{Error, Result};
+use crate::exec::Progress;
+use crate::io::ome_zarr::{StoreWriter, TIMES, time_name};
+
+/// What of a time's store goes into its group.
+const OF_TIME: [&str; 5] = ["levelset", "distance", "marks.csv", "report.json", "report.html"];
+/// The images that get an axis of time.
+const IMAGES: [&str; 2] = ["", "labels/segmentation"];
+
+impl Series<'_> {
+    /// Joins all times, and tells of them.
+    ///
+    /// # Errors
+    /// When files cannot be written.
+    pub(super) fn join(&self, work: &Work, store: Option<StoreWriter>, times: &[TimeReport]) -> Result<()> {
+        let output = &self.args.output;
+        if let Some(store) = &store {
+            self.join_images(work, store, times)?;
+        }
+        let mut notes = self.console.notes();
+        for note in times.iter().filter_map(|time| time.report.as_ref()).flat_map(|report| {
+            report["notes"].as_array().into_iter().flatten().filter_map(|note| note.as_str().map(ToOwned::to_owned))
+        }) {
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+        let whole = Whole {
+            times,
+            chosen: &self.times,
+            axis: &self.axis,
+            output: output.store().map(|path| path.display().to_string()),
+            notes,
+            seconds: self.started.elapsed().as_secs_f64(),
+        };
+        if let Some(store) = store {
+            self.write_report(&store, &whole)?;
+            store.finish()?;
+        }
+        if let Some(path) = &output.report {
+            write(path, output.overwrite, &json(&whole)?)?;
+        }
+        self.print(&whole.told(&self.whole_in()))
+    }
+
+    fn join_images(&self, work: &Work, store: &StoreWriter, times: &[TimeReport]) -> Result<()> {
+        let stores: Vec<Option<PathBuf>> = times.iter().map(|time| work.store_there(time.time)).collect();
+        let named: Vec<Option<&Path>> = stores.iter().map(Option::as_deref).collect();
+        for image in IMAGES {
+            store.join_times(image, &named, &self.axis)?;
+        }
+        let solved = times.iter().zip(named).filter(|(time, _)| time.report.is_some());
+        for (time, from) in solved.filter_map(|(time, from)| Some((time.time, from?))) {
+            let group = format!("{TIMES}/{}", time_name(time));
+            store.group(&group)?;
+            for part in OF_TIME {
+                store.take_over(from, part, &format!("{group}/{part}"))?;
+            }
+            store.take_over(from, "meshes", &format!("meshes/{}", time_name(time)))?;
+        }
+        let marks = all_marks(&stores, times)?;
+        if let Some(marks) = marks {
+            write(&store.file("marks.csv")?, true, &marks)?;
+        }
+        Ok(())
+    }
+
+    fn write_report(&self, store: &StoreWriter, whole: &Whole<'_>) -> Result<()> {
+        write(&store.file("volumes.csv")?, true, &whole.table())?;
+        let path = store.file("report.html")?;
+        let folder = store.folder();
+        let of = |time: u32| {
+            Some(format!("{TIMES}/{}/report.html", time_name(time))).filter(|page| folder.join(page).exists())
+        };
+        match page(whole, self.typed, &of).and_then(|page| write(&path, true, &page)) {
+            Ok(()) => {}
+            Err(error) => self.console.note(&format!("report.html is left out: {error}")),
+        }
+        write(&store.file("report.json")?, true, &json(whole)?)
+    }
+}
+
+fn json(whole: &Whole<'_>) -> Result<String> {
+    let text = serde_json::to_string_pretty(&whole.report())
+        .map_err(|error| Error::failed(format!("the report cannot be told: {error}")).caused_by(error))?;
+    Ok(text + "\n")
+}
+
+/// The marks of all times, moved as they were, with their times; none where objects grew from seeds alone.
+fn all_marks(stores: &[Option<PathBuf>], times: &[TimeReport]) -> Result<Option<String>> {
+    let mut all = String::from("object,contour,t,x,y,z\n");
+    let empty = all.len();
+    for (store, time) in stores.iter().zip(times) {
+        let Some(path) = store.as_ref().map(|store| store.join("marks.csv")).filter(|path| path.exists()) else {
+            continue;
+        };
+        let text = std::fs::read_to_string(&path).map_err(|e| Error::from_io("cannot read marks", &e).at(&path))?;
+        for line in text.lines().skip(1) {
+            let mut cells = line.splitn(3, ',');
+            if let (Some(object), Some(contour), Some(place)) = (cells.next(), cells.next(), cells.next()) {
+                // A string takes whatever is written.
+                let _ = writeln!(all, "{object},{contour},{},{place}", time.time);
+            }
+        }
+    }
+    Ok((all.len() > empty).then_some(all))
+}
+
+fn write(path: &Path, replace: bool, text: &str) -> Result<()> {
+    write_whole(path, replace, |file| io::Write::write_all(file, text.as_bytes()))
+        .map_err(|error| Error::from_io("cannot be written", &error).at(path))
+}
