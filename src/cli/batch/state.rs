@@ -194,8 +194,9 @@ pub(crate) fn reasons(folder: &Folder, item: &Item, keeps: bool, stop: &AtomicBo
 
 /// What is known of an item that another batch has done meanwhile, as its inputs are now.
 pub(crate) fn done_meanwhile(folder: &Folder, item: &Item) -> Option<State> {
-    let state =
-        folder.state(&item.name).filter(|state| state.stage == Stage::Done && is_whole(&folder.store(&item.name)))?;
+    let store = folder.store(&item.name);
+    let is_there = is_whole(&store) && misfit(&store).is_none();
+    let state = folder.state(&item.name).filter(|state| state.stage == Stage::Done && is_there)?;
     let is_same = |(name, path): &(String, PathBuf)| {
         let was = state.inputs.iter().find(|input| input.path == *name && input.hash.is_some());
         was.is_some_and(|was| Looks::of(path).is_ok_and(|now| now == was.looks))
