@@ -73,7 +73,7 @@ pub fn watershed(
     let (of_voxel, mut regions, _of_regions) = flood.peaks(engine, &far)?;
     let mut descent = Descent { watershed: &flood, of_voxel: &of_voxel };
     relax_to_fixed_point(stage, Reach::Faces, &flood.workers, &mut descent)?;
-    let (contacts, _of_contacts) = flood.contacts(engine, &of_voxel, &mut regions)?;
+    let Meetings { contacts, _held } = flood.contacts(engine, &of_voxel, &mut regions)?;
     let least = |voxels: f64| (voxels * sources.geometry.min_spacing()) as f32;
     let (is_inside, found) =
         spaces::inside(&regions, &contacts, least(LEAST_DEPTH_VOXELS), least(LEAST_POCKET_VOXELS), least(WALL_VOXELS));
@@ -81,6 +81,14 @@ pub fn watershed(
     let basins = found.iter().map(|space| basin(space, &contacts, set)).collect();
     let lost = lost_points(stage, sources, &inside)?;
     Ok(Sides { inside, basins, lost })
+}
+
+/// Where regions meet.
+struct Meetings {
+    /// With the brick that each place is in.
+    contacts: Vec<(Contact, BrickId)>,
+    /// What holds the memory that they take.
+    _held: Vec<Hold>,
 }
 
 struct Watershed<'a> {
@@ -147,13 +155,8 @@ impl Watershed<'_> {
         Ok((of_voxel, regions, held))
     }
 
-    /// Where regions meet, with the brick each place is in; counts the voxels of all regions.
-    fn contacts(
-        &self,
-        engine: &Engine,
-        of_voxel: &BrickArray<u32>,
-        regions: &mut [Region],
-    ) -> Result<(Vec<(Contact, BrickId)>, Vec<Hold>)> {
+    /// Where regions meet; counts the voxels of all regions.
+    fn contacts(&self, engine: &Engine, of_voxel: &BrickArray<u32>, regions: &mut [Region]) -> Result<Meetings> {
         let set = self.set();
         let found = self.stage.run(&one_wave(set), &self.workers, |w, &slot| {
             self.gather_distance(slot, &mut w.d);
@@ -173,7 +176,7 @@ impl Watershed<'_> {
                 regions[region as usize].voxels += voxels;
             }
         }
-        Ok((spaces::joined(all), held))
+        Ok(Meetings { contacts: spaces::joined(all), _held: held })
     }
 
     fn sides(&self, engine: &Engine, of_voxel: &BrickArray<u32>, is_inside: &[bool]) -> Result<BrickArray<u8>> {
