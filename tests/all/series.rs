@@ -156,7 +156,9 @@ fn a_run_that_was_killed_goes_on_with_the_same_bits() {
     let whole = contents(&bench.path("out/whole.zarr"));
     let meshes: Vec<String> = bench.entries("out").into_iter().filter(|name| name.starts_with("m-")).collect();
     assert_eq!(meshes, ["m-t0007.ply", "m-t0008.ply", "m-t0009.ply", "m-t0010.ply", "m-t0011.ply"]);
-    meshes.iter().for_each(|mesh| fs::remove_file(bench.path("out").join(mesh)).unwrap());
+    for mesh in &meshes {
+        fs::remove_file(bench.path("out").join(mesh)).unwrap();
+    }
     let held = |signal: &str, flags: &str| {
         let mut held = Held::start(bench.command(&format!("{run} -o out/x.zarr {flags}")));
         held.hear("time 9 (3 of 5)");
@@ -369,14 +371,12 @@ fn what_cannot_be_is_said_in_one_sentence() {
 fn what_is_odd_is_noted_and_parts_that_fail_are_told() {
     let bench = bench();
     // Without times the marks are those of the first one.
-    let without: String = marks([4])
-        .lines()
-        .map(|line| {
-            let cells: Vec<&str> = line.split(',').collect();
-            format!("{},{},{},{},{}\n", cells[0], cells[1], cells[3], cells[4], cells[5])
-        })
-        .collect();
-    bench.write("plain.csv", &without);
+    let without_time = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        [cells[0], cells[1], cells[3], cells[4], cells[5]].join(",")
+    };
+    let without: Vec<String> = marks([4]).lines().map(without_time).collect();
+    bench.write("plain.csv", &(without.join("\n") + "\n"));
     let plan = bench.succeed("segment drop.tif --points plain.csv --time 4:7 --dry-run -o out/x.zarr");
     assert!(plan.contains("times 4 to 6: object 1 from its") && plan.contains("marks of time 4"), "{plan}");
     assert!(bench.entries("out").is_empty());
@@ -390,7 +390,8 @@ fn what_is_odd_is_noted_and_parts_that_fail_are_told() {
     assert_eq!(volumes(&bench.json("out/r.json"), 1).len(), 3);
     // A second object that is marked at time 5 alone, as a line that encloses nothing.
     let mut two = marks([4, 6]);
-    two += &(0..8).map(|n| format!("2,0,5,{n},2,3\n")).collect::<String>();
+    let line: Vec<String> = (0..8).map(|n| format!("2,0,5,{n},2,3\n")).collect();
+    two += &line.concat();
     bench.write("two.csv", &two);
     let output = bench.run("segment drop.tif --points two.csv --time 4:7 -q -o out/two.zarr");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();

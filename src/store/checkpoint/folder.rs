@@ -115,12 +115,9 @@ impl Checkpoints {
     /// What is said where they would go without leave.
     #[must_use]
     pub fn would_be_lost(folder: &Path) -> Error {
-        if let Some(error) = worker(folder) {
-            return error;
-        }
         let what =
             "holds checkpoints of a run that was ended; give --resume to go on with it, or --overwrite to begin anew";
-        Error::usage(what).at(folder)
+        worker(folder).unwrap_or_else(|| Error::usage(what).at(folder))
     }
 
     /// Those of a run that goes on with what was put by in a folder: the last checkpoint that is whole.
@@ -333,9 +330,8 @@ mod tests {
         let (run, found) = Checkpoints::resume(&folder, identity("2")).unwrap();
         assert_eq!((found.stages, found.torn.len(), facts(&run)), (2, 0, Some((vec![3], 1))));
         let busy = [Checkpoints::resume(&folder, identity("2")).err().unwrap(), Checkpoints::would_be_lost(&folder)];
-        for busy in busy.map(|error| error.to_string()) {
-            assert!(busy.contains("belongs to a run that goes on (host"), "{busy}");
-        }
+        let is_told = |error: Error| error.to_string().contains("belongs to a run that goes on (host");
+        assert!(busy.into_iter().all(is_told));
         drop(run);
         let file = folder.join("000004.checkpoint");
         let whole = fs::read(&file).unwrap();
