@@ -57,7 +57,7 @@ impl Resources {
 
     /// An engine that keeps to them. Jobs take what they hold off its window.
     pub(crate) fn engine(&self, cancel: &Cancel, progress: Arc<dyn Progress>) -> Result<Engine> {
-        let scratch = Scratch::new(&self.scratch, self.memory);
+        let scratch = Scratch::new(&self.scratch, self.memory).watching();
         Engine::new(self.threads, scratch, Budget { total: self.memory }, cancel.clone(), progress)
     }
 }

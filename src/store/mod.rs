@@ -7,6 +7,7 @@ pub mod checkpoint;
 mod element;
 mod free_space;
 mod hidden;
+mod mapped;
 mod scratch;
 mod slot_file;
 mod stream;

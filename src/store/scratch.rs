@@ -19,6 +19,13 @@ impl Scratch {
         Self { dir: dir.to_path_buf(), window: Window::new(window_bytes) }
     }
 
+    /// From now on what the system has mapped counts, where that is more than what was used: for a process with one window.
+    #[must_use]
+    pub fn watching(self) -> Self {
+        self.window.watch();
+        self
+    }
+
     /// What moved between scratch and memory so far.
     #[must_use]
     pub fn traffic(&self) -> Traffic {

@@ -3,18 +3,30 @@
 //! Every mapped file is cut into segments of [`SEGMENT_BYTES`]. A segment becomes resident when a brick in it is
 //! used; past the limit the segments that have not been used for longest are written back and dropped (a second
 //! chance first-in-first-out queue). A dropped segment of a shared mapping loses nothing: its next use reads it again.
-//! What counts of a segment are its blocks that were used: of two bricks in it, or the faces of twenty, often one alone is.
+//! What counts of a segment are its blocks that were used: of two bricks in it, or the faces of twenty, often one alone is. The
+//! system may map more around a fault than a block, as much as it has in one piece in its page cache (large folios, Linux 6.18):
+//! a window that watches counts what the system says beyond its own account too, up to whole segments.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
+use super::mapped::mapped_bytes;
+
 /// Bytes that are dropped together. The system may map a whole huge page of its page cache at one fault, so segments
 /// are as large as those and aligned to them: else pages would become resident that nobody accounts for.
 pub(super) const SEGMENT_BYTES: usize = 2 << 20;
-/// Bytes that become resident together: the system maps what its page cache has around a fault, within as many bytes.
+/// Bytes that become resident together: the system maps what its page cache has around a fault, within as many bytes where that
+/// is in small pieces.
 const BLOCK_BYTES: usize = 64 << 10;
 const _: () = assert!(SEGMENT_BYTES / BLOCK_BYTES == u32::BITS as usize, "a bit for each block");
+
+/// So many more bytes are admitted between two looks at what the system has mapped.
+const LOOK_BYTES: i64 = 1 << 20;
+/// The program's own pages and those of its libraries that may come after the first look.
+const OWN_BYTES: u64 = 8 << 20;
+/// The first look of a window that does not watch.
+const UNWATCHED: u64 = u64::MAX;
 
 const DROPPED: u8 = 0;
 const RESIDENT: u8 = 1;
@@ -94,6 +106,7 @@ impl Segments {
         self.states[segment].store(DROPPED, Relaxed);
         let bytes = self.bytes_of(segment, self.blocks[segment].swap(0, Relaxed));
         self.pages.drop_pages(segment * SEGMENT_BYTES, self.segment_len(segment), self.window.writes_behind());
+        self.window.whole.fetch_sub(self.segment_len(segment) as i64, Relaxed);
         Some(bytes)
     }
 
@@ -104,6 +117,9 @@ impl Segments {
         } else {
             let of_segment = |n: usize| self.bytes_of(n, self.blocks[n].load(Relaxed));
             self.window.resident.fetch_sub((0..self.blocks.len()).map(of_segment).sum(), Relaxed);
+            let is_in = |n: &usize| self.states[*n].load(Relaxed) != DROPPED;
+            let whole = (0..self.states.len()).filter(is_in).map(|n| self.segment_len(n) as i64).sum();
+            self.window.whole.fetch_sub(whole, Relaxed);
         }
         self.window.allocated.fetch_sub(self.bytes as u64, Relaxed);
     }
@@ -129,6 +145,14 @@ pub struct Window {
     lent: AtomicU64,
     /// What is dropped may be counted before what was admitted: for a moment it can be negative.
     resident: AtomicI64,
+    /// Bytes of all segments that are in, used or not.
+    whole: AtomicI64,
+    /// Bytes of mapped files that the process had when the window began to watch.
+    first: AtomicU64,
+    /// Bytes that are resident by the system's account and not by this one.
+    unseen: AtomicU64,
+    /// Bytes that were admitted since the system was asked.
+    since: AtomicI64,
     /// Bytes in plain memory, which count as resident.
     pinned: AtomicU64,
     /// Bytes of all scratch files.
@@ -175,6 +199,10 @@ impl Window {
             limit: AtomicU64::new(limit),
             lent: AtomicU64::new(0),
             resident: AtomicI64::new(0),
+            whole: AtomicI64::new(0),
+            first: AtomicU64::new(UNWATCHED),
+            unseen: AtomicU64::new(0),
+            since: AtomicI64::new(0),
             pinned: AtomicU64::new(0),
             allocated: AtomicU64::new(0),
             page_cache: AtomicU64::new(0),
@@ -196,6 +224,23 @@ impl Window {
     /// at once, so that they are clean when memory runs short; below it, writing them would only cost time.
     pub fn set_page_cache(&self, bytes: u64) {
         self.page_cache.store(bytes, Relaxed);
+    }
+
+    /// From now on what the system has mapped of files counts, where that is more than what was used. For a process with one
+    /// window, and all its other maps made before.
+    pub fn watch(&self) {
+        self.first.store(mapped_bytes().unwrap_or(UNWATCHED), Relaxed);
+    }
+
+    /// Asks the system how much it has mapped. No more than whole segments can be: what lies beyond is somebody else's.
+    fn look(&self) {
+        self.since.store(0, Relaxed);
+        let first = self.first.load(Relaxed);
+        let Some(mapped) = (first != UNWATCHED).then(mapped_bytes).flatten() else { return };
+        let counted = self.resident().saturating_sub(self.pinned.load(Relaxed));
+        let whole = u64::try_from(self.whole.load(Relaxed)).unwrap_or(0);
+        let unseen = mapped.saturating_sub(first.saturating_add(OWN_BYTES)).min(whole).saturating_sub(counted);
+        self.unseen.store(unseen, Relaxed);
     }
 
     /// Whether so many more bytes may be in plain memory instead of a file; takes them into account if so. At most half
@@ -241,20 +286,27 @@ impl Window {
     fn admit(&self, file: &Arc<Segments>, segment: usize, bytes: i64, is_new: bool) {
         self.resident.fetch_add(bytes, Relaxed);
         if is_new {
+            self.whole.fetch_add(file.segment_len(segment) as i64, Relaxed);
             self.queue.lock().unwrap_or_else(PoisonError::into_inner).push_back((Arc::downgrade(file), segment));
+        }
+        if self.since.fetch_add(bytes, Relaxed) + bytes >= LOOK_BYTES {
+            self.look();
         }
         self.shrink();
     }
 
     /// Drops segments until the limit holds. Each is looked at twice at most: in use since, it stays once.
     fn shrink(&self) {
-        while self.resident() > self.resident_limit() {
+        while self.resident() + self.unseen.load(Relaxed) > self.resident_limit() {
             let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
             let Some((file, segment)) = queue.pop_front() else { return };
             drop(queue);
             let Some(file) = file.upgrade() else { continue };
             if let Some(bytes) = file.try_drop(segment) {
                 self.resident.fetch_sub(bytes, Relaxed);
+                if self.unseen.load(Relaxed) > 0 {
+                    self.look();
+                }
             } else {
                 let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
                 queue.push_back((Arc::downgrade(&file), segment));
