@@ -10,6 +10,7 @@ use std::rc::Rc;
 
 use crate::error::Result;
 use crate::grid::Box3;
+use crate::kernel::image::filter::downsample::add_to_blocks;
 use crate::kernel::image::shift::{Found, Patch, ellipsoid, find};
 use crate::store::{Sample, SampleWork, VolumeSource};
 
@@ -211,12 +212,7 @@ impl SampleWork for Averaging<'_> {
         for slab in slabs {
             values.resize(slab.len(), T::default());
             source.read_box(&slab, T::buffer(&mut values))?;
-            for (row, (y, z)) in values.chunks_exact(row as usize).zip(slab.rows()) {
-                let at = coarse.offset_of([coarse.lo[0], y.div_euclid(factors[1]), z.div_euclid(factors[2])]);
-                for (block, sum) in row.chunks_exact(factors[0] as usize).zip(&mut sums[at..]) {
-                    *sum += block.iter().map(|value| value.to_f64()).sum::<f64>();
-                }
-            }
+            add_to_blocks(&values, &slab, factors, coarse, sums);
         }
         Ok(())
     }

@@ -117,6 +117,18 @@ impl Blocks {
     }
 }
 
+/// Adds the values of a box to the sums of the blocks that they lie in, counted from voxel 0 on, in f64. `part` begins and ends
+/// along x where blocks do; `values` are dense over it, `sums` over the box `coarse` of blocks.
+pub fn add_to_blocks<T: Element>(values: &[T], part: &Box3, factors: [i64; 3], coarse: &Box3, sums: &mut [f64]) {
+    for (row, (y, z)) in values.chunks_exact(part.shape()[0] as usize).zip(part.rows()) {
+        let first = [part.lo[0], y, z];
+        let at = coarse.offset_of(std::array::from_fn(|a| first[a].div_euclid(factors[a])));
+        for (block, sum) in row.chunks_exact(factors[0] as usize).zip(&mut sums[at..]) {
+            *sum += block.iter().map(|value| value.to_f64()).sum::<f64>();
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
@@ -245,5 +257,20 @@ mod tests {
         assert_eq!(out, [7]);
         mode(&[9, 9, 0, 0, 7, 7, 3, 3_u8], [2, 2, 2], [2, 2, 2], &mut out);
         assert_eq!(out, [3]);
+    }
+
+    #[test]
+    fn sums_of_blocks_by_slabs_are_their_means_by_their_voxels() {
+        let (factors, part) = ([2, 1, 3], Box3::new([-4, 2, 3], [4, 5, 9]));
+        let coarse = Box3::new([-2, 2, 1], [2, 5, 3]);
+        let values: Vec<u8> = (0..part.len()).map(|n| (n * 37 % 251) as u8).collect();
+        let mut sums = vec![0.0; coarse.len()];
+        let (low, high) = values.split_at(part.len() / 2);
+        add_to_blocks(low, &Box3::new(part.lo, [4, 5, 6]), factors, &coarse, &mut sums);
+        add_to_blocks(high, &Box3::new([-4, 2, 6], part.hi), factors, &coarse, &mut sums);
+        let mut means = vec![0.0_f64; coarse.len()];
+        let exact: Vec<f64> = values.iter().map(|value| f64::from(*value)).collect();
+        mean(&exact, part.shape(), factors, &mut means);
+        assert!(sums.iter().zip(&means).all(|(sum, mean)| (sum / 6.0 - mean).abs() < 1e-9));
     }
 }
