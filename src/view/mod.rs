@@ -8,6 +8,7 @@
 mod answers;
 mod folder;
 mod links;
+mod listing;
 mod mesh;
 mod page;
 mod ranges;

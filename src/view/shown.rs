@@ -1,13 +1,13 @@
 //! What lies in a store, in a folder of several, or in another program's OME-Zarr, that can be shown: images, label images and
 //! fields by their OME metadata (versions 0.4 and 0.5), and meshes.
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use serde_json::Value;
 
 use super::folder::Folder;
+use super::listing::{file_name, files, folders, is_mesh};
 use super::ready::Ready;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::point_file::PointFile;
@@ -370,35 +370,4 @@ fn colors(list: &Value) -> Vec<(u64, [u8; 3])> {
         Some((color["label-value"].as_u64()?, [channel(color, 0)?, channel(color, 1)?, channel(color, 2)?]))
     };
     list.as_array().into_iter().flatten().filter_map(color).collect()
-}
-
-fn is_mesh(file: &Path) -> bool {
-    let ending = file.extension().map(OsStr::to_ascii_lowercase);
-    ending.is_some_and(|ending| ["ply", "obj", "stl", "off"].map(str::as_ref).contains(&&*ending))
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
-}
-
-/// What a folder holds, in order of names.
-fn entries(folder: &Path) -> Vec<PathBuf> {
-    let Ok(listed) = std::fs::read_dir(folder) else { return Vec::new() };
-    let mut entries: Vec<PathBuf> = listed.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    entries.sort();
-    entries
-}
-
-/// Folders in a folder that may be groups: those of chunks have numbers for names, and hidden ones are under way.
-fn folders(folder: &Path) -> Vec<PathBuf> {
-    let may_be_group = |path: &PathBuf| {
-        let name = file_name(path);
-        let is_chunks = name == "c" || name.bytes().all(|byte| byte.is_ascii_digit());
-        path.is_dir() && !path.is_symlink() && !is_chunks && !name.starts_with('.')
-    };
-    entries(folder).into_iter().filter(may_be_group).collect()
-}
-
-fn files(folder: &Path) -> Vec<PathBuf> {
-    entries(folder).into_iter().filter(|path| path.is_file() && !path.is_symlink()).collect()
 }
