@@ -8,10 +8,9 @@ use super::pages::{PagesArgs, VolumesArgs};
 use super::survive::SurviveArgs;
 use super::times::Times;
 use super::values::{
-    Crop, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size, parse_triple,
-    solvers_help,
+    CompressArg, Crop, OmeArg, Output, parse_crop, parse_fill_gaps, parse_method, parse_pair, parse_seed, parse_size,
+    parse_triple, solvers_help,
 };
-use crate::io::ome_zarr::{Compression, OmeVersion};
 use crate::pipeline::distance::Method;
 use crate::pipeline::marks::Seed;
 use crate::pipeline::segment::FillGaps;
@@ -344,58 +343,4 @@ pub(crate) enum StopArg {
     Surface,
     /// The L2 norm of a step's change falls under the limit
     L2,
-}
-
-/// How chunks are packed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum CompressArg {
-    None,
-    Fast,
-    Small,
-}
-
-/// Which version of OME-Zarr is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum OmeArg {
-    #[value(name = "0.4")]
-    V04,
-    #[value(name = "0.5")]
-    V05,
-}
-
-impl OmeArg {
-    /// As it is typed.
-    pub(crate) fn name(self) -> &'static str {
-        OmeVersion::from(self).name()
-    }
-}
-
-impl From<OmeArg> for OmeVersion {
-    fn from(arg: OmeArg) -> Self {
-        match arg {
-            OmeArg::V04 => Self::V04,
-            OmeArg::V05 => Self::V05,
-        }
-    }
-}
-
-impl CompressArg {
-    /// As it is typed.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Fast => "fast",
-            Self::Small => "small",
-        }
-    }
-}
-
-impl From<CompressArg> for Compression {
-    fn from(arg: CompressArg) -> Self {
-        match arg {
-            CompressArg::None => Self::None,
-            CompressArg::Fast => Self::Fast,
-            CompressArg::Small => Self::Small,
-        }
-    }
 }

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::common::{CompressArg, LogArg, OmeArg};
+use super::common::LogArg;
 use super::pages::VolumeArgs;
+use super::values::{CompressArg, OmeArg};
 use super::values::{parse_size, parse_spacing};
 
 /// Write a volume or a mesh in another format.

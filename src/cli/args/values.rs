@@ -3,6 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use clap::ValueEnum;
+
+use crate::io::ome_zarr::{Compression, OmeVersion};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::pipeline::distance::{Method, SOLVERS};
 use crate::pipeline::marks::Seed;
@@ -142,6 +145,60 @@ pub(crate) fn parse_neighbours(text: &str) -> Result<Neighbours, String> {
 pub(crate) fn solvers_help() -> String {
     let list: Vec<String> = SOLVERS.iter().map(|solver| format!("{} ({})", solver.name, solver.about)).collect();
     format!("Distance method: {}", list.join(", "))
+}
+
+/// How chunks are packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CompressArg {
+    None,
+    Fast,
+    Small,
+}
+
+/// Which version of OME-Zarr is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OmeArg {
+    #[value(name = "0.4")]
+    V04,
+    #[value(name = "0.5")]
+    V05,
+}
+
+impl OmeArg {
+    /// As it is typed.
+    pub(crate) fn name(self) -> &'static str {
+        OmeVersion::from(self).name()
+    }
+}
+
+impl From<OmeArg> for OmeVersion {
+    fn from(arg: OmeArg) -> Self {
+        match arg {
+            OmeArg::V04 => Self::V04,
+            OmeArg::V05 => Self::V05,
+        }
+    }
+}
+
+impl CompressArg {
+    /// As it is typed.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Fast => "fast",
+            Self::Small => "small",
+        }
+    }
+}
+
+impl From<CompressArg> for Compression {
+    fn from(arg: CompressArg) -> Self {
+        match arg {
+            CompressArg::None => Self::None,
+            CompressArg::Fast => Self::Fast,
+            CompressArg::Small => Self::Small,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ mod mesh;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::cli::args::common::{CompressArg, OmeArg};
 use crate::cli::args::convert::ConvertArgs;
+use crate::cli::args::values::{CompressArg, OmeArg};
 use crate::cli::inputs::image::{OpenStack, chosen_notes, open_volume};
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::Outputs;
