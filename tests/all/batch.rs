@@ -4,12 +4,13 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use crate::common::ball::{Ball, Bench};
 use crate::common::held::{Ended, Held};
+use crate::common::patience::output_of;
 
 /// A folder with stacks and marks of one ball under several names, and a list.
 fn bench(names: &[&str], list: &str) -> Bench {
@@ -235,8 +236,8 @@ fn shards_side_by_side_are_one_run() {
         command.spawn().unwrap()
     };
     let both = [start("1/2"), start("2/2")];
-    for mut child in both {
-        assert!(child.wait().unwrap().success());
+    for child in both {
+        assert!(output_of(child).status.success());
     }
     let of = |shard: &str| {
         figures(&bench, shard).iter().map(|row| row["item"].as_str().unwrap().to_string()).collect::<Vec<_>>()
@@ -276,22 +277,24 @@ fn memory_of_what_runs_at_a_time_is_within_the_limit() {
 const ENDLESS: &str = "[defaults]\ncommand = \"segment\"\npoints = \"in/{stem}.csv\"\n\n[[items]]\nimages = \"in/*.tif\"\ntol = 1e-30\nmax_steps = 1000000000\n";
 
 /// Waits until logs tell that a number of items are in their time steps.
-fn until_moving(bench: &Bench, names: &[&str]) {
+fn until_moving(run: &mut Held, bench: &Bench, names: &[&str]) {
     let moves = |name: &str| {
         fs::read_to_string(bench.path(&format!("out/{name}.log"))).is_ok_and(|log| log.contains("speed 1  done"))
     };
-    while !names.iter().all(|name| moves(name)) {
-        std::thread::yield_now();
-    }
+    run.go_on_until("time steps of all", |_| names.iter().all(|name| moves(name)));
 }
 
 #[test]
 fn a_second_signal_ends_what_runs() {
     for (signals, code) in [(&["INT", "INT"][..], 130), (&["TERM"][..], 143)] {
         let bench = bench(&["a", "b", "c"], ENDLESS);
-        let run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 2"));
-        until_moving(&bench, &["a", "b"]);
-        for signal in signals {
+        let mut run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 2"));
+        until_moving(&mut run, &bench, &["a", "b"]);
+        for (n, signal) in signals.iter().enumerate() {
+            if n == 1 {
+                // Two that are on their way at once are one to the system.
+                run.hear("no new items start");
+            }
             run.signal(signal);
         }
         let Ended { status, said, .. } = run.finish();
@@ -315,14 +318,18 @@ fn a_second_signal_ends_what_runs() {
 #[test]
 fn items_are_asked_for_checkpoints() {
     let bench = bench(&["a"], ENDLESS);
-    let run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 1"));
-    until_moving(&bench, &["a"]);
+    let mut run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 1"));
+    until_moving(&mut run, &bench, &["a"]);
     let is_taken = || fs::read_to_string(bench.path("out/a.log")).is_ok_and(|log| log.contains("a checkpoint of"));
     // One that has just begun is not asked.
-    while !is_taken() {
-        run.signal("USR1");
-        std::thread::sleep(Duration::from_millis(100));
-    }
+    let mut asked = Instant::now();
+    run.go_on_until("a checkpoint of a", |run| {
+        if asked.elapsed() > Duration::from_millis(100) {
+            run.signal("USR1");
+            asked = Instant::now();
+        }
+        is_taken()
+    });
     run.signal("TERM");
     assert_eq!(run.finish().status.code(), Some(143), "it had gone on");
 }
@@ -330,8 +337,8 @@ fn items_are_asked_for_checkpoints() {
 #[test]
 fn a_first_signal_lets_what_runs_end() {
     let bench = bench(&["a", "b", "c"], &LIST.replace("max_steps = 3", "max_steps = 60\ntol = 1e-30"));
-    let run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 1"));
-    until_moving(&bench, &["a"]);
+    let mut run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 1"));
+    until_moving(&mut run, &bench, &["a"]);
     run.signal("INT");
     let Ended { status, said, .. } = run.finish();
     assert_eq!(status.code(), Some(130), "{said}");
@@ -345,8 +352,8 @@ fn a_first_signal_lets_what_runs_end() {
 #[test]
 fn a_killed_batch_leaves_nothing_running() {
     let bench = bench(&["a", "b"], ENDLESS);
-    let run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 2"));
-    until_moving(&bench, &["a", "b"]);
+    let mut run = Held::start(bench.command("batch jobs.toml -o out --memory 600MiB --threads 2"));
+    until_moving(&mut run, &bench, &["a", "b"]);
     run.signal("KILL");
     assert_eq!(run.finish().status.code(), None);
     bench.write("jobs.toml", LIST);

@@ -15,6 +15,7 @@ use strandline::io::geometry::read::source::Source;
 use strandline::io::geometry::read::sources::read_source;
 
 use crate::common::ball::{Ball, Bench, HEADER};
+use crate::common::patience::output_of;
 use crate::common::python;
 use crate::common::stores::volume;
 
@@ -197,7 +198,7 @@ fn a_dash_is_standard_input() {
         let mut child = command.spawn().unwrap();
         let marks = format!("{HEADER}{}", ball.marks(1));
         child.stdin.take().unwrap().write_all(marks.as_bytes()).unwrap();
-        child.wait_with_output().unwrap()
+        output_of(child)
     };
     let marks = ball.marks(1).lines().count();
     let plan = fed("segment image.tif --points - -o none --dry-run");

@@ -7,6 +7,7 @@ use std::process::Stdio;
 
 use crate::common::ball::{Ball, Bench};
 use crate::common::held::{Ended, Held};
+use crate::common::patience::{output_of, wait_until};
 
 // Checkpoints are what a run may leave: tests/all/resume.rs.
 const RUN: &str = "segment image.tif --points marks.csv -o out/x.zarr -v --checkpoint off";
@@ -142,12 +143,10 @@ fn a_run_that_cannot_look_up_ends_all_the_same() {
             let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim().to_owned();
             u64::from_str_radix(&mask, 16).unwrap()
         };
-        while caught() & (1 << 1) == 0 || caught() & (1 << 14) == 0 {
-            std::thread::yield_now();
-        }
+        wait_until("the run listens", || caught() & (1 << 1) != 0 && caught() & (1 << 14) != 0);
         let sent = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
         assert!(sent.success());
-        let output = child.wait_with_output().unwrap();
+        let output = output_of(child);
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!((output.status.code(), said.lines().last()), (Some(code), Some(SENTENCE)), "{said}");
         assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty());

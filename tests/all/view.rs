@@ -7,9 +7,9 @@ use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Stdio};
-use std::time::{Duration, Instant};
 
 use crate::common::ball::{Ball, Bench};
+use crate::common::patience::{PATIENCE, wait_until};
 use crate::common::random::Random;
 
 /// A server of its own, ended when it is dropped.
@@ -31,6 +31,7 @@ impl Served {
     /// Sends what may be no request at all.
     fn send(&self, bytes: &[u8]) -> Answer {
         let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
         stream.write_all(bytes).unwrap();
         let mut answer = Vec::new();
         stream.read_to_end(&mut answer).unwrap();
@@ -284,14 +285,7 @@ fn runs_that_have_ended_are_not_running() {
         bench.write("points.xyz", "0 0 0\n1 0 0\n0 1 0\n");
         let run = "distance points.xyz --origin=-1,-1,-1 --spacing 0.005 --shape 600,600,600 --live -q -o out.zarr";
         let mut run = bench.command(run).stderr(Stdio::null()).spawn().unwrap();
-        let until = Instant::now() + Duration::from_mins(1);
-        let wait = |seen: &dyn Fn() -> bool| {
-            while !seen() {
-                assert!(Instant::now() < until, "{word}");
-                std::thread::sleep(Duration::from_millis(5));
-            }
-        };
-        wait(&|| bench.path("out.zarr/zarr.json").is_file());
+        wait_until("a store", || bench.path("out.zarr/zarr.json").is_file());
         let served = Served::new(&bench, "out.zarr");
         assert_eq!(served.json("/live.json")["running"], true);
         run.kill().unwrap();
@@ -299,7 +293,7 @@ fn runs_that_have_ended_are_not_running() {
         if is_taken {
             fs::remove_dir_all(bench.path("out.zarr")).unwrap();
         }
-        wait(&|| served.json("/live.json")["running"] == false);
+        wait_until(word, || served.json("/live.json")["running"] == false);
         let told = served.json("/live.json");
         assert!(told["text"].as_str().unwrap().contains(word), "{told}");
     }

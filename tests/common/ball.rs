@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use super::patience;
 use super::random::Random;
 use super::tiff_bytes::{Value, bytes_u16, gray_page, tiff_file};
 use strandline::grid::{Box3, Geometry};
@@ -133,7 +134,7 @@ impl Bench {
     }
 
     pub(crate) fn run(&self, arguments: &str) -> Output {
-        self.command(arguments).output().unwrap()
+        patience::run(&mut self.command(arguments))
     }
 
     /// Runs what must succeed; returns what it printed.

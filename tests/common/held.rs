@@ -7,9 +7,12 @@
 use std::fs::File;
 use std::io::Read;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
 
-use rustix::event::{PollFd, PollFlags, poll};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pipe::{PipeFlags, fcntl_setpipe_size, pipe_with};
+
+use super::patience::{PATIENCE, output_of};
 
 /// The most that a pipe takes as one write.
 const WRITE: usize = 4096;
@@ -43,9 +46,7 @@ impl Held {
         while String::from_utf8_lossy(&self.said).matches('\n').count() < number {
             assert!(self.take() > 0, "ended before line {number}: {}", String::from_utf8_lossy(&self.said));
         }
-        let mut ears = [PollFd::new(&self.ear, PollFlags::IN)];
-        poll(&mut ears, None).unwrap();
-        assert!(ears[0].revents().contains(PollFlags::IN), "ended before line {number}");
+        assert!(self.speaks(PATIENCE), "neither line {number} nor the end came");
         self.said.clear();
     }
 
@@ -57,6 +58,18 @@ impl Held {
         self.said.clear();
     }
 
+    /// Lets it go on, whatever it says, until something is so.
+    pub(crate) fn go_on_until(&mut self, what: &str, mut is_so: impl FnMut(&Self) -> bool) {
+        let begun = Instant::now();
+        while !is_so(self) {
+            let said = String::from_utf8_lossy(&self.said);
+            assert!(begun.elapsed() < PATIENCE, "waited in vain: {what}: {said}");
+            if self.speaks(Duration::from_millis(5)) {
+                assert!(self.take() > 0, "ended before this: {what}: {}", String::from_utf8_lossy(&self.said));
+            }
+        }
+    }
+
     pub(crate) fn signal(&self, name: &str) {
         let sent = Command::new("kill").args(["-s", name, &self.child.id().to_string()]).status().unwrap();
         assert!(sent.success());
@@ -65,13 +78,25 @@ impl Held {
     /// Lets it go on to its end.
     pub(crate) fn finish(mut self) -> Ended {
         while self.take() > 0 {}
-        let output = self.child.wait_with_output().unwrap();
+        let output = output_of(self.child);
         let said = String::from_utf8(self.said).unwrap();
         Ended { status: output.status, said, printed: String::from_utf8(output.stdout).unwrap() }
     }
 
+    /// Whether within some time there is a write to take, or the end.
+    fn speaks(&self, within: Duration) -> bool {
+        let mut ears = [PollFd::new(&self.ear, PollFlags::IN)];
+        let within = Timespec::try_from(within).unwrap();
+        poll(&mut ears, Some(&within)).unwrap();
+        !ears[0].revents().is_empty()
+    }
+
     /// Takes one write out of the pipe; returns its bytes, 0 when there will be none any more.
     fn take(&mut self) -> usize {
+        if !self.speaks(PATIENCE) {
+            let _ = self.child.kill();
+            panic!("it neither went on nor ended: {}", String::from_utf8_lossy(&self.said));
+        }
         let mut write = [0; WRITE];
         let len = self.ear.read(&mut write).unwrap();
         self.said.extend_from_slice(&write[..len]);

@@ -10,6 +10,7 @@ pub(crate) mod lab;
 pub(crate) mod mesh_buffer;
 pub(crate) mod meshes;
 pub(crate) mod npy;
+pub(crate) mod patience;
 pub(crate) mod plain_reconstruction;
 pub(crate) mod plain_scheme;
 pub(crate) mod polyhedra;
