@@ -14,7 +14,8 @@ pub(super) fn page(folder: &Folder, rows: &[Row], counts: &Counts) -> String {
         page.element("p", &[("class", "faint")], &told(counts));
         let failed = rows.iter().filter(|row| row.state == "failed");
         for row in failed {
-            let object = row.object.map_or(String::new(), |label| format!(", object {label}"));
+            let time = row.time.map_or(String::new(), |time| format!(", time {time}"));
+            let object = row.object.map_or(String::new(), |label| format!(", object {label}")) + &time;
             let reason = row.reason.as_deref().unwrap_or("failed");
             page.element("p", &[("class", "warning")], &format!("{}{object}: {reason}", row.item));
         }
@@ -34,8 +35,8 @@ pub(crate) fn told(counts: &Counts) -> String {
     format!("{all} {items}: {}", parts.join(", "))
 }
 
-const HEAD: [&str; 10] =
-    ["", "item", "object", "state", "volume", "area", "marks off, mean", "largest", "time", "peak memory"];
+const HEAD: [&str; 11] =
+    ["", "item", "object", "at time", "state", "volume", "area", "marks off, mean", "largest", "time", "peak memory"];
 
 fn put_rows(table: &mut Html, folder: &Folder, rows: &[Row]) {
     table.within("thead", &[], |head| {
@@ -71,6 +72,7 @@ fn put_row(cells: &mut Html, folder: &Folder, row: &Row, is_first: bool) {
     let of = |value: Option<f64>| value.map_or(String::new(), number);
     let rest = [
         row.object.map_or(String::new(), |label| label.to_string()),
+        row.time.map_or(String::new(), |time| time.to_string()),
         row.state.into(),
         of(row.volume),
         of(row.area),

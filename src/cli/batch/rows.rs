@@ -9,6 +9,8 @@ use super::state::{Object, Stage, State};
 pub(crate) struct Row {
     pub(crate) item: String,
     pub(crate) object: Option<u64>,
+    /// Of an item with several times of an image.
+    pub(crate) time: Option<u64>,
     pub(crate) state: &'static str,
     pub(crate) exit_code: Option<i32>,
     pub(crate) reason: Option<String>,
@@ -35,6 +37,7 @@ pub(super) fn rows(name: &str, state: Option<&State>) -> Vec<Row> {
     let whole = Row {
         item: name.into(),
         object: None,
+        time: None,
         state: stage.name(),
         exit_code: state.and_then(|state| state.code),
         reason: state.and_then(|state| state.reason.clone()),
@@ -51,6 +54,7 @@ pub(super) fn rows(name: &str, state: Option<&State>) -> Vec<Row> {
     }
     let row = |object: &Object| Row {
         object: object.label,
+        time: object.time,
         // Of a run that failed in part the objects that it found are done.
         state: if object.reason.is_some() { Stage::Failed.name() } else { Stage::Done.name() },
         reason: object.reason.clone(),
@@ -65,12 +69,14 @@ pub(super) fn rows(name: &str, state: Option<&State>) -> Vec<Row> {
 
 /// Values between commas, with a heading; none is empty.
 pub(super) fn csv(rows: &[Row]) -> String {
-    let mut text =
-        String::from("item,object,state,exit_code,reason,volume,area,marks_mean,marks_max,seconds,peak_memory_bytes\n");
+    let mut text = String::from(
+        "item,object,time,state,exit_code,reason,volume,area,marks_mean,marks_max,seconds,peak_memory_bytes\n",
+    );
     for row in rows {
         let cells = [
             quoted(&row.item),
             cell(row.object),
+            cell(row.time),
             row.state.into(),
             cell(row.exit_code),
             row.reason.as_deref().map_or(String::new(), quoted),
@@ -109,6 +115,6 @@ mod tests {
         assert_eq!((quoted("=SUM(1)"), quoted("a=1")), ("'=SUM(1)".into(), "a=1".into()));
         let mut row = rows("x,y", None).remove(0);
         row.volume = Some(0.1);
-        assert!(csv(&[row]).ends_with("\n\"x,y\",,skipped,,,0.1,,,,,\n"));
+        assert!(csv(&[row]).ends_with("\n\"x,y\",,,skipped,,,0.1,,,,,\n"));
     }
 }

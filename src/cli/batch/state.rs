@@ -45,6 +45,9 @@ impl Stage {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Object {
     pub(crate) label: Option<u64>,
+    /// The time of the image, counted from 0, where it has several that were asked for.
+    #[serde(default)]
+    pub(crate) time: Option<u64>,
     /// Why there is none.
     pub(crate) reason: Option<String>,
     pub(crate) volume: Option<f64>,
@@ -218,17 +221,33 @@ fn misfit(store: &Path) -> Option<String> {
 pub(crate) fn reported(store: &Path) -> Option<(Vec<Object>, f64, u64)> {
     let report: Value = serde_json::from_slice(&fs::read(store.join("report.json")).ok()?).ok()?;
     let result = &report["result"];
-    let one = |object: &Value| Object {
+    let one = |time: Option<u64>, object: &Value| Object {
         label: object["label"].as_u64(),
+        time,
         reason: object["reason"].as_str().map(str::to_owned),
         volume: object["volume"].as_f64(),
         area: object["area"].as_f64(),
         marks_mean: object["hausdorff"]["mean"].as_f64(),
         marks_max: object["hausdorff"]["max"].as_f64(),
     };
-    let all = |name: &str| result[name].as_array().into_iter().flatten().map(one).collect::<Vec<_>>();
-    let mut objects = if result["objects"].is_array() { all("objects") } else { vec![one(result)] };
-    objects.extend(all("refused"));
-    objects.sort_by_key(|object| object.label);
+    let all = |time: Option<u64>, result: &Value| -> Vec<Object> {
+        let of = |name: &str| result[name].as_array().into_iter().flatten();
+        of("objects").chain(of("refused")).map(|object| one(time, object)).collect()
+    };
+    // A time of which nothing could be solved has a reason and no objects.
+    let at_time = |told: &Value| {
+        let (time, objects) = (told["time"].as_u64(), all(told["time"].as_u64(), told));
+        if objects.is_empty() { vec![one(time, told)] } else { objects }
+    };
+    let mut objects = match result["times"].as_array() {
+        Some(times) => times.iter().flat_map(at_time).collect(),
+        None if result["objects"].is_array() => all(None, result),
+        None => {
+            let mut all = all(None, result);
+            all.push(one(None, result));
+            all
+        }
+    };
+    objects.sort_by_key(|object| (object.time, object.label));
     Some((objects, report["seconds"].as_f64()?, report["peak_rss_bytes"].as_u64()?))
 }
