@@ -29,7 +29,7 @@ pub struct Check {
 
 impl Check {
     /// One that has found nothing so far.
-    pub(super) fn new(name: impl Into<String>) -> Self {
+    pub(crate) fn new(name: impl Into<String>) -> Self {
         Self { name: name.into(), ..Self::default() }
     }
 
@@ -57,12 +57,12 @@ impl Check {
     }
 
     /// Something wrong with a file.
-    pub(super) fn wrong_in(&mut self, file: impl Into<String>, text: impl Into<String>) {
+    pub(crate) fn wrong_in(&mut self, file: impl Into<String>, text: impl Into<String>) {
         self.add(Fault { file: Some(file.into()), voxel: None, text: text.into() });
     }
 
     /// Adds to what was compared.
-    pub(super) fn also(&mut self, told: &str) {
+    pub(crate) fn also(&mut self, told: &str) {
         self.told.push_str(told);
     }
 

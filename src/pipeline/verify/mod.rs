@@ -10,6 +10,7 @@ mod series;
 mod structure;
 mod sums;
 mod surface;
+mod vertices;
 mod voxels;
 
 use std::path::Path;
@@ -20,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Engine, Footprint};
 use crate::io::ome_zarr::{TIMES, listed_sums};
 use structure::Image;
+use vertices::DrawnFrom;
 
 pub use found::{Check, Fault};
 pub use rerun::same_results;
@@ -56,12 +58,15 @@ pub fn verify(engine: &Engine, store: &Path, tell: &mut dyn FnMut(Check)) -> Res
                 tell(surface::check_object(engine, store, (&images, "meshes"), object)?);
             }
         }
-        "reconstruct" => tell(surface::check(engine, store, "meshes/surface.ply", of(""), result)?),
+        "reconstruct" => {
+            tell(surface::check(engine, store, "meshes/surface.ply", of("").map(DrawnFrom::LevelSet), result)?)
+        }
         "distance" => tell(distances::check(engine, &images, &report)?),
         _ => {
             tell(distances::check(engine, &images, &report)?);
-            // Its vertices lie where two distances are equal, which the one that is stored does not tell.
-            tell(surface::check(engine, store, "meshes/surface.ply", None, result)?);
+            // Its vertices lie where two distances are equal, of which the lesser one alone is stored.
+            let labels = of("labels/nearest").map(DrawnFrom::Labels);
+            tell(surface::check(engine, store, "meshes/surface.ply", labels, result)?);
         }
     }
     Ok(())

@@ -1,23 +1,19 @@
-//! A mesh against the field that it is the surface of: every vertex lies where u = 1/2 is crossed between two voxels, as far as the
-//! file's numbers tell, and the mesh measures what the report says.
+//! A mesh against the image that it was drawn from, and against what the report says that it measures.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::Value;
 
-use super::found::{Check, Fault};
+use super::found::Check;
 use super::structure::Image;
-use super::voxels::read;
+use super::vertices::{self, DrawnFrom};
 use crate::error::Result;
-use crate::exec::{Engine, Workers};
-use crate::grid::{Box3, Geometry, TriangleMesh};
+use crate::exec::Engine;
+use crate::grid::TriangleMesh;
 use crate::io::geometry::read::source::Source;
 use crate::io::geometry::read::sources::read_source;
-use crate::kernel::surface::{SurfaceMeasure, fraction};
+use crate::kernel::surface::SurfaceMeasure;
 
-/// Voxels along the edge of the boxes that vertices are gathered by.
-const EDGE: i64 = 63;
 /// Bytes in memory for each of the file: vertices in double precision, triangles, their edges, and numbers gathered by box.
 const MEMORY: u64 = 6;
 
@@ -36,14 +32,20 @@ pub(super) fn check_object(
     let alone = of("levelset");
     let mesh = if alone.is_some() { format!("{folder}/surface.ply") } else { format!("{folder}/{own}.ply") };
     let field = alone.or_else(|| of(&format!("levelset/{own}")));
-    check(engine, store, &mesh, field, object)
+    check(engine, store, &mesh, field.map(DrawnFrom::LevelSet), object)
 }
 
-/// Compares a mesh with a field and with what is told of it.
+/// Compares a mesh with what it was drawn from and with what is told of it.
 ///
 /// # Errors
 /// When the memory does not hold the mesh or the run is interrupted.
-pub(super) fn check(engine: &Engine, store: &Path, name: &str, field: Option<&Image>, told: &Value) -> Result<Check> {
+pub(super) fn check(
+    engine: &Engine,
+    store: &Path,
+    name: &str,
+    from: Option<DrawnFrom<'_>>,
+    told: &Value,
+) -> Result<Check> {
     let mut found = Check::new(name);
     let path = store.join(name);
     let Ok(file) = path.metadata() else {
@@ -61,9 +63,9 @@ pub(super) fn check(engine: &Engine, store: &Path, name: &str, field: Option<&Im
     };
     measures(&mesh, name, told, &mut found);
     found.told = format!("{} triangles and their measures", mesh.len());
-    if let Some(field) = field {
-        vertices(engine, &mesh, name, field, &mut found)?;
-        found.also(&format!(", {} vertices on the surface u = 1/2 of {}", mesh.vertices.len(), field.name()));
+    if let Some(from) = from {
+        vertices::check(engine, (&mesh, rounding(&mesh)), name, from, &mut found)?;
+        found.also(&format!(", {} vertices {}", mesh.vertices.len(), from.told()));
     }
     Ok(found)
 }
@@ -114,87 +116,4 @@ fn measures(mesh: &TriangleMesh, name: &str, told: &Value, found: &mut Check) {
 
 fn length(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
-}
-
-/// Compares all vertices with the field, box by box.
-fn vertices(engine: &Engine, mesh: &TriangleMesh, name: &str, field: &Image, found: &mut Check) -> Result<()> {
-    let geometry = &field.reader.levels()[0].geometry;
-    let mut boxes: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
-    for (n, vertex) in mesh.vertices.iter().enumerate() {
-        let cell = geometry.to_voxels(*vertex).map(|v| (v.floor() as i64).div_euclid(EDGE));
-        boxes.entry([cell[2], cell[1], cell[0]]).or_default().push(n as u32);
-    }
-    let boxes: Vec<([i64; 3], Vec<u32>)> = boxes.into_iter().collect();
-    let eps = rounding(mesh);
-    let stage = engine.stage(name, boxes.len() as u64);
-    let parts = stage.run(&boxes, &Workers::none(), |(), ([z, y, x], members)| {
-        let mut found = Check::default();
-        let lo = [*x, *y, *z].map(|cell| cell * EDGE);
-        let part = Box3::from_shape([EDGE + 2; 3]).translate(lo.map(|v| v - 1));
-        let Some(values) = padded(field, &part, &mut found) else { return Ok(found) };
-        for &n in members {
-            let position = mesh.vertices[n as usize];
-            if let Some((voxel, text)) = off(geometry, position, eps, (&values, &part)) {
-                let text = format!("vertex {n} at {position:?} {text}");
-                found.add(Fault { file: Some(name.to_owned()), voxel: Some(voxel), text });
-            }
-        }
-        Ok(found)
-    })?;
-    stage.finish();
-    found.take_all(parts);
-    Ok(())
-}
-
-/// The values of a box that may reach out of the field, where it is 0.
-fn padded(field: &Image, part: &Box3, found: &mut Check) -> Option<Vec<f32>> {
-    let mut values = vec![0.0; part.len()];
-    let inside = part.intersect(&field.reader.levels()[0].geometry.domain());
-    if inside.is_empty() {
-        return Some(values);
-    }
-    let stored = read::<f32>(field, 0, &inside, found)?;
-    let width = inside.shape()[0] as usize;
-    for (row, (y, z)) in stored.chunks_exact(width).zip(inside.rows()) {
-        values[part.offset_of([inside.lo[0], y, z])..][..width].copy_from_slice(row);
-    }
-    Some(values)
-}
-
-/// What is wrong with the place of a vertex, and the voxel below it.
-fn off(
-    geometry: &Geometry,
-    position: [f64; 3],
-    eps: f64,
-    (values, part): (&[f32], &Box3),
-) -> Option<([i64; 3], String)> {
-    let place = geometry.to_voxels(position);
-    // What rounding moves it, in voxels; on the way from the world to voxels places lose digits too.
-    let slack: [f64; 3] = std::array::from_fn(|a| {
-        eps * position[a].abs() / geometry.spacing[a] + 1e-12 * (1.0 + (geometry.origin[a] / geometry.spacing[a]).abs())
-    });
-    let from_voxel = |a: usize| (place[a] - place[a].round()).abs();
-    let axis = (0..3).max_by(|&a, &b| from_voxel(a).total_cmp(&from_voxel(b)))?;
-    let mut lower: [i64; 3] = place.map(|v| v.round() as i64);
-    lower[axis] = place[axis].floor() as i64;
-    if let Some(other) = (0..3).find(|&a| a != axis && from_voxel(a) > slack[a]) {
-        let off = from_voxel(other).min(from_voxel(axis));
-        return Some((
-            lower,
-            format!("lies between no two voxels that are neighbours: {off} voxels beside their line"),
-        ));
-    }
-    let mut upper = lower;
-    upper[axis] += 1;
-    if !(part.contains(lower) && part.contains(upper)) {
-        return Some((lower, "lies outside of the field".into()));
-    }
-    let [below, above] = [lower, upper].map(|voxel| values[part.offset_of(voxel)]);
-    if (below >= 0.5) == (above >= 0.5) {
-        return Some((lower, format!("lies between u = {below} and {above}, where 1/2 is not crossed")));
-    }
-    let expected = fraction(below, above, 0.5);
-    let at = place[axis] - lower[axis] as f64;
-    ((at - expected).abs() > slack[axis])
-        .then(|| (lower, format!("lies {at} of the way from u = {below} to {above}; 1/2 is at {expected}")))
 }
