@@ -14,6 +14,7 @@ use super::progress::outlook::{Outlook, Running};
 use super::save_points::{SavePoint, SavePoints};
 use super::workers::Workers;
 use crate::error::{Error, ErrorKind, Result};
+use crate::store::checkpoint::Identity;
 use crate::store::{Scratch, Traffic};
 
 /// What one stage of a run cost.
@@ -87,6 +88,12 @@ impl Engine {
     #[must_use]
     pub fn with_save_points(self, saving: Option<Arc<SavePoints>>) -> Self {
         Self { saving: saving.filter(|_| self.ranks == 1), ..self }
+    }
+
+    /// What a run that puts by what it has solved was asked for, and what its inputs hold.
+    #[must_use]
+    pub fn identity(&self) -> Option<&Identity> {
+        self.saving.as_ref().map(|saving| saving.identity())
     }
 
     /// The run is over: what was put by goes, unless the run ended by something that can be mended: a signal, a

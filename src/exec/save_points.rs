@@ -19,7 +19,7 @@ use super::cancel::Cancel;
 use super::progress::heard::Progress;
 use crate::error::{Error, Result};
 use crate::grid::digits::bytes;
-use crate::store::checkpoint::{Checkpoints, SavedField, pack, restore, unpack};
+use crate::store::checkpoint::{Checkpoints, Identity, SavedField, pack, restore, unpack};
 use crate::store::{BrickArray, Element};
 
 /// How often checkpoints are taken where nobody says.
@@ -62,6 +62,12 @@ impl SavePoints {
             spent: Mutex::default(),
             failure: Mutex::default(),
         }
+    }
+
+    /// What the run was asked for, and what its inputs hold.
+    #[must_use]
+    pub fn identity(&self) -> &Identity {
+        self.checkpoints.identity()
     }
 
     /// Removes all checkpoints: the run is done.

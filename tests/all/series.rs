@@ -339,6 +339,23 @@ fn an_object_leaves_the_part(bench: &Bench) {
 }
 
 #[test]
+fn a_batch_lists_each_time() {
+    let bench = bench();
+    let list = "[[items]]\ncommand = \"segment\"\nimages = \"drop.tif\"\npoints = \"three.csv\"\ntime = \"9:11\"\nmax_steps = 3\n";
+    bench.write("jobs.toml", list);
+    bench.succeed("batch jobs.toml -o out/all -q");
+    let summary = bench.json("out/all/summary.json");
+    let rows = summary["rows"].as_array().unwrap();
+    let report = bench.json("out/all/drop.zarr/report.json");
+    let told: Vec<f64> = rows.iter().map(|row| row["volume"].as_f64().unwrap()).collect();
+    assert_eq!(told, volumes(&report, 1));
+    let times: Vec<_> = rows.iter().map(|row| (row["time"].as_u64(), row["object"].as_u64())).collect();
+    assert_eq!(times, [(Some(9), Some(1)), (Some(10), Some(1))]);
+    let table = fs::read_to_string(bench.path("out/all/summary.csv")).unwrap();
+    assert!(table.starts_with("item,object,time,state,") && table.contains("\ndrop,1,10,done,"), "{table}");
+}
+
+#[test]
 fn what_cannot_be_is_said_in_one_sentence() {
     let bench = bench();
     let run = |flags: &str, code: i32| {

@@ -197,12 +197,7 @@ fn labels_meshes_and_reports_that_do_not_fit_are_told() {
     set(&out, "/labels/segmentation/0", [1, 2, 3], 0_u8);
     edit(&out.join("report.json"), |report| report["result"]["objects"][1]["volume"] = 1000.0.into());
     told(&wrong(&bench, "verify out/x.zarr"), &["meshes/object-2.ply", "volume: 1000"]);
-    let mesh = out.join("meshes/object-1.ply");
-    let mut bytes = fs::read(&mesh).unwrap();
-    let start = bytes.windows(11).position(|word| word == b"end_header\n").unwrap() + 11;
-    let x = f32::from_le_bytes(bytes[start..start + 4].try_into().unwrap());
-    bytes[start..start + 4].copy_from_slice(&(x + 0.01).to_le_bytes());
-    fs::write(&mesh, bytes).unwrap();
+    move_first_vertex(&out.join("meshes/object-1.ply"), 0.01);
     let printed = wrong(&bench, "verify out/x.zarr --log json");
     assert_eq!(printed, "", "events go to stderr");
     told(&wrong(&bench, "verify out/x.zarr"), &["meshes/object-1.ply", "vertex 0 at ["]);
@@ -215,6 +210,47 @@ fn labels_meshes_and_reports_that_do_not_fit_are_told() {
     told(&wrong(&bench, "verify out/x.zarr"), &["report.json", "is missing"]);
     let text = bench.fail("verify out/none.zarr", 2);
     assert!(text.contains("there is no such store"), "{text}");
+}
+
+#[test]
+fn settings_and_inputs_are_those_of_the_run() {
+    let bench = bench();
+    bench.succeed(&format!("{LONG} -o out/x.zarr"));
+    let settings = |printed: &str| printed.lines().find(|line| line.contains("settings")).unwrap().to_owned();
+    let printed = bench.succeed("verify out/x.zarr");
+    assert!(settings(&printed).ends_with("7 of 7 facts of the distance that made it"), "{printed}");
+    // Of another length, so that it is not the file that was read, whatever its hash.
+    bench.write("cloud.xyz", "0 0 0\n");
+    let printed = bench.succeed("verify out/x.zarr");
+    assert!(settings(&printed).contains("6 of 7") && settings(&printed).contains("cloud.xyz ("), "{printed}");
+    let report = bench.path("out/x.zarr/report.json");
+    edit(&report, |report| {
+        let arguments = report["arguments"].as_array_mut().unwrap();
+        *arguments.iter_mut().find(|word| *word == "0.1").unwrap() = "0.2".into();
+    });
+    told(&wrong(&bench, "verify out/x.zarr"), &["settings", "has --spacing 0.2 in its arguments", "made with 0.1"]);
+    bench.succeed(&format!("{LONG} -o out/x.zarr --overwrite --checkpoint off"));
+    assert!(settings(&bench.succeed("verify out/x.zarr")).contains("not compared"));
+}
+
+/// Moves the first vertex of a mesh along x.
+fn move_first_vertex(mesh: &Path, by: f32) {
+    let mut bytes = fs::read(mesh).unwrap();
+    let start = bytes.windows(11).position(|word| word == b"end_header\n").unwrap() + 11;
+    let x = f32::from_le_bytes(bytes[start..start + 4].try_into().unwrap());
+    bytes[start..start + 4].copy_from_slice(&(x + by).to_le_bytes());
+    fs::write(mesh, bytes).unwrap();
+}
+
+#[test]
+fn a_middle_surface_lies_where_labels_change() {
+    let bench = bench();
+    let grid = "--shape 30,20,18 --origin -2,0,1 --spacing 0.3";
+    bench.succeed(&format!("middle cloud.xyz other.xyz -q {grid} -o out/x.zarr"));
+    fs::remove_file(bench.path("out/x.zarr/checksums.txt")).unwrap();
+    assert!(bench.succeed("verify out/x.zarr").contains("vertices where labels/nearest changes"));
+    move_first_vertex(&bench.path("out/x.zarr/meshes/surface.ply"), -1.2);
+    told(&wrong(&bench, "verify out/x.zarr"), &["meshes/surface.ply", "vertex 0 at [", "lies in the midst of label 1"]);
 }
 
 fn edit(path: &Path, change: impl Fn(&mut Value)) {

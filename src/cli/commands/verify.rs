@@ -1,6 +1,7 @@
 //! `strandline verify`: checks a store, a line a check; with `--rerun` the run that wrote it, too.
 
 mod again;
+mod settings;
 
 use std::sync::Arc;
 
@@ -39,9 +40,9 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
             printed = told;
         }
     };
-    let result = verify(&engine, store, &mut tell);
+    let result = verify(&engine, store, &mut tell).and_then(|()| settings::check(store));
     console.clear();
-    result?;
+    result?.map(&mut tell);
     if let Some(again) = again {
         let result = again::rerun(again, args, &engine, &cancel, &console);
         console.clear();

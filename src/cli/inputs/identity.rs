@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::UNIX_EPOCH;
 
 use super::content::files_of;
-use super::typed::{Given, Typed};
+use super::typed::Typed;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::sources::is_standard_input;
 use crate::store::checkpoint::Identity;
@@ -53,10 +53,10 @@ pub(crate) fn identity(typed: &[String]) -> Result<Option<Identity>> {
     identity.push(("the command".into(), command));
     given.retain(|given| !WITHOUT_EFFECT.contains(&given.id.as_str()));
     given.sort_by(|a, b| a.id.cmp(&b.id));
-    for Given { id, flag, is_path, values, .. } in given {
-        let name = flag.map_or_else(|| id.to_uppercase(), |flag| format!("--{flag}"));
-        let values = values.iter().map(Path::new);
-        let values = if is_path {
+    for given in given {
+        let name = given.name();
+        let values = given.values.iter().map(Path::new);
+        let values = if given.is_path {
             let Some(values) = values.map(told).collect::<Result<Option<Vec<_>>>>()? else { return Ok(None) };
             values
         } else {

@@ -31,6 +31,13 @@ pub(crate) struct Given {
     pub(crate) values: Vec<OsString>,
 }
 
+impl Given {
+    /// As it is called where it is told.
+    pub(crate) fn name(&self) -> String {
+        self.flag.as_ref().map_or_else(|| self.id.to_uppercase(), |flag| format!("--{flag}"))
+    }
+}
+
 impl Typed {
     /// Takes a command line apart, the program's name first.
     ///

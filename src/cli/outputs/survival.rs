@@ -1,5 +1,6 @@
 //! How a run survives its end: where its checkpoints go, and what `--resume` finds.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -94,8 +95,15 @@ fn check_apart(folder: Option<&Path>, store: Option<&Path>) -> Result<()> {
 fn check_same(store: &Path, now: &Identity) -> Result<()> {
     let report = std::fs::read(store.join("report.json")).unwrap_or_default();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap_or_default();
-    let made: Option<Vec<String>> = serde_json::from_value(report["arguments"].clone()).ok();
-    let then = made.map(|made| identity(&made)).transpose()?.flatten().unwrap_or_default();
+    let known: Option<BTreeMap<String, String>> = serde_json::from_value(report["fingerprint"].clone()).ok();
+    let then = match known.filter(|known| !known.is_empty()) {
+        Some(known) => known.into_iter().collect(),
+        // A run without checkpoints.
+        None => {
+            let made: Option<Vec<String>> = serde_json::from_value(report["arguments"].clone()).ok();
+            made.map(|made| identity(&made)).transpose()?.flatten().unwrap_or_default()
+        }
+    };
     let Some(difference) = difference(&then, now) else { return Ok(()) };
     let what = format!(
         "is complete, and of another run: {difference}; choose another output, or give --overwrite in place of --resume"

@@ -24,6 +24,8 @@ pub(crate) struct Report<S, R> {
     pub(crate) command: &'static str,
     /// The command line as typed.
     pub(crate) arguments: Vec<String>,
+    /// What had an effect, by name, inputs with their sums; empty of a run that was not to survive its end.
+    pub(crate) fingerprint: BTreeMap<String, String>,
     pub(crate) settings: S,
     pub(crate) grid: Grid,
     pub(crate) threads: usize,
@@ -286,6 +288,7 @@ impl<S: Serialize, R: Serialize> Report<S, R> {
             version: env!("CARGO_PKG_VERSION"),
             command: ran.command,
             arguments: ran.typed.to_vec(),
+            fingerprint: ran.engine.identity().into_iter().flatten().cloned().collect(),
             settings,
             grid: Grid::new(geometry),
             threads: ran.engine.threads(),
