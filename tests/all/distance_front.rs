@@ -68,6 +68,7 @@ fn largest_difference<P: Stored>(geometry: &Geometry, cloud: &[[f64; 3]], edges:
 }
 
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn eikonal_methods_come_to_rest_where_sweeps_do() {
     for (seed, shape, spacing) in [
         (1, [66, 52, 37], [0.1; 3]),
@@ -76,7 +77,7 @@ fn eikonal_methods_come_to_rest_where_sweeps_do() {
         (4, [200, 1, 1], [0.7; 3]),
     ] {
         let geometry = grid(shape, spacing);
-        for count in [1, 12, 100] {
+        for count in [1, 100] {
             let cloud = random_cloud(&geometry, count, seed);
             let wide = largest_difference::<f64>(&geometry, &cloud, &[8, 16, 32]);
             let single = largest_difference::<f32>(&geometry, &cloud, &[8, 16, 32]);
@@ -138,6 +139,7 @@ fn inside(geometry: &Geometry, mut cloud: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
 /// voxels that points fix have it without exception. On Sponge & Sphere one
 /// point of the sphere is walled in by the voxels that its neighbours fix; the front tells voxels around of it.
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn euclidean_methods_find_nearly_every_nearest_source() {
     let lab = Lab::new(2);
     let pair = sponge_and_sphere().concat();
@@ -146,9 +148,7 @@ fn euclidean_methods_find_nearly_every_nearest_source() {
         cases.push((format!("Sponge & Sphere, h = {h}"), grid_around(&pair, h), pair.clone()));
     }
     for (seed, (count, spacing)) in
-        [(200, [0.5; 3]), (2000, [0.5; 3]), (200, [0.4, 0.4, 1.3]), (2000, [0.4, 0.4, 1.3]), (200, [1.0; 3])]
-            .into_iter()
-            .enumerate()
+        [(200, [0.5; 3]), (2000, [0.5; 3]), (200, [0.4, 0.4, 1.3]), (2000, [0.4, 0.4, 1.3])].into_iter().enumerate()
     {
         let geometry = grid([70, 64, 50], spacing);
         let cloud = inside(&geometry, random_cloud(&geometry, count, seed as u64));

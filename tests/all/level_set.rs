@@ -1,20 +1,15 @@
-//! Whole reconstructions and motions: the Sponge's figures as the papers' algorithms give them in f64 on the same
-//! cloud and settings, and a sphere that shrinks by its curvature at the exact rate.
+//! Motions whose course is known: a sphere that shrinks by its curvature, moves at a speed, or comes to rest, and the same bits from
+//! any number of threads. Whole reconstructions are in `reconstruct`.
 
 use std::f64::consts::PI;
 
-use strandline::grid::{BrickGrid, Geometry, PointBins};
+use strandline::grid::Geometry;
 use strandline::kernel::level_set::cell::CELL;
-use strandline::kernel::level_set::initial::persistence::PERSISTENCE;
 use strandline::kernel::level_set::scheme::velocity::Velocity;
-use strandline::kernel::surface::{MarchingCubes, Measures, Patch, PatchIndex, SurfaceMeasure, Welder, cells_of_brick};
-use strandline::pipeline::distance::{Method, Sources, cloud_distance};
-use strandline::pipeline::enclosure::tagging::tag;
-use strandline::pipeline::level_set::band::{Reaches, make_band};
+use strandline::kernel::surface::{MarchingCubes, Measures, Patch, SurfaceMeasure, Welder, cells_of_brick};
 use strandline::pipeline::level_set::evolve::evolve;
-use strandline::pipeline::level_set::time_loop::{Evolution, Stop, TimeLoop};
+use strandline::pipeline::level_set::time_loop::{Stop, TimeLoop};
 
-use crate::common::clouds::{grid_around, sponge};
 use crate::common::lab::{Lab, PlainGrid, dense, whole};
 use crate::common::mesh_buffer::MeshBuffer;
 use crate::common::plain_scheme::{gradient_norms, mean_norm};
@@ -31,17 +26,6 @@ fn surface(geometry: &Geometry, u: &[f32]) -> (MeshBuffer, Measures) {
     (mesh, measure.measures())
 }
 
-/// Each position once.
-fn distinct(cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let mut kept: Vec<[f64; 3]> = Vec::new();
-    for p in cloud {
-        if kept.iter().all(|q| (0..3).any(|a| (p[a] - q[a]).abs() > 1e-9)) {
-            kept.push(*p);
-        }
-    }
-    kept
-}
-
 fn settings(h: f64, theta: f32, delta: f32) -> TimeLoop {
     let tau = (h / 4.0) as f32;
     TimeLoop {
@@ -50,43 +34,6 @@ fn settings(h: f64, theta: f32, delta: f32) -> TimeLoop {
         max_steps: 1000,
         omega: 1.2,
         solver_tolerance: 1e-6,
-    }
-}
-
-/// The Sponge reconstructed with beta = 0.25, in the band d <= 2 beta: volume, mean distance of the cloud.
-fn sponge_figures(lab: &Lab, h: f64, delta: f32) -> (f64, f64, Evolution) {
-    let cloud = sponge();
-    let geometry = grid_around(&cloud, h);
-    let grid = BrickGrid::new(geometry.shape, CELL as i64);
-    let bins = PointBins::new(grid, &geometry, &cloud);
-    let set = dense(geometry.shape, CELL as i64);
-    let sources = Sources::cloud(&geometry, &cloud, &bins);
-    let stage = lab.engine.stage("sponge", 0);
-    let distance =
-        cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, f32::INFINITY).expect("room in scratch");
-    let tagging = tag(&stage, &lab.engine, &sources, &distance, PERSISTENCE, |_| true).expect("room in scratch");
-    let inside = tagging.inside(&stage, &lab.engine, 0.25).expect("room in scratch");
-    let reaches = Reaches { inner: 0.5, outer: 0.5 };
-    let mut band = make_band(&stage, &lab.engine, &distance, &inside, reaches).expect("room in scratch");
-    let done = evolve(&stage, &lab.engine, &mut band, None, geometry.spacing, &settings(h, 1.0, delta), None)
-        .expect("room in scratch");
-    let (mesh, measures) = surface(&geometry, &whole(&band.u));
-    assert!(measures.is_closed());
-    let near = PatchIndex::new(&mesh.vertices, &mesh.triangles, h).hausdorff_from(distinct(&cloud)).expect("a surface");
-    (measures.volume, near.mean, done)
-}
-
-/// Volumes within 1 %, the mean distance of the cloud (each position once) within 3 %.
-#[test]
-fn the_sponge_has_the_figures_of_the_papers_algorithms() {
-    let lab = Lab::new(2);
-    for (delta, volume, mean) in [(0.0, 2.195, 0.0076), (0.025, 1.939, 0.0213), (0.05, 1.839, 0.0359)] {
-        let found = sponge_figures(&lab, 0.05, delta);
-        assert!((found.0 / volume - 1.0).abs() < 0.01, "delta {delta}: {found:?} for {volume}");
-        assert!((found.1 / mean - 1.0).abs() < 0.03, "delta {delta}: {found:?} for {mean}");
-        assert_eq!(found.2.stopped_by, "l2");
-        // The papers' SOR takes 5 to 7 iterations a step.
-        assert!(found.2.sor_iterations < 12 * u64::from(found.2.steps), "{found:?}");
     }
 }
 
@@ -144,11 +91,11 @@ fn a_sphere_moves_at_its_speed() {
         (0.75 / PI * surface(&geometry, &whole(&band.u)).1.volume).cbrt()
     };
     let time = 40.0 * 0.005;
-    for speed in [1.0, -1.0, 0.5] {
+    for speed in [1.0, -1.0] {
         let off = [1, 2].map(|finer| (radius_after(finer, 40, &|_| speed) - 0.6 - speed * time).abs());
         assert!(off[0] < 0.15 * time && off[1] < 0.7 * off[0], "{speed}: {off:?}");
     }
-    let rested = radius_after(2, 200, &|r| 4.0 * (0.75 - r));
+    let rested = radius_after(2, 100, &|r| 8.0 * (0.75 - r));
     assert!((rested - 0.75).abs() < 0.01, "{rested}");
 }
 

@@ -7,7 +7,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 use strandline::error::Result;
 use strandline::grid::{Box3, BrickGrid, BrickSet, Geometry, PointBins};
@@ -19,6 +18,7 @@ use strandline::store::ElementType;
 
 use crate::common::ball::{Ball, Bench, HEADER, write_stack};
 use crate::common::lab::Lab;
+use crate::common::patience::wait_until;
 use crate::common::random::Random;
 
 /// Keeps what was read of boxes when the front had passed them.
@@ -120,9 +120,9 @@ fn live_runs_leave_the_bits_of_others() {
     fs::write(bench.path("ball.xyz"), ball.join("\n")).unwrap();
     fs::write(bench.path("other.xyz"), "3 0 0\n3 1 0\n3 0 1\n").unwrap();
     for (name, command) in [
-        ("distance", "distance ball.xyz --spacing 0.05 --labels --closest-point"),
+        ("distance", "distance ball.xyz --spacing 0.06 --labels --closest-point"),
         ("reconstruct", "reconstruct ball.xyz"),
-        ("middle", "middle ball.xyz other.xyz --spacing 0.05"),
+        ("middle", "middle ball.xyz other.xyz --spacing 0.08"),
     ] {
         bench.succeed(&format!("{command} -q -o {name}.zarr"));
         bench.succeed(&format!("{command} -q --live -o {name}-live.zarr"));
@@ -147,7 +147,8 @@ fn live_segmentations_leave_the_bits_of_others() {
         let voxels: Vec<u16> = a.iter().zip(&b).map(|(a, b)| *a.max(b)).collect();
         write_stack(&bench.path("image.tif"), &geometry, &[&voxels]);
         bench.write("marks.csv", &format!("{HEADER}{}{}", balls[0].marks(1), balls[1].marks(2)));
-        let command = format!("segment image.tif --points marks.csv --image none {flags} -q --memory 1GiB");
+        let command =
+            format!("segment image.tif --points marks.csv --image none --max-steps 2 {flags} -q --memory 1GiB");
         bench.succeed(&format!("{command} -o plain.zarr"));
         bench.succeed(&format!("{command} --live -o live.zarr"));
         let [plain, live] = ["plain", "live"].map(|name| contents(&bench.path(&format!("{name}.zarr"))));
@@ -174,10 +175,7 @@ fn a_killed_live_run_is_told_by_the_next() {
     let command = format!("distance points.xyz {grid} --method fsm --labels --live -q -o out.zarr");
     let store = bench.path("out.zarr");
     let mut child = bench.command(&command).stderr(Stdio::null()).spawn().unwrap();
-    let until = Instant::now() + Duration::from_mins(1);
-    while !store.join("zarr.json").is_file() && Instant::now() < until {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_until("a store", || store.join("zarr.json").is_file());
     let said = bench.fail(&command, 2);
     assert!(said.contains("another run writes this output"), "{said}");
     child.kill().unwrap();

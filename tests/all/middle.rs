@@ -81,7 +81,7 @@ fn between_cube_and_sphere_is_the_true_surface() {
 fn between_concentric_spheres_is_a_sphere() {
     let mut sets = DataSets::default();
     for radius in [0.25, 1.0] {
-        sets.add_mesh(&meshes::sphere([0.0; 3], radius, 360, PI));
+        sets.add_mesh(&meshes::sphere([0.0; 3], radius, 240, PI));
     }
     let (volume, area) = (4.0 / 3.0 * PI * 0.625_f64.powi(3), 4.0 * PI * 0.625 * 0.625);
     let errors = [0.1, 0.05].map(|h| {

@@ -18,6 +18,7 @@ use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources
 use strandline::store::{BoxSource, Element, Scratch};
 
 use crate::common::clouds::{grid_around, sponge};
+use crate::common::patience;
 use crate::common::random::Random;
 
 const SCHEDULES: [Schedule; 3] =
@@ -143,6 +144,7 @@ fn case(shape: [i64; 3], spacing: [f64; 3], edge: i64, count: usize, seed: u64) 
 
 /// Odd shapes, thin domains along each axis, more ranks than bricks.
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn any_number_of_ranks_gives_the_bits_of_one() {
     let shapes = [[33, 29, 21], [1, 40, 37], [70, 1, 1], [38, 23, 1], [1, 1, 50], [16, 16, 16], [1, 1, 1]];
     for (seed, shape) in shapes.into_iter().enumerate() {
@@ -297,7 +299,7 @@ proptest! {
 }
 
 fn strandline(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_strandline")).args(arguments).output().expect("the program runs")
+    patience::run(Command::new(env!("CARGO_BIN_EXE_strandline")).args(arguments))
 }
 
 /// All files under a folder, with their contents, sorted; the report left out.

@@ -56,6 +56,9 @@ fn the_sponge_measures_what_the_papers_scheme_gives() {
         let (measures, off) = (found.measures, found.hausdorff.expect("points").mean);
         println!("delta {delta}: volume {} ({volume}), mean {off} ({mean})", measures.volume);
         assert!(measures.is_closed() && measures.components == 1);
+        assert_eq!(found.evolution.stopped_by, "l2");
+        // The papers' SOR takes 5 to 7 iterations a step.
+        assert!(found.evolution.sor_iterations < 12 * u64::from(found.evolution.steps), "{:?}", found.evolution);
         assert!((measures.volume - volume).abs() < 0.01 * volume + 5e-4, "delta {delta}: volume {}", measures.volume);
         assert!((off - mean).abs() < 0.01 * mean + 5e-5, "delta {delta}: mean distance {off}");
     }
@@ -64,6 +67,7 @@ fn the_sponge_measures_what_the_papers_scheme_gives() {
 /// In the band by bricks in f32, and everywhere by the plain program in f64 (Kósa 2015, Tables 1 and 2 compare
 /// the two): the mean distance of the points is the same to 1e-5.
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn the_band_gives_what_the_full_domain_gives() {
     let (cloud, h, delta) = (places(&sponge()), 0.05, 0.025);
     let grid = grid_around(&cloud, h);
@@ -193,23 +197,22 @@ fn mesh_of(grid: &Geometry, cloud: &[[f64; 3]]) -> TriangleMesh {
 /// A tenth of the points can be missing, and of 100 points moved anywhere in the box none has an effect: the surface
 /// moves by less than half a spacing beside every point that stays (Kósa 2015, Fig. 13-14).
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn missing_and_moved_points_do_not_move_the_surface() {
     let cloud = scan([2.0; 3], 12_000, 0.01);
     let grid = grid_for(&cloud, None).expect("a spacing");
     let h = grid.spacing[0];
     let whole = mesh_of(&grid, &cloud);
-    for seed in [11, 14] {
-        let mut random = Random(seed);
-        let fewer: Vec<[f64; 3]> = cloud.iter().copied().filter(|_| random.below(10) > 0).collect();
-        let (moves, stays): (Vec<_>, Vec<_>) = fewer.iter().enumerate().partition(|(n, _)| n % 97 == 0 && *n < 9700);
-        let stays: Vec<[f64; 3]> = stays.into_iter().map(|(_, &point)| point).collect();
-        let noise = moves.iter().map(|_| std::array::from_fn(|_| 4.4 * random.unit() - 2.2));
-        let moved: Vec<[f64; 3]> = stays.iter().copied().chain(noise).collect();
-        for changed in [&fewer, &moved] {
-            let most = largest_move(&whole, &mesh_of(&grid, changed), &stays, 0.5 * h);
-            println!("seed {seed}: moved by {} h", most / h);
-            assert!(most < 0.5 * h, "seed {seed}: moved by {} h", most / h);
-        }
+    let mut random = Random(11);
+    let fewer: Vec<[f64; 3]> = cloud.iter().copied().filter(|_| random.below(10) > 0).collect();
+    let (moves, stays): (Vec<_>, Vec<_>) = fewer.iter().enumerate().partition(|(n, _)| n % 97 == 0 && *n < 9700);
+    let stays: Vec<[f64; 3]> = stays.into_iter().map(|(_, &point)| point).collect();
+    let noise = moves.iter().map(|_| std::array::from_fn(|_| 4.4 * random.unit() - 2.2));
+    let moved: Vec<[f64; 3]> = stays.iter().copied().chain(noise).collect();
+    for changed in [&fewer, &moved] {
+        let most = largest_move(&whole, &mesh_of(&grid, changed), &stays, 0.5 * h);
+        println!("moved by {} h", most / h);
+        assert!(most < 0.5 * h, "moved by {} h", most / h);
     }
 }
 

@@ -6,10 +6,10 @@
 use std::f64::consts::PI;
 use std::fs;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 use crate::common::ball::{Ball, Bench};
 use crate::common::held::{Ended, Held};
+use crate::common::patience::{output_of, wait_until};
 use crate::common::stores::{contents, same};
 
 /// Points on a sphere, in a spiral.
@@ -33,10 +33,10 @@ fn bench() -> Bench {
 
 /// Each command, long enough to be ended on its way.
 const RUNS: [&str; 4] = [
-    "segment image.tif --points marks.csv --tol 1e-30 --max-steps 300",
-    "distance a.xyz b.xyz --spacing 0.02 --padding 1 --labels --brick 16",
-    "middle a.xyz b.xyz --spacing 0.02 --brick 16",
-    "reconstruct a.xyz --tol 1e-30 --max-steps 60",
+    "segment image.tif --points marks.csv --tol 1e-30 --max-steps 60",
+    "distance a.xyz b.xyz --spacing 0.03 --padding 1 --labels --brick 16",
+    "middle a.xyz b.xyz --spacing 0.03 --brick 16",
+    "reconstruct a.xyz --tol 1e-30 --max-steps 20",
 ];
 
 /// Ends a run by SIGTERM when it has taken so many checkpoints; its store is `out/x.zarr`.
@@ -44,12 +44,9 @@ fn terminated(bench: &Bench, run: &str, checkpoints: usize) {
     let mut command = bench.command(&format!("{run} -o out/x.zarr --checkpoint-every 1ms"));
     let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let last = bench.path("out/x.zarr.checkpoint").join(format!("{checkpoints:06}.checkpoint"));
-    let begun = Instant::now();
-    while !last.exists() && begun.elapsed() < Duration::from_mins(1) {
-        std::thread::yield_now();
-    }
+    wait_until("a checkpoint", || last.exists());
     Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
-    let output = child.wait_with_output().unwrap();
+    let output = output_of(child);
     assert_eq!(output.status.code(), Some(143), "{run}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
@@ -80,8 +77,8 @@ fn other_runs_are_refused_with_the_difference() {
     terminated(&bench, run, 1);
     let told = bench.fail(&format!("{run} --method fsm -o out/x.zarr --resume"), 2);
     assert!(told.contains("--method was not given and is fsm"), "{told}");
-    let told = bench.fail(&format!("{} -o out/x.zarr --resume", run.replace("0.02", "0.04")), 2);
-    assert!(told.contains("--spacing was 0.02 and is 0.04"), "{told}");
+    let told = bench.fail(&format!("{} -o out/x.zarr --resume", run.replace("0.03", "0.04")), 2);
+    assert!(told.contains("--spacing was 0.03 and is 0.04"), "{told}");
     bench.write("b.xyz", &sphere(501, [1.3, 0.0, 0.0], 0.5));
     let told = bench.fail(&format!("{run} -o out/x.zarr --resume"), 2);
     assert!(told.contains("SOURCES was a.xyz (") && told.contains("b.xyz ("), "{told}");
@@ -169,8 +166,8 @@ fn there_may_be_nothing_to_go_on_with() {
     same(&before, &contents(&bench.path("out/x.zarr")), "complete already");
     assert_eq!(bench.entries("out"), ["x.zarr"]);
     assert_eq!(report, fs::read(bench.path("out/x.zarr/report.json")).unwrap(), "nothing ran");
-    let told = bench.fail(&format!("{} -o out/x.zarr --resume", run.replace("0.02", "0.04")), 2);
-    assert!(told.contains("is complete, and of another run: --spacing was 0.02 and is 0.04"), "{told}");
+    let told = bench.fail(&format!("{} -o out/x.zarr --resume", run.replace("0.03", "0.04")), 2);
+    assert!(told.contains("is complete, and of another run: --spacing was 0.03 and is 0.04"), "{told}");
     let folder = bench.path("held.checkpoint");
     fs::create_dir(&folder).unwrap();
     let lock = fs::File::create(folder.join("strandline.lock")).unwrap();
