@@ -112,7 +112,9 @@ fn marks(image: &Image, marks: &[[f64; 3]]) -> Value {
             "transform": { "outputDimensions": { "x": unit("x"), "y": unit("y"), "z": unit("z") } },
         },
         "annotations": marks.iter().enumerate().map(point).collect::<Vec<_>>(),
-        "shader": "void main() {\n  setColor(defaultColor());\n  setPointMarkerSize(4.0);\n}\n",
+        // Borders of the colour itself: where marks are crowded, black ones would hide them.
+        "shader": "void main() {\n  setColor(defaultColor());\n  setPointMarkerSize(4.0);\n  \
+                   setPointMarkerBorderColor(0.4 * defaultColor());\n}\n",
     })
 }
 

@@ -269,6 +269,10 @@ fn a_second_run_is_the_same_or_told() {
         let line = printed.lines().last().unwrap();
         assert!(line.starts_with("ok     rerun: ") && line.contains(layout), "{printed}");
     }
+    fs::create_dir(bench.path("other")).unwrap();
+    bench.succeed("verify out/d.zarr --rerun --scratch other");
+    bench.fail("verify out/d.zarr --rerun --scratch nowhere", 1);
+    assert!(bench.entries("other").is_empty());
     assert_eq!(bench.entries("out"), ["d.zarr", "p.png", "s.zarr"], "nothing is left beside");
     bench.write("cloud.xyz", &lines(&sphere([1.1, 2.0, 3.0], 2.0, 600, |_| true)));
     told(&wrong(&bench, "verify out/d.zarr --rerun"), &["rerun", "0/c/0/0/0", "in the second run"]);

@@ -21,6 +21,9 @@ pub(crate) struct VerifyArgs {
     /// [default: half of what the machine or the control group has]
     #[arg(long, value_name = "SIZE", value_parser = parse_size, help_heading = "Resources")]
     pub(crate) memory: Option<u64>,
+    /// Folder for the second run: what it writes and its temporary files [default: beside the store]
+    #[arg(long, value_name = "DIR", requires = "rerun", help_heading = "Resources")]
+    pub(crate) scratch: Option<PathBuf>,
     /// Threads [default: one for each core]
     #[arg(long, value_name = "N", help_heading = "Resources")]
     pub(crate) threads: Option<usize>,

@@ -96,13 +96,12 @@ fn check_same(store: &Path, now: &Identity) -> Result<()> {
     let report = std::fs::read(store.join("report.json")).unwrap_or_default();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap_or_default();
     let known: Option<BTreeMap<String, String>> = serde_json::from_value(report["fingerprint"].clone()).ok();
-    let then = match known.filter(|known| !known.is_empty()) {
-        Some(known) => known.into_iter().collect(),
+    let then = if let Some(known) = known.filter(|known| !known.is_empty()) {
+        known.into_iter().collect()
+    } else {
         // A run without checkpoints.
-        None => {
-            let made: Option<Vec<String>> = serde_json::from_value(report["arguments"].clone()).ok();
-            made.map(|made| identity(&made)).transpose()?.flatten().unwrap_or_default()
-        }
+        let made: Option<Vec<String>> = serde_json::from_value(report["arguments"].clone()).ok();
+        made.map(|made| identity(&made)).transpose()?.flatten().unwrap_or_default()
     };
     let Some(difference) = difference(&then, now) else { return Ok(()) };
     let what = format!(

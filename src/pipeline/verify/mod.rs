@@ -59,7 +59,7 @@ pub fn verify(engine: &Engine, store: &Path, tell: &mut dyn FnMut(Check)) -> Res
             }
         }
         "reconstruct" => {
-            tell(surface::check(engine, store, "meshes/surface.ply", of("").map(DrawnFrom::LevelSet), result)?)
+            tell(surface::check(engine, store, "meshes/surface.ply", of("").map(DrawnFrom::LevelSet), result)?);
         }
         "distance" => tell(distances::check(engine, &images, &report)?),
         _ => {

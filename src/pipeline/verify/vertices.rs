@@ -17,6 +17,9 @@ const EDGE: i64 = 63;
 /// Voxels around these that are looked at.
 const MARGIN: i64 = 1;
 
+/// The voxel below a vertex, and what is wrong with its place.
+type Off = ([i64; 3], String);
+
 /// What a mesh was drawn from.
 #[derive(Clone, Copy)]
 pub(super) enum DrawnFrom<'a> {
@@ -45,7 +48,7 @@ impl<'a> DrawnFrom<'a> {
     fn compare(self, members: &[u32], mesh: &TriangleMesh, eps: f64, part: &Box3, name: &str) -> Check {
         let mut found = Check::default();
         let geometry = &self.image().reader.levels()[0].geometry;
-        let judge: Box<dyn Fn([f64; 3]) -> Option<([i64; 3], String)>> = match self {
+        let judge: Box<dyn Fn([f64; 3]) -> Option<Off>> = match self {
             Self::LevelSet(image) => {
                 let Some(values) = padded::<f32>(image, part, &mut found) else { return found };
                 Box::new(move |position| off(geometry, position, eps, (&values, part)))
@@ -111,12 +114,7 @@ fn padded<T: Element>(field: &Image, part: &Box3, found: &mut Check) -> Option<V
 }
 
 /// What is wrong with the place of a vertex, and the voxel below it.
-fn off(
-    geometry: &Geometry,
-    position: [f64; 3],
-    eps: f64,
-    (values, part): (&[f32], &Box3),
-) -> Option<([i64; 3], String)> {
+fn off(geometry: &Geometry, position: [f64; 3], eps: f64, (values, part): (&[f32], &Box3)) -> Option<Off> {
     let place = geometry.to_voxels(position);
     // What rounding moves it, in voxels; on the way from the world to voxels places lose digits too.
     let slack: [f64; 3] = std::array::from_fn(|a| {
@@ -149,11 +147,7 @@ fn off(
 }
 
 /// What is wrong with the place of a vertex between labels, and the voxel below it.
-fn in_one_label(
-    geometry: &Geometry,
-    position: [f64; 3],
-    (values, part): (&[u32], &Box3),
-) -> Option<([i64; 3], String)> {
+fn in_one_label(geometry: &Geometry, position: [f64; 3], (values, part): (&[u32], &Box3)) -> Option<Off> {
     let lower: [i64; 3] = geometry.to_voxels(position).map(|v| v.floor() as i64);
     let around = Box3::new(lower, lower.map(|v| v + 2)).grow(MARGIN).intersect(part);
     let mut first = 0;

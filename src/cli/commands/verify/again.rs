@@ -18,6 +18,8 @@ use crate::job::resources::folder_of;
 use crate::pipeline::verify::{Check, report_of, same_results};
 use crate::store::HiddenFolder;
 
+/// How a command line begins to name the folder of temporary files.
+const SCRATCH: &str = "--scratch=";
 /// Flags that are given anew or that change what is written beside the results.
 const OURS: [&str; 16] = [
     "output",
@@ -69,8 +71,9 @@ pub(super) fn rerun(
     console: &Console,
 ) -> Result<Check> {
     let Again { store, report, line } = again;
-    let beside = HiddenFolder::create(folder_of(&store))
-        .map_err(|e| Error::from_io("no folder can be made beside the store", &e).at(&store))?;
+    let folder = args.scratch.as_deref().unwrap_or_else(|| folder_of(&store));
+    let beside = HiddenFolder::create(folder)
+        .map_err(|e| Error::from_io("the second run has no folder; name one with --scratch", &e).at(folder))?;
     let again = beside.path().join("again.zarr");
     let layout = Layout::other_than(&report, args);
     match run(line.clone(), &layout, &again, cancel) {
@@ -93,6 +96,8 @@ struct Layout {
     memory: Option<u64>,
     /// None where the size of bricks may change last places.
     brick: Option<i64>,
+    /// Where it puts temporary files; none where the first run did.
+    scratch: Option<PathBuf>,
 }
 
 impl Layout {
@@ -103,7 +108,8 @@ impl Layout {
         let is_free = matches!(report["command"].as_str(), Some("segment" | "demo" | "reconstruct"));
         let brick = if report["settings"]["brick"] == 32 { 64 } else { 32 };
         let threads = args.threads.map_or(threads, |threads| threads as u64);
-        Self { threads, memory: args.memory.or(half), brick: is_free.then_some(brick) }
+        let scratch = args.scratch.clone();
+        Self { threads, memory: args.memory.or(half), brick: is_free.then_some(brick), scratch }
     }
 
     fn told(&self) -> String {
@@ -174,6 +180,12 @@ fn run(mut line: Vec<OsString>, layout: &Layout, output: &Path, cancel: &Cancel)
     let mut flags = vec![output_flag, format!("--threads={}", layout.threads).into(), "--quiet".into()];
     flags.extend(layout.memory.map(|bytes| format!("--memory={bytes}").into()));
     flags.extend(layout.brick.map(|brick| format!("--brick={brick}").into()));
+    if let Some(scratch) = &layout.scratch {
+        line.retain(|word| !word.to_string_lossy().starts_with(SCRATCH));
+        let mut flag = OsString::from(SCRATCH);
+        flag.push(scratch);
+        flags.push(flag);
+    }
     line.splice(1..1, flags);
     let failed = |e: std::io::Error| Error::from_io("the second run cannot be started", &e);
     let said = tempfile::tempfile().map_err(failed)?;
