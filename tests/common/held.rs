@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::Read;
 use std::process::{Child, Command, ExitStatus, Stdio};
 
-use rustix::event::{PollFd, PollFlags, poll};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pipe::{PipeFlags, fcntl_setpipe_size, pipe_with};
 
 /// The most that a pipe takes as one write.
@@ -55,6 +55,15 @@ impl Held {
             assert!(self.take() > 0, "ended before {words:?}: {}", String::from_utf8_lossy(&self.said));
         }
         self.said.clear();
+    }
+
+    /// Lets it say one more thing, if it has begun to within a millisecond.
+    pub(crate) fn hear_on(&mut self) {
+        let mut ears = [PollFd::new(&self.ear, PollFlags::IN)];
+        poll(&mut ears, Some(&Timespec { tv_sec: 0, tv_nsec: 1_000_000 })).unwrap();
+        if !ears[0].revents().is_empty() {
+            assert!(self.take() > 0, "ended: {}", String::from_utf8_lossy(&self.said));
+        }
     }
 
     pub(crate) fn signal(&self, name: &str) {

@@ -239,6 +239,7 @@ mod tests {
         /// Boxes that can be read.
         times: usize,
         compression: Compression,
+        is_live: bool,
     }
 
     impl Run<'_> {
@@ -256,7 +257,8 @@ mod tests {
         }
 
         fn write_with(&self, engine: &Engine, field: &Field) -> Result<()> {
-            let store = StoreWriter::create(&self.folder.join("out.zarr"), true)?.packed(self.compression);
+            let create = if self.is_live { StoreWriter::create_live } else { StoreWriter::create };
+            let store = create(&self.folder.join("out.zarr"), true)?.packed(self.compression);
             let geometry = Geometry::new(SHAPE, [1.0; 3], [0.0; 3]);
             let spec = ImageSpec {
                 name: "field",
@@ -270,6 +272,11 @@ mod tests {
             write_levels::<f32>(&stage, engine, store.image("field", &spec)?, field, Reduce::Mean)?;
             stage.finish();
             store.finish()
+        }
+
+        /// One that reads so often in so many threads.
+        fn new(folder: &'_ Path, threads: usize, times: usize) -> Run<'_> {
+            Run { folder, threads, times, compression: Compression::Fast, is_live: false }
         }
 
         fn begun(&self) -> Checkpoints {
@@ -303,7 +310,7 @@ mod tests {
 
     fn whole(compression: Compression) -> Vec<(String, Vec<u8>)> {
         let folder = tempfile::tempdir().unwrap();
-        let run = Run { folder: folder.path(), threads: 2, times: usize::MAX, compression };
+        let run = Run { compression, ..Run::new(folder.path(), 2, usize::MAX) };
         let (written, read, _) = run.write(run.begun(), Duration::MAX);
         written.unwrap();
         assert_eq!(read, CHUNKS);
@@ -323,7 +330,7 @@ mod tests {
         // Batches are of 32 visits in two threads, and of 16 in one: each run gets one farther than the one before.
         for [(first, before), (second, then)] in [[(2, 40), (1, 20)], [(1, 20), (2, 35)]] {
             let folder = tempfile::tempdir().unwrap();
-            let run = Run { folder: folder.path(), threads: first, times: before, compression: Compression::Fast };
+            let run = Run::new(folder.path(), first, before);
             let (failed, _, said) = run.write(run.begun(), Duration::ZERO);
             assert_eq!((failed.unwrap_err().to_string().as_str(), said.as_str()), ("no more", ""));
             assert!(!folder.path().join("out.zarr").exists());
@@ -356,7 +363,7 @@ mod tests {
         ];
         for (fault, compression, told) in faults {
             let folder = tempfile::tempdir().unwrap();
-            let run = Run { folder: folder.path(), threads: 2, times: 40, compression: Compression::Fast };
+            let run = Run::new(folder.path(), 2, 40);
             assert!(run.write(run.begun(), Duration::ZERO).0.is_err());
             fault(&shards(folder.path())[2]);
             // Ended once more: what was of no use is not named again.
@@ -369,6 +376,14 @@ mod tests {
             assert!(read < CHUNKS && said.contains("goes on where"), "{read}: {said}");
             assert!(files(folder.path()) == whole(compression), "{told}");
         }
+    }
+
+    #[test]
+    fn of_a_live_store_nothing_is_put_by() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = Run { is_live: true, ..Run::new(folder.path(), 2, 40) };
+        assert!(run.write(run.begun(), Duration::ZERO).0.is_err());
+        assert!(folder.path().join("out.zarr").exists() && !folder.path().join("c.checkpoint").exists());
     }
 
     #[test]

@@ -57,7 +57,7 @@ fn second_name(file: &Path, name: &Path) -> io::Result<()> {
         _ => {}
     }
     fs::hard_link(file, name).map_err(|error| {
-        let what = "what is written of the output cannot have a second name (hard link) there, as it can in a folder on the same disk";
+        let what = "files of the output cannot have a second name (hard link) there; name a folder on the disk of the output with --checkpoint";
         io::Error::new(error.kind(), format!("{what}: {error}"))
     })?;
     File::open(name)?.sync_all()
