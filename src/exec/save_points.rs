@@ -19,7 +19,7 @@ use super::cancel::Cancel;
 use super::progress::heard::Progress;
 use crate::error::{Error, Result};
 use crate::grid::digits::bytes;
-use crate::store::checkpoint::{Checkpoints, Identity, SavedField, pack, restore, unpack};
+use crate::store::checkpoint::{Checkpoints, Identity, Kept, Linked, SavedField, Taken, pack, restore, unpack};
 use crate::store::{BrickArray, Element};
 
 /// How often checkpoints are taken where nobody says.
@@ -124,8 +124,19 @@ impl SavePoint<'_> {
     /// What the stage had put by in the run that this one goes on with.
     #[must_use]
     pub fn saved(&self) -> Option<Saved> {
-        let (facts, files) = self.points.checkpoints.entry(&self.key)?;
-        Some(Saved { facts, files })
+        self.points.checkpoints.entry(&self.key).map(Saved)
+    }
+
+    /// What the stage had put by is of no use to it: it begins anew, and says why.
+    pub fn forget(&self, why: &str) {
+        self.points.checkpoints.forget(&self.key);
+        self.note(why);
+    }
+
+    /// Tells the user one line about the stage.
+    pub fn note(&self, line: &str) {
+        let name = self.key.split(" #").next().unwrap_or_default();
+        self.progress.note(&format!("{name}: {line}"));
     }
 
     /// What the stage has is consistent: a checkpoint is taken if it is time, and at its end if it is not too dear.
@@ -138,6 +149,19 @@ impl SavePoint<'_> {
         facts: impl FnOnce() -> F,
         fields: &[&dyn SavedField],
     ) -> Result<()> {
+        self.reached_writing(ended, || (facts(), Vec::new()), fields)
+    }
+
+    /// The same of a stage that writes the output; `known` tells also which files of that are whole.
+    ///
+    /// # Errors
+    /// As [`SavePoint::reached`].
+    pub fn reached_writing<F: Serialize>(
+        &mut self,
+        ended: bool,
+        known: impl FnOnce() -> (F, Vec<Linked>),
+        fields: &[&dyn SavedField],
+    ) -> Result<()> {
         let (is_last, wishes) = (self.cancel.is_asked(), self.points.wishes());
         let is_wished = wishes != self.wishes;
         if !is_last && !is_wished && !self.is_due(ended, fields) {
@@ -146,11 +170,15 @@ impl SavePoint<'_> {
         self.cancel.check()?;
         let started = Instant::now();
         let goes_on = || self.cancel.check().map_err(io::Error::other);
-        let saved = pack(&facts()).and_then(|facts| self.points.checkpoints.save(&self.key, facts, fields, &goes_on));
-        self.points.spend(started.elapsed(), *saved.as_ref().unwrap_or(&0));
+        let (facts, linked) = known();
+        let saved =
+            pack(&facts).and_then(|facts| self.points.checkpoints.save(&self.key, facts, (fields, &linked), &goes_on));
+        let Taken { bytes: written, linking } = *saved.as_ref().unwrap_or(&Taken::default());
+        // What is flushed of the output is no cost of checkpoints: it has to reach the disk.
+        self.points.spend(started.elapsed().saturating_sub(linking), written);
         (self.last, self.wishes) = (Instant::now(), wishes);
         match saved {
-            Ok(written) if is_last || is_wished => {
+            Ok(_) if is_last || is_wished => {
                 self.progress.note(&format!("a checkpoint of {} was taken; --resume goes on from it", bytes(written)));
             }
             Ok(_) => {}
@@ -183,10 +211,7 @@ impl Drop for SavePoint<'_> {
 }
 
 /// What a stage had put by.
-pub struct Saved {
-    facts: Vec<u8>,
-    files: Vec<PathBuf>,
-}
+pub struct Saved(Kept);
 
 impl Saved {
     /// What it knew.
@@ -194,9 +219,15 @@ impl Saved {
     /// # Errors
     /// When that is something else.
     pub fn facts<F: DeserializeOwned>(&self) -> Result<F> {
-        unpack(&self.facts).map_err(|error| {
+        unpack(&self.0.facts).map_err(|error| {
             Error::from_io("the checkpoint cannot be understood; leave --resume out to begin anew", &error)
         })
+    }
+
+    /// The files of the output that were whole, as they are now, in the order in which the stage named them.
+    #[must_use]
+    pub fn linked(&self) -> &[PathBuf] {
+        &self.0.links
     }
 
     /// Puts the bricks of its `n`-th field back.
@@ -204,7 +235,7 @@ impl Saved {
     /// # Errors
     /// When they cannot be read, or are those of another field.
     pub fn restore<T: Element>(&self, n: usize, field: &BrickArray<T>) -> Result<()> {
-        let Some(path) = self.files.get(n) else { return Err(Error::failed("the checkpoint has too few fields")) };
+        let Some(path) = self.0.files.get(n) else { return Err(Error::failed("the checkpoint has too few fields")) };
         let read = || restore(field, &mut BufReader::with_capacity(1 << 20, File::open(path)?));
         read().map_err(|error| {
             Error::from_io("the checkpoint cannot be read; leave --resume out to begin anew", &error).at(path)

@@ -5,9 +5,10 @@
 
 use std::f64::consts::PI;
 use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::common::ball::{Ball, Bench};
+use crate::common::ball::{Ball, Bench, write_stack};
 use crate::common::held::{Ended, Held};
 use crate::common::patience::{output_of, wait_until};
 use crate::common::stores::{contents, same};
@@ -28,6 +29,14 @@ fn bench() -> Bench {
     let bench = Bench::new(&Ball::small());
     bench.write("a.xyz", &sphere(2000, [0.0; 3], 1.0));
     bench.write("b.xyz", &sphere(500, [1.3, 0.0, 0.0], 0.5));
+    bench
+}
+
+/// The same with a stack of three shards, `wide.tif`.
+fn wide_bench() -> Bench {
+    let (bench, mut ball) = (bench(), Ball::small());
+    ball.geometry.shape = [600, 80, 20];
+    write_stack(&bench.path("wide.tif"), &ball.geometry, &[&ball.voxels()]);
     bench
 }
 
@@ -68,6 +77,83 @@ fn terminated_runs_go_on_with_the_same_bits() {
             fs::remove_dir_all(bench.path(store)).unwrap();
         }
     }
+}
+
+/// Each command with a stage that writes a field of several shards.
+const WRITING: [(&str, &str); 5] = [
+    ("segment wide.tif --points marks.csv --tol 1e-30 --max-steps 20", "write image"),
+    ("segment wide.tif --points marks.csv --tol 1e-30 --max-steps 20", "write labels"),
+    ("distance a.xyz b.xyz --origin=-3,-0.4,-0.15 --spacing 0.01 --shape 600,80,30 --closest-point", "read out"),
+    ("middle a.xyz b.xyz --origin=-3,-0.4,-0.15 --spacing 0.01 --shape 600,80,30", "read out"),
+    (
+        "reconstruct a.xyz --origin=-9,-1.4,-1.4 --spacing 0.03 --shape 600,94,94 --tol 1e-30 --max-steps 3",
+        "write levelset",
+    ),
+];
+
+/// Ends a run by SIGTERM when it has taken a checkpoint in a stage; by then it may have said that the stage is done, and no more.
+fn terminated_writing(bench: &Bench, run: &str, stage: &str) {
+    let mut held = Held::start(bench.command(&format!("{run} -o out/x.zarr -v --threads 1 --checkpoint-every 10ms")));
+    let folder = bench.path("out/x.zarr.checkpoint");
+    // Manifests name stages as they are, with their number among those of their name.
+    let key = format!("{stage} #1").into_bytes();
+    let names_it = |path: PathBuf| fs::read(path).is_ok_and(|file| file.windows(key.len()).any(|bytes| bytes == key));
+    let is_manifest = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "checkpoint");
+    let entries = || fs::read_dir(&folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_taken = |_: &Held| entries().filter(is_manifest).any(names_it);
+    held.go_on_until(&format!("a checkpoint of {stage} in {run}"), is_taken);
+    held.signal("TERM");
+    let Ended { status, said, .. } = held.finish();
+    assert_eq!(status.code(), Some(143), "{run}: {said}");
+}
+
+/// The checksums of a store, but those of reports.
+fn checksums(store: &Path) -> Vec<String> {
+    let lines = fs::read_to_string(store.join("checksums.txt")).unwrap();
+    lines.lines().filter(|line| !line.contains(" report.")).map(String::from).collect()
+}
+
+#[test]
+fn runs_that_are_terminated_while_they_write_go_on_there() {
+    let bench = wide_bench();
+    for (n, (run, stage)) in WRITING.into_iter().enumerate() {
+        bench.succeed(&format!("{run} -o out/whole.zarr --checkpoint off"));
+        terminated_writing(&bench, run, stage);
+        assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr.checkpoint"], "{run}");
+        let threads = if n % 2 == 0 { "--threads 3" } else { "--memory 400MiB" };
+        let output = bench.run(&format!("{run} -o out/x.zarr --resume {threads}"));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && said.contains(&format!("{stage}: goes on where ")), "{run}: {said}");
+        assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr"], "{run}");
+        let [whole, resumed] = ["out/whole.zarr", "out/x.zarr"].map(|store| bench.path(store));
+        same(&contents(&whole), &contents(&resumed), run);
+        assert_eq!(checksums(&whole), checksums(&resumed), "{run}");
+        for store in [whole, resumed] {
+            fs::remove_dir_all(store).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_damaged_shard_is_told_and_all_of_its_field_is_written_again() {
+    let bench = bench();
+    let (run, stage) = WRITING[2];
+    bench.succeed(&format!("{run} -o out/whole.zarr --checkpoint off"));
+    terminated_writing(&bench, run, stage);
+    let mut shards = bench.entries("out/x.zarr.checkpoint");
+    shards.retain(|name| name.contains(".shard"));
+    let shard = bench.path("out/x.zarr.checkpoint").join(&shards[0]);
+    let mut bytes = fs::read(&shard).unwrap();
+    bytes[100] ^= 4;
+    fs::write(&shard, bytes).unwrap();
+    let output = bench.run(&format!("{run} -o out/x.zarr --resume"));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let told = format!("{stage}: what was written before is not gone on with, and all of it is written again: ");
+    assert!(output.status.success() && said.contains(&told) && said.contains("is damaged"), "{said}");
+    assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr"]);
+    let [whole, resumed] = ["out/whole.zarr", "out/x.zarr"].map(|store| bench.path(store));
+    same(&contents(&whole), &contents(&resumed), run);
+    assert_eq!(checksums(&whole), checksums(&resumed));
 }
 
 #[test]

@@ -64,7 +64,7 @@ impl Held {
         while !is_so(self) {
             let said = String::from_utf8_lossy(&self.said);
             assert!(begun.elapsed() < PATIENCE, "waited in vain: {what}: {said}");
-            if self.speaks(Duration::from_millis(5)) {
+            if self.speaks(Duration::from_millis(1)) {
                 assert!(self.take() > 0, "ended before this: {what}: {}", String::from_utf8_lossy(&self.said));
             }
         }

@@ -5,6 +5,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use serde_json::Value;
+
 use super::compression::{Compression, Content};
 use super::files::write_whole;
 use super::metadata;
@@ -51,8 +53,7 @@ impl LevelWriter {
         layout: ShardLayout,
     ) -> Result<Self> {
         let codec = ChunkCodec::new(element, packed, layout.version)?;
-        layout.version.write(folder, &metadata::array(plan.geometry.shape, element, layout, &codec))?;
-        Ok(Self {
+        let level = Self {
             folder: folder.to_path_buf(),
             store: store.to_path_buf(),
             plan,
@@ -61,7 +62,29 @@ impl LevelWriter {
             codec,
             root: None,
             pending: Mutex::default(),
-        })
+        };
+        layout.version.write(folder, &level.document())?;
+        Ok(level)
+    }
+
+    /// What says how its voxels lie in its files, as Zarr 3 has it.
+    pub(super) fn document(&self) -> Value {
+        metadata::array(self.plan.geometry.shape, self.element, self.layout, &self.codec)
+    }
+
+    /// Its folder.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The version of its store.
+    pub(super) fn version(&self) -> OmeVersion {
+        self.layout.version
+    }
+
+    /// Where its shards are counted.
+    pub(super) fn root(&self) -> Option<&Arc<Root>> {
+        self.root.as_ref()
     }
 
     /// The same level; its shards are counted there.

@@ -20,6 +20,7 @@ mod shard;
 mod store;
 mod sums;
 mod version;
+mod written;
 
 pub use abandoned::LONGEST_ENDING;
 pub use compression::{Compression, Content};

@@ -95,6 +95,22 @@ impl Root {
         }
     }
 
+    /// The folder of the store.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Whether the store stands under its own name while it is written.
+    pub(super) fn is_live(&self) -> bool {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner).live.is_some()
+    }
+
+    /// The shards below a folder of the store that are written, by their paths in the store.
+    pub(super) fn written_below(&self, folder: &Path) -> Vec<(String, FileSum)> {
+        let Ok(inside) = folder.strip_prefix(&self.folder) else { return Vec::new() };
+        self.sums.beginning(&format!("{}/", inside.to_string_lossy().replace('\\', "/")))
+    }
+
     /// Writes the checksums of all files, which are whole.
     pub(super) fn write_sums(&self) -> Result<()> {
         self.sums.write(&self.folder)

@@ -6,8 +6,11 @@
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
+use std::ops::Bound;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use serde::{Deserialize, Serialize};
 
 use super::files::{io_error, write_whole};
 use crate::error::{Error, Result};
@@ -18,7 +21,7 @@ pub const CHECKSUMS: &str = "checksums.txt";
 const BUFFER: usize = 1 << 18;
 
 /// What is known of a file's bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileSum {
     /// CRC-32C of all bytes.
     pub crc: u32,
@@ -97,6 +100,13 @@ impl ShardSums {
         } else {
             self.all().insert(path.into(), sum);
         }
+    }
+
+    /// Those whose paths begin like this, in their order.
+    pub(super) fn beginning(&self, with: &str) -> Vec<(String, FileSum)> {
+        let all = self.all();
+        let from = all.range::<str, _>((Bound::Included(with), Bound::Unbounded));
+        from.take_while(|(path, _)| path.starts_with(with)).map(|(path, sum)| (path.to_string(), *sum)).collect()
     }
 
     /// Writes the list of all files of a store.

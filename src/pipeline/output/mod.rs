@@ -2,4 +2,5 @@
 
 pub(crate) mod drawn;
 pub mod pyramid;
+pub(crate) mod saved;
 pub mod viewer_mesh;

@@ -3,15 +3,17 @@
 //! one of its shards; that is then written, and goes on to the next level likewise.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering::{AcqRel, Relaxed, Release};
+use std::sync::atomic::Ordering::{AcqRel, Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
-use crate::error::Result;
-use crate::exec::{Engine, Stage, Workers};
-use crate::grid::{Box3, BrickGrid, BrickSet, Geometry};
+use super::saved::{PartlyWritten, in_batches};
+use crate::error::{Error, Result};
+use crate::exec::{Engine, Saved, Stage, Workers};
+use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, Slot};
 use crate::io::ome_zarr::{ImageWriter, LevelWriter, joined_bytes, plan_levels, shard_bytes};
 use crate::kernel::image::filter::downsample;
 use crate::kernel::image::filter::downsample::coarse_box;
+use crate::store::checkpoint::{SavedField, SomeBricks};
 use crate::store::{BoxSource, BrickArray, Element, ElementType};
 
 /// How several voxels become one.
@@ -163,6 +165,50 @@ impl<T: Element> Pyramid<T> {
     }
 }
 
+impl<T: Element> PartlyWritten for Pyramid<T> {
+    fn image(&self) -> &ImageWriter {
+        &self.image
+    }
+
+    fn missing(&self) -> Vec<Vec<u64>> {
+        let of = |coarser: &Coarser<T>| coarser.missing.iter().map(|missing| missing.load(Acquire)).collect();
+        self.coarser.iter().map(of).collect()
+    }
+
+    fn waiting(&self) -> Vec<Box<dyn SavedField + '_>> {
+        let waiting = (1..).zip(&self.coarser).map(|(n, coarser)| coarser.half_come(self.image.levels(), n));
+        waiting.map(|bricks| Box::new(bricks) as Box<dyn SavedField>).collect()
+    }
+
+    fn go_on(&self, missing: &[Vec<u64>], saved: &Saved, first: usize) -> Result<()> {
+        for (n, (coarser, known)) in self.coarser.iter().zip(missing).enumerate() {
+            if known.len() != coarser.missing.len() {
+                return Err(Error::failed("the checkpoint is of another image; leave --resume out to begin anew"));
+            }
+            saved.restore(first + n, &coarser.waiting)?;
+            coarser.missing.iter().zip(known).for_each(|(missing, &known)| missing.store(known, Release));
+        }
+        Ok(())
+    }
+}
+
+impl<T: Element> Coarser<T> {
+    /// The bricks of level `n` that wait: of shards of which something has come and not all.
+    fn half_come(&self, levels: &[LevelWriter], n: usize) -> SomeBricks<'_, T> {
+        let set = self.waiting.set();
+        let shards = self.missing.iter().zip(&self.shards.boxes);
+        let half_come = shards.filter(|(missing, shard)| {
+            let missing = missing.load(Acquire);
+            missing > 0 && missing < voxels_below(levels, n, shard)
+        });
+        let bricks = half_come.flat_map(|(_, shard)| set.grid().bricks_in(shard));
+        let mut slots: Vec<Slot> = bricks.filter_map(|id| set.slot(id)).collect();
+        slots.sort_unstable();
+        slots.dedup();
+        SomeBricks { field: &self.waiting, slots }
+    }
+}
+
 /// How many voxels of the level below a box of level `n` covers.
 fn voxels_below(levels: &[LevelWriter], n: usize, part: &Box3) -> u64 {
     let factors = levels[n].factors();
@@ -217,7 +263,7 @@ pub(crate) fn held(geometry: &Geometry, elements: &[ElementType], threads: u64) 
     elements.iter().map(bytes).fold(joined.unwrap_or(0), u64::saturating_add)
 }
 
-/// Fills all levels of an image from `source`.
+/// Fills all levels of an image from `source`; where the stage is resumable, a run that is ended in it is gone on with.
 ///
 /// # Errors
 /// When a shard cannot be written, scratch runs out or the run is interrupted.
@@ -231,8 +277,7 @@ pub fn write_levels<T: Element>(
     let pyramid = Pyramid::new(engine, image, reduce)?;
     let workers = Workers::new(|| (Vec::new(), Vec::new()));
     let visits = visits([pyramid.finest()], engine.threads());
-    stage.expect(visits.len() as u64);
-    stage.run(&visits, &workers, |(values, buffer), visit| {
+    let write = |(values, buffer): &mut (Vec<T>, Vec<T>), visit: &Vec<Box3>| {
         visit.iter().try_for_each(|chunk| {
             values.resize(chunk.len(), T::default());
             if source.constant_in(chunk) == Some(T::default()) {
@@ -242,8 +287,8 @@ pub fn write_levels<T: Element>(
             }
             pyramid.put(chunk, values, buffer)
         })
-    })?;
-    Ok(())
+    };
+    in_batches(stage, &[&pyramid], &visits, &mut (), |batch, ()| stage.run(&visits[batch], &workers, write).map(drop))
 }
 
 #[cfg(test)]

@@ -107,7 +107,7 @@ impl Reconstruction {
                 window: Some([0.0, high]),
                 extremes: None,
             };
-            let stage = engine.stage(&format!("write {name}"), 0);
+            let stage = engine.resumable_stage(&format!("write {name}"), 0);
             stage.voxels(geometry.domain().volume());
             write_levels::<f32>(&stage, engine, store.image(group, &spec)?, field, Reduce::Mean)?;
             stage.finish();

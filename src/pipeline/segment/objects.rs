@@ -191,7 +191,7 @@ fn write_fields(engine: &Engine, solution: &Solution, label: u32, store: &StoreW
     for (name, field, high) in [("levelset", &solution.u, 1.0), ("distance", &solution.distance, farthest)] {
         let group = if several { format!("{name}/object-{label}") } else { name.into() };
         let spec = ImageSpec { name, geometry, element, content, window: Some([0.0, high]), extremes: None };
-        let stage = engine.stage(&format!("write {name} {label}"), 0);
+        let stage = engine.resumable_stage(&format!("write {name} {label}"), 0);
         write_levels::<f32>(&stage, engine, store.image(&group, &spec)?, field, Reduce::Mean)?;
         stage.finish();
     }

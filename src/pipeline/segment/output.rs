@@ -234,7 +234,7 @@ fn begin_image<T: Sample>(engine: &Engine, geometry: &Geometry, store: &StoreWri
 }
 
 fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>, store: &StoreWriter) -> Result<()> {
-    let stage = engine.stage("write image", 0);
+    let stage = engine.resumable_stage("write image", 0);
     stage.voxels(geometry.domain().volume());
     let written = store.image("", &image_spec(geometry, image))?;
     write_levels::<T>(&stage, engine, written, &image.bricks, Reduce::Mean)?;

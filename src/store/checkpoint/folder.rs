@@ -5,19 +5,20 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
 use super::identity::{Identity, difference};
+use super::links::{LinkOf, Linked, link};
 use super::lock::{LOCK, lock, worker};
+use super::names::{field_name, manifest_name, names, numbers};
 use super::payload::{self, SavedField};
 use super::record;
 use crate::error::{Error, Result};
 use crate::store::HiddenFile;
 use crate::store::hidden::remove_abandoned;
 
-/// The names of manifests and fields end like this.
-const ENDINGS: [&str; 2] = [".checkpoint", ".bricks"];
 /// So many manifests are kept, with what they name.
 const KEPT: usize = 2;
 /// Bytes that are handed to the disk at a time.
@@ -35,6 +36,12 @@ impl Manifest {
     fn files(&self) -> impl Iterator<Item = &FileOf> {
         self.entries.values().flat_map(|entry| &entry.files)
     }
+
+    /// The names of all that it needs.
+    fn needed(&self) -> BTreeSet<String> {
+        let links = self.entries.values().flat_map(|entry| &entry.links).map(|link| &link.name);
+        self.files().map(|file| &file.name).chain(links).cloned().collect()
+    }
 }
 
 /// What a stage has put by.
@@ -43,12 +50,33 @@ struct Entry {
     /// What it knows, packed.
     facts: Vec<u8>,
     files: Vec<FileOf>,
+    links: Vec<LinkOf>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct FileOf {
     name: String,
     bytes: u64,
+}
+
+/// What a checkpoint took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Taken {
+    /// Bytes of its fields.
+    pub bytes: u64,
+    /// Time in which files were linked and flushed, which the end of the run would have waited for.
+    pub linking: Duration,
+}
+
+/// What was found of a stage.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    /// What it knew, packed.
+    pub facts: Vec<u8>,
+    /// The files of its fields.
+    pub files: Vec<PathBuf>,
+    /// The second names of files of the output, in the order in which the stage gave them. Nobody has looked at what they hold.
+    pub links: Vec<PathBuf>,
 }
 
 /// What was found in a folder by a run that is to go on.
@@ -151,7 +179,7 @@ impl Checkpoints {
                 found.torn.push(format!("{}: {error}", folder.join(name).display()));
                 continue;
             }
-            state.kept.insert(number, manifest.files().map(|file| file.name.clone()).collect());
+            state.kept.insert(number, manifest.needed());
             if state.entries.is_empty() {
                 found.stages = manifest.entries.len();
                 state.entries = manifest.entries;
@@ -160,16 +188,23 @@ impl Checkpoints {
         Ok((Self { folder: folder.to_path_buf(), identity, state: Mutex::new(state) }, found))
     }
 
-    /// What a stage has put by, and the files of its fields.
+    /// What a stage has put by.
     #[must_use]
-    pub fn entry(&self, key: &str) -> Option<(Vec<u8>, Vec<PathBuf>)> {
+    pub fn entry(&self, key: &str) -> Option<Kept> {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let entry = state.entries.get(key)?;
-        Some((entry.facts.clone(), entry.files.iter().map(|file| self.folder.join(&file.name)).collect()))
+        let files = entry.files.iter().map(|file| self.folder.join(&file.name)).collect();
+        let links = entry.links.iter().map(|link| self.folder.join(&link.name)).collect();
+        Some(Kept { facts: entry.facts.clone(), files, links })
     }
 
-    /// Puts by what a stage knows, in place of what it did before. `goes_on` is asked between bricks. Returns the bytes of its
-    /// fields.
+    /// What a stage has put by is of no use: the next checkpoint names nothing of it.
+    pub fn forget(&self, key: &str) {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).entries.remove(key);
+    }
+
+    /// Puts by what a stage knows, in place of what it did before. `goes_on` is asked between bricks, and between files that are
+    /// linked.
     ///
     /// # Errors
     /// When it cannot be written, or is not to go on: then the checkpoint before stands.
@@ -177,10 +212,39 @@ impl Checkpoints {
         &self,
         key: &str,
         facts: Vec<u8>,
-        fields: &[&dyn SavedField],
+        (fields, linked): (&[&dyn SavedField], &[Linked]),
         goes_on: &dyn Fn() -> io::Result<()>,
-    ) -> io::Result<u64> {
+    ) -> io::Result<Taken> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        self.open(&mut state)?;
+        let number = state.number + 1;
+        // What a number that was not finished has left must not stand in the way of the next.
+        state.number = number;
+        let started = Instant::now();
+        let before = state.entries.get(key).map(|entry| entry.links.as_slice()).unwrap_or_default();
+        let links = link(&self.folder, number, before, linked, goes_on)?;
+        let linking = started.elapsed();
+        let mut files = Vec::new();
+        for (n, field) in fields.iter().enumerate() {
+            let name = field_name(number, n);
+            self.put(&name, &mut |out| field.save(out, goes_on))?;
+            files.push(FileOf { name, bytes: field.saved_bytes() });
+        }
+        let bytes = files.iter().map(|file| file.bytes).sum();
+        let mut entries = state.entries.clone();
+        entries.insert(key.to_owned(), Entry { facts, files, links });
+        let manifest = Manifest { identity: self.identity.clone(), entries };
+        self.put(&manifest_name(number), &mut |out| record::write(&mut &mut *out, &manifest))?;
+        // A name is safe when its folder is.
+        File::open(&self.folder).and_then(|folder| folder.sync_all())?;
+        state.kept.insert(number, manifest.needed());
+        state.entries = manifest.entries;
+        self.drop_older(&mut state);
+        Ok(Taken { bytes, linking })
+    }
+
+    /// Makes the folder where this run has not taken a checkpoint yet, and locks it.
+    fn open(&self, state: &mut State) -> io::Result<()> {
         if state.lock.is_none() {
             state.is_made = !self.folder.is_dir();
             fs::create_dir_all(&self.folder)?;
@@ -190,26 +254,7 @@ impl Checkpoints {
                 return Err(io::Error::other("another run has put checkpoints into the same folder meanwhile"));
             }
         }
-        let number = state.number + 1;
-        // What a number that was not finished has left must not stand in the way of the next.
-        state.number = number;
-        let mut files = Vec::new();
-        for (n, field) in fields.iter().enumerate() {
-            let name = format!("{number:06}-{n}{}", ENDINGS[1]);
-            self.put(&name, &mut |out| field.save(out, goes_on))?;
-            files.push(FileOf { name, bytes: field.saved_bytes() });
-        }
-        let bytes = files.iter().map(|file| file.bytes).sum();
-        let mut entries = state.entries.clone();
-        entries.insert(key.to_owned(), Entry { facts, files });
-        let manifest = Manifest { identity: self.identity.clone(), entries };
-        self.put(&manifest_name(number), &mut |out| record::write(&mut &mut *out, &manifest))?;
-        // A name is safe when its folder is.
-        File::open(&self.folder).and_then(|folder| folder.sync_all())?;
-        state.kept.insert(number, manifest.files().map(|file| file.name.clone()).collect());
-        state.entries = manifest.entries;
-        self.drop_older(&mut state);
-        Ok(bytes)
+        Ok(())
     }
 
     /// Writes a file beside, flushes it, and gives it its name.
@@ -255,31 +300,6 @@ impl Checkpoints {
     }
 }
 
-fn manifest_name(number: u64) -> String {
-    format!("{number:06}{}", ENDINGS[0])
-}
-
-/// The numbers of the manifests in a folder, ascending.
-fn numbers(folder: &Path) -> Vec<u64> {
-    let names = names(folder);
-    let mut numbers: Vec<u64> = names.iter().filter_map(|name| name.strip_suffix(ENDINGS[0])?.parse().ok()).collect();
-    numbers.sort_unstable();
-    numbers
-}
-
-/// The names in a folder that are those of checkpoints.
-fn names(folder: &Path) -> Vec<String> {
-    let is_number = |digits: &str| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
-    let is_ours = |name: &String| {
-        let of_field = name.strip_suffix(ENDINGS[1]).and_then(|stem| stem.split_once('-'));
-        let is_field = of_field.is_some_and(|(number, n)| number.len() >= 6 && is_number(number) && is_number(n));
-        is_field || name.strip_suffix(ENDINGS[0]).is_some_and(|number| number.len() >= 6 && is_number(number))
-    };
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let files = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_file()));
-    files.filter_map(|entry| entry.file_name().into_string().ok()).filter(is_ours).collect()
-}
-
 /// Checks a file of bricks from its beginning to its end.
 fn whole(folder: &Path, file: &FileOf) -> io::Result<()> {
     let opened = File::open(folder.join(&file.name))?;
@@ -290,109 +310,4 @@ fn whole(folder: &Path, file: &FileOf) -> io::Result<()> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use super::*;
-    use crate::grid::{BrickGrid, BrickSet};
-    use crate::store::{BrickArray, Scratch};
-
-    fn identity(spacing: &str) -> Identity {
-        vec![("version".into(), "1".into()), ("--spacing".into(), spacing.into())]
-    }
-
-    fn field(scratch: &Scratch, value: f32) -> BrickArray<f32> {
-        let set = Arc::new(BrickSet::dense(BrickGrid::new([32, 32, 16], 16)));
-        let field = BrickArray::new(scratch, &set).unwrap();
-        set.owned().for_each(|slot| field.write(slot, |brick| brick.fill(value)));
-        field
-    }
-
-    /// Three checkpoints of one stage and one of another, in a folder that is let go.
-    fn made(folder: &Path, scratch: &Scratch) {
-        let run = Checkpoints::begin(folder, identity("2"), false).unwrap();
-        for step in 1..=3_u8 {
-            run.save("moving", vec![step], &[&field(scratch, f32::from(step))], &|| Ok(())).unwrap();
-        }
-        run.save("other", vec![9], &[], &|| Ok(())).unwrap();
-        let failing = run.save("moving", vec![4], &[&field(scratch, 4.0)], &|| Err(io::Error::other("not now")));
-        assert_eq!(failing.unwrap_err().to_string(), "not now");
-    }
-
-    #[test]
-    fn a_run_goes_on_from_the_last_whole_checkpoint() {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = dir.path().join("c.checkpoint");
-        let scratch = Scratch::new(dir.path(), 1 << 30);
-        made(&folder, &scratch);
-        assert_eq!(numbers(&folder), [3, 4]);
-        let facts = |run: &Checkpoints| run.entry("moving").map(|(facts, files)| (facts, files.len()));
-        let (run, found) = Checkpoints::resume(&folder, identity("2")).unwrap();
-        assert_eq!((found.stages, found.torn.len(), facts(&run)), (2, 0, Some((vec![3], 1))));
-        let busy = [Checkpoints::resume(&folder, identity("2")).err().unwrap(), Checkpoints::would_be_lost(&folder)];
-        let is_told = |error: Error| error.to_string().contains("belongs to a run that goes on (host");
-        assert!(busy.into_iter().all(is_told));
-        drop(run);
-        let file = folder.join("000004.checkpoint");
-        let whole = fs::read(&file).unwrap();
-        fs::write(&file, &whole[..whole.len() - 1]).unwrap();
-        let (run, found) = Checkpoints::resume(&folder, identity("2")).unwrap();
-        assert_eq!((found.stages, found.torn.len(), facts(&run)), (1, 1, Some((vec![3], 1))));
-        run.save("moving", vec![5], &[&field(&scratch, 5.0)], &|| Ok(())).unwrap();
-        assert_eq!(numbers(&folder), [3, 5], "a number is never used again, and the torn one is gone");
-        run.clear();
-        assert!(!folder.exists());
-    }
-
-    #[test]
-    fn a_damaged_field_leaves_nothing_to_go_on_with_where_both_checkpoints_name_it() {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = dir.path().join("c");
-        let scratch = Scratch::new(dir.path(), 1 << 30);
-        made(&folder, &scratch);
-        let file = folder.join("000003-0.bricks");
-        let mut bytes = fs::read(&file).unwrap();
-        bytes[5000] ^= 4;
-        fs::write(&file, bytes).unwrap();
-        let (run, found) = Checkpoints::resume(&folder, identity("2")).unwrap();
-        assert_eq!((found.stages, found.torn.len()), (0, 2));
-        assert!(found.torn[0].contains("the checksum of a brick does not fit"), "{:?}", found.torn);
-        assert!(run.entry("moving").is_none() && run.entry("other").is_none());
-    }
-
-    #[test]
-    fn other_runs_are_refused_and_nothing_is_lost_without_leave() {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = dir.path().join("c");
-        made(&folder, &Scratch::new(dir.path(), 1 << 30));
-        let error = Checkpoints::resume(&folder, identity("3")).err().unwrap().to_string();
-        assert!(error.contains("--spacing was 2 and is 3"), "{error}");
-        let error = Checkpoints::begin(&folder, identity("2"), false).err().unwrap().to_string();
-        assert!(error.contains("give --resume to go on with it"), "{error}");
-        let (_, found) = Checkpoints::resume(&dir.path().join("nowhere"), identity("2")).unwrap();
-        assert_eq!(found, Found::default());
-        let mine = ["mine.txt", "2024-11-05.bricks", "lock"];
-        for name in mine {
-            fs::write(folder.join(name), "x").unwrap();
-        }
-        drop(Checkpoints::begin(&folder, identity("3"), true).unwrap());
-        assert!(numbers(&folder).is_empty() && mine.iter().all(|name| folder.join(name).exists()));
-    }
-
-    #[test]
-    fn runs_that_began_in_one_folder_leave_each_others_checkpoints() {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = dir.path().join("c");
-        let [first, second] = ["2", "3"].map(|spacing| Checkpoints::begin(&folder, identity(spacing), false).unwrap());
-        first.save("moving", vec![1], &[], &|| Ok(())).unwrap();
-        let refused = second.save("moving", vec![2], &[], &|| Ok(())).unwrap_err().to_string();
-        assert!(refused.contains("belongs to a run that goes on"), "{refused}");
-        second.clear();
-        assert_eq!(numbers(&folder), [1]);
-        drop(first);
-        let refused = second.save("moving", vec![2], &[], &|| Ok(())).unwrap_err().to_string();
-        assert!(refused.contains("another run has put checkpoints"), "{refused}");
-        second.clear();
-        assert_eq!(numbers(&folder), [1]);
-    }
-}
+mod tests;

@@ -5,19 +5,24 @@
 //! DIR/strandline.lock         held by the run that works in the folder
 //! DIR/000007.checkpoint       a manifest: who made it, and its entries (record)
 //! DIR/000006-0.bricks         the bricks of a field (payload); manifests that follow each other share those that did not change
+//! DIR/000005-17.shard         a second name (hard link) of a file of the output that is whole
 //! ```
 //!
-//! An entry is one stage: what it knows, packed, and the fields that it works on. Everything is written beside, flushed and
-//! renamed, never in place; the last two manifests are kept with what they name. A torn one is known by its checksums, and the
-//! one before is taken.
+//! An entry is one stage: what it knows, packed, the fields that it works on, and what it has written of the output. Everything is
+//! written beside, flushed and renamed, never in place; the last two manifests are kept with what they name. A torn one is known
+//! by its checksums, and the one before is taken; what files of the output hold is looked at by the stage, which knows their
+//! checksums.
 
 mod folder;
 mod identity;
+mod links;
 mod lock;
+mod names;
 mod payload;
 mod record;
 
-pub use folder::{Checkpoints, Found};
+pub use folder::{Checkpoints, Found, Kept, Taken};
 pub use identity::{Identity, difference};
-pub use payload::{SavedField, restore};
+pub use links::Linked;
+pub use payload::{SavedField, SomeBricks, restore};
 pub use record::{pack, unpack};

@@ -27,23 +27,53 @@ pub trait SavedField: Sync {
 
 impl<T: Element> SavedField for BrickArray<T> {
     fn saved_bytes(&self) -> u64 {
-        let brick = BRICK_HEAD + self.values_of_brick() * size_of::<T>();
-        (HEAD + written(self).count() * brick) as u64
+        bytes_of(self, written(self).count())
     }
 
     fn save(&self, out: &mut dyn Write, goes_on: &dyn Fn() -> io::Result<()>) -> io::Result<()> {
-        out.write_all(&head(self, written(self).count() as u64))?;
-        let mut bytes = Vec::with_capacity(self.values_of_brick() * size_of::<T>());
-        for slot in written(self) {
-            goes_on()?;
-            bytes.clear();
-            self.read(slot, |values| T::append_bytes(values, &mut bytes));
-            out.write_all(&slot.to_le_bytes())?;
-            out.write_all(&checksum(slot, &bytes).to_le_bytes())?;
-            out.write_all(&bytes)?;
-        }
-        Ok(())
+        save(self, &written(self).collect::<Vec<_>>(), out, goes_on)
     }
+}
+
+/// Some bricks of a field, where the others are not needed any more or hold nothing yet.
+pub struct SomeBricks<'a, T: Element> {
+    /// The field.
+    pub field: &'a BrickArray<T>,
+    /// The bricks.
+    pub slots: Vec<Slot>,
+}
+
+impl<T: Element> SavedField for SomeBricks<'_, T> {
+    fn saved_bytes(&self) -> u64 {
+        bytes_of(self.field, self.slots.len())
+    }
+
+    fn save(&self, out: &mut dyn Write, goes_on: &dyn Fn() -> io::Result<()>) -> io::Result<()> {
+        save(self.field, &self.slots, out, goes_on)
+    }
+}
+
+fn bytes_of<T: Element>(field: &BrickArray<T>, bricks: usize) -> u64 {
+    (HEAD + bricks * (BRICK_HEAD + field.values_of_brick() * size_of::<T>())) as u64
+}
+
+fn save<T: Element>(
+    field: &BrickArray<T>,
+    slots: &[Slot],
+    out: &mut dyn Write,
+    goes_on: &dyn Fn() -> io::Result<()>,
+) -> io::Result<()> {
+    out.write_all(&head(field, slots.len() as u64))?;
+    let mut bytes = Vec::with_capacity(field.values_of_brick() * size_of::<T>());
+    for &slot in slots {
+        goes_on()?;
+        bytes.clear();
+        field.read(slot, |values| T::append_bytes(values, &mut bytes));
+        out.write_all(&slot.to_le_bytes())?;
+        out.write_all(&checksum(slot, &bytes).to_le_bytes())?;
+        out.write_all(&bytes)?;
+    }
+    Ok(())
 }
 
 /// The bricks that hold more than the value they began with.
@@ -179,6 +209,25 @@ mod tests {
             before.read(slot, |from| after.read(slot, |to| assert!(before.unwritten(slot).is_some() || from == to)));
         }
         after.read_face(3, crate::grid::FACES[0], |face| assert_eq!(face[1], 15_016.0));
+    }
+
+    #[test]
+    fn some_bricks_come_back_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new(dir.path(), 1 << 30);
+        let (before, after) = (field(&scratch), field(&scratch));
+        before.set().owned().for_each(|slot| before.write(slot, |brick| brick.fill(slot as f32)));
+        let some = SomeBricks { field: &before, slots: vec![1, 3] };
+        let mut file = Vec::new();
+        some.save(&mut file, &|| Ok(())).unwrap();
+        assert_eq!(file.len() as u64, some.saved_bytes());
+        check(&mut file.as_slice(), file.len() as u64).unwrap();
+        restore(&after, &mut file.as_slice()).unwrap();
+        for slot in before.set().owned() {
+            let is_back = [1, 3].contains(&slot);
+            assert_eq!(after.unwritten(slot).is_none(), is_back, "{slot}");
+            after.read(slot, |brick| assert!(!is_back || brick.iter().all(|&value| value == slot as f32)));
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::io::ome_zarr::{Content, ImageSpec, LabelColor, LabelSpec, LevelWriter
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::image::picture::palette::label_color;
 use crate::pipeline::output::pyramid::{Pyramid, Reduce, held};
+use crate::pipeline::output::saved::PartlyWritten;
 use crate::store::{Element, ElementType};
 
 /// What is written beside the distance.
@@ -107,6 +108,17 @@ impl<'a, P: Precision> Images<'a, P> {
         std::iter::once(self.distance.finest()).chain(labels).chain(closest).collect()
     }
 
+    /// All of them, as checkpoints see them.
+    pub(crate) fn all(&self) -> Vec<&dyn PartlyWritten> {
+        let labels = self.labels.iter().chain(&self.borders).map(|image| image.partly_written());
+        let closest: Vec<&dyn PartlyWritten> = match &self.closest {
+            None => Vec::new(),
+            Some(Closest::Single(images)) => images.iter().map(|image| image as &dyn PartlyWritten).collect(),
+            Some(Closest::Double(images)) => images.iter().map(|image| image as &dyn PartlyWritten).collect(),
+        };
+        std::iter::once(&self.distance as &dyn PartlyWritten).chain(labels).chain(closest).collect()
+    }
+
     /// Takes what was read of a chunk.
     pub(crate) fn put(&self, tile: &Tile<'_, P>, buffers: &mut Buffers<P>) -> Result<()> {
         self.distance.put(tile.part, tile.values, &mut buffers.values)?;
@@ -171,6 +183,7 @@ fn put_coordinates<T: Element, P>(
 /// An image of labels, whatever its type.
 trait LabelImage: Send + Sync {
     fn finest(&self) -> &LevelWriter;
+    fn partly_written(&self) -> &dyn PartlyWritten;
     fn put(&self, chunk: &Box3, labels: &[u32], buffers: &mut LabelBuffers) -> Result<()>;
     fn again(&self);
 }
@@ -188,6 +201,10 @@ macro_rules! label_image {
         impl LabelImage for Pyramid<$type> {
             fn finest(&self) -> &LevelWriter {
                 Pyramid::finest(self)
+            }
+
+            fn partly_written(&self) -> &dyn PartlyWritten {
+                self
             }
 
             fn put(&self, chunk: &Box3, labels: &[u32], buffers: &mut LabelBuffers) -> Result<()> {

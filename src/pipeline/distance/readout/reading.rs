@@ -19,6 +19,7 @@ use crate::kernel::distance::repair::bends::MARGIN;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::schedule::passing::Passed;
 use crate::pipeline::output::pyramid::{visits, visits_of};
+use crate::pipeline::output::saved::in_batches;
 
 /// Edges of the boxes that voxels are looked at in where nothing is written: as if something was.
 const LOOK_EDGES: [[i64; 3]; 2] = [[128; 3], [64; 3]];
@@ -81,15 +82,27 @@ impl<'a, P: Precision> Reading<'a, P> {
     /// # Errors
     /// When the output cannot be written, scratch runs out or the run is interrupted.
     pub(crate) fn finish(&self, solved: &Solved<'_, P>) -> Result<DistanceFound> {
-        let stage = self.engine.stage("read out", 0);
+        let stage = self.engine.resumable_stage("read out", 0);
         stage.voxels(self.what.geometry.domain().volume());
         if std::mem::take(&mut self.progress().reopened) {
             self.begin_again();
         }
+        let mut measured = std::mem::take(&mut self.progress().measured);
         let rest: Vec<usize> = (0..self.visits.len()).filter(|&visit| !self.progress().done[visit]).collect();
-        stage.expect(rest.len() as u64);
-        self.read_out(&stage, solved, &rest)?;
-        let measured = std::mem::take(&mut self.progress().measured);
+        match &self.images {
+            // What is kept for who asked for it is not in a checkpoint.
+            Some(images) if rest.len() == self.visits.len() && self.what.kept.is_none() => {
+                in_batches(&stage, &images.all(), &self.visits, &mut measured, |batch, measured| {
+                    let more = self.read_out(&stage, solved, &rest[batch])?;
+                    *measured = std::mem::take(measured).and(more);
+                    Ok(())
+                })?;
+            }
+            _ => {
+                stage.expect(rest.len() as u64);
+                measured = measured.and(self.read_out(&stage, solved, &rest)?);
+            }
+        }
         self.describe(measured.max)?;
         stage.finish();
         Ok(self.what.found(measured, solved))
@@ -109,8 +122,8 @@ impl<'a, P: Precision> Reading<'a, P> {
         self.images.as_ref().map_or(Ok(()), |images| images.describe([low, max]))
     }
 
-    /// Takes some visits.
-    fn read_out(&self, stage: &Stage<'_>, solved: &Solved<'_, P>, visits: &[usize]) -> Result<()> {
+    /// Takes some visits; returns what they measured.
+    fn read_out(&self, stage: &Stage<'_>, solved: &Solved<'_, P>, visits: &[usize]) -> Result<Measured> {
         let measured = stage.run(visits, &self.workers, |(voxels, buffers), &visit| {
             self.visits[visit].iter().try_fold(Measured::default(), |before, part| {
                 let measured = self.what.measure(part, solved, self.inside.as_ref(), voxels)?;
@@ -123,13 +136,7 @@ impl<'a, P: Precision> Reading<'a, P> {
                 Ok(before.and(measured))
             })
         })?;
-        let mut progress = self.progress();
-        let before = std::mem::take(&mut progress.measured);
-        progress.measured = measured.into_iter().fold(before, Measured::and);
-        for &visit in visits {
-            progress.done[visit] = true;
-        }
-        Ok(())
+        Ok(measured.into_iter().fold(Measured::default(), Measured::and))
     }
 
     fn progress(&self) -> MutexGuard<'_, Progress> {
@@ -159,8 +166,14 @@ impl<P: Precision> Early<P> for Reading<'_, P> {
         }
         let quiet = self.engine.beside();
         let stage = quiet.stage("read out early", 0);
-        self.read_out(&stage, solved, &ready)?;
-        let max = self.progress().measured.max;
+        let more = self.read_out(&stage, solved, &ready)?;
+        let mut progress = self.progress();
+        progress.measured = std::mem::take(&mut progress.measured).and(more);
+        for visit in ready {
+            progress.done[visit] = true;
+        }
+        let max = progress.measured.max;
+        drop(progress);
         self.describe(max)
     }
 

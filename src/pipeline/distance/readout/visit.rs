@@ -3,6 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::field::Solved;
 use super::found::DistanceFound;
 use super::images::Wanted;
@@ -43,7 +45,7 @@ pub(super) struct Voxels<P> {
 }
 
 /// What the voxels of a chunk hold, for the report.
-#[derive(Default)]
+#[derive(Default, Serialize, Deserialize)]
 pub(super) struct Measured {
     pub(super) max: f64,
     unlabelled: u64,

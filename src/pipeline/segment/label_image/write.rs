@@ -24,7 +24,7 @@ pub(crate) fn write_labels(
     solved: &[(Solution, ObjectReport)],
     (store, early): (Option<&StoreWriter>, Option<&dyn Early>),
 ) -> Result<BTreeMap<u32, u64>> {
-    let stage = engine.stage("write labels", 0);
+    let stage = engine.resumable_stage("write labels", 0);
     stage.voxels(geometry.domain().volume());
     match (store, early) {
         (_, Some(early)) => early.finish(&stage, engine, volume)?,

@@ -1,0 +1,178 @@
+//! Images that are written visit by visit, in batches between which a run can put by how far it is.
+//!
+//! Visits come shard by shard (`pyramid::visits`): those of a *part*, a tile as large as the largest shard of the finest levels, one
+//! after the other. A batch is some parts, so after it no shard of a finest level is half come, and none of a coarser level either,
+//! as these are written in one go. All that comes then depends on how many parts are done, on what is known of coarser levels (the
+//! voxels below that are missing, and the bricks that wait for them), on what was found on the way, and on the shards on disk. These
+//! are linked, not copied, and checked by their sums when a run goes on with them; parts, unlike visits, are the same for any number
+//! of threads.
+
+use std::ops::Range;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
+use crate::exec::{SavePoint, Saved, Stage, Workers};
+use crate::grid::Box3;
+use crate::io::ome_zarr::{FileSum, ImageWriter};
+use crate::store::checkpoint::{Linked, SavedField};
+
+/// Visits of a batch for each thread, where a part has no more: enough to keep all threads busy nearly to its end.
+const VISITS_PER_THREAD: usize = 16;
+
+/// An image that is written, whatever its type.
+pub(crate) trait PartlyWritten: Sync {
+    fn image(&self) -> &ImageWriter;
+
+    /// Of each coarser level the voxels below that are still to come, of each of its shards.
+    fn missing(&self) -> Vec<Vec<u64>>;
+
+    /// Of each coarser level the bricks that wait for them.
+    fn waiting(&self) -> Vec<Box<dyn SavedField + '_>>;
+
+    /// Takes up what another run knew; its bricks are the fields of a checkpoint from the `first` one on.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    fn go_on(&self, missing: &[Vec<u64>], saved: &Saved, first: usize) -> Result<()>;
+}
+
+/// What a run knows between two batches.
+#[derive(Serialize, Deserialize)]
+struct Known<F> {
+    /// Parts that are done.
+    parts: usize,
+    images: Vec<KnownImage>,
+    found: F,
+}
+
+#[derive(Serialize, Deserialize)]
+struct KnownImage {
+    form: u32,
+    missing: Vec<Vec<u64>>,
+    shards: Vec<(String, FileSum)>,
+}
+
+/// Makes visits, with `take`, which adds to what was `found`; where the run takes checkpoints, in batches, without those that the
+/// run which it goes on with has made. Of a live store, which stays as it is when the run ends, there are no checkpoints.
+///
+/// # Errors
+/// Of `take`, when a checkpoint cannot be read, or the run is interrupted.
+pub(crate) fn in_batches<F: Serialize + DeserializeOwned>(
+    stage: &Stage<'_>,
+    images: &[&dyn PartlyWritten],
+    visits: &[Vec<Box3>],
+    found: &mut F,
+    mut take: impl FnMut(Range<usize>, &mut F) -> Result<()>,
+) -> Result<()> {
+    let is_live = images.iter().any(|image| image.image().is_live());
+    let Some(mut save_point) = (!is_live).then(|| stage.save_point()).flatten() else {
+        stage.expect(visits.len() as u64);
+        return take(0..visits.len(), found);
+    };
+    let begins = parts(visits, images);
+    let (mut done, parts, mut steps) = (0, begins.len() - 1, 0);
+    if let Some(known) = go_on(stage, &save_point, images, parts)? {
+        (done, *found) = (known.parts, known.found);
+        steps = known.images.iter().map(|image| image.shards.len()).sum();
+    }
+    stage.expect((steps + visits.len() - begins[done]) as u64);
+    while done < parts {
+        let end = batch(&begins, done, VISITS_PER_THREAD * stage.threads());
+        take(begins[done]..begins[end], found)?;
+        done = end;
+        let waiting: Vec<_> = images.iter().flat_map(|image| image.waiting()).collect();
+        let fields: Vec<&dyn SavedField> = waiting.iter().map(AsRef::as_ref).collect();
+        save_point.reached_writing(done == parts, || known(images, done, &*found), &fields)?;
+    }
+    Ok(())
+}
+
+/// What a checkpoint holds, and the files that it links.
+fn known<F>(images: &[&dyn PartlyWritten], parts: usize, found: F) -> (Known<F>, Vec<Linked>) {
+    let image = |image: &&dyn PartlyWritten| KnownImage {
+        form: image.image().form(),
+        missing: image.missing(),
+        shards: image.image().written(),
+    };
+    let known: Vec<KnownImage> = images.iter().map(image).collect();
+    let linked = images.iter().zip(&known).flat_map(|(image, known)| {
+        known.shards.iter().map(|(path, _)| Linked { path: image.image().file(path), name: path.clone() })
+    });
+    let linked = linked.collect();
+    (Known { parts, images: known, found }, linked)
+}
+
+/// Goes on where an earlier run was ended: what it knew, with its shards in place. None where there is no such run, or what it has
+/// written is of no use, which is told.
+fn go_on<F: DeserializeOwned>(
+    stage: &Stage<'_>,
+    save_point: &SavePoint<'_>,
+    images: &[&dyn PartlyWritten],
+    parts: usize,
+) -> Result<Option<Known<F>>> {
+    let Some(saved) = save_point.saved() else { return Ok(None) };
+    let known: Known<F> = saved.facts()?;
+    let is_same = known.images.iter().map(|known| known.form).eq(images.iter().map(|image| image.image().form()));
+    let fault = if is_same && known.parts <= parts {
+        take_over(stage, &saved, images, &known.images)?
+    } else {
+        Some("it is packed in another way than this run packs it".to_owned())
+    };
+    if let Some(fault) = fault {
+        save_point
+            .forget(&format!("what was written before is not gone on with, and all of it is written again: {fault}"));
+        return Ok(None);
+    }
+    let mut field = 0;
+    for (image, known) in images.iter().zip(&known.images) {
+        image.go_on(&known.missing, &saved, field)?;
+        field += known.missing.len();
+    }
+    save_point.note(&format!("goes on where {} of {parts} parts are written", known.parts));
+    Ok(Some(known))
+}
+
+/// Checks the shards of a checkpoint and links them into the store; says what is wrong with one, if there is something. Those that
+/// are linked by then do no harm: all are written again.
+fn take_over(
+    stage: &Stage<'_>,
+    saved: &Saved,
+    images: &[&dyn PartlyWritten],
+    known: &[KnownImage],
+) -> Result<Option<String>> {
+    let images = images.iter().map(|image| image.image());
+    let shards = images.zip(known).flat_map(|(image, known)| known.shards.iter().map(move |shard| (image, shard)));
+    let shards: Vec<_> = shards.zip(saved.linked()).collect();
+    if shards.len() != known.iter().map(|known| known.shards.len()).sum::<usize>() {
+        return Ok(Some("shards are missing".into()));
+    }
+    let faults = stage.run(&shards, &Workers::none(), |(), &((image, (path, sum)), file)| {
+        let taken = match FileSum::of(file) {
+            Ok(found) if found == *sum => image.take_over(path, file, *sum).map_err(|error| error.to_string()),
+            Ok(_) => Err("is damaged".into()),
+            Err(error) => Err(error.to_string()),
+        };
+        Ok(taken.err().map(|fault| format!("{}: {fault}", file.display())))
+    })?;
+    Ok(faults.into_iter().flatten().next())
+}
+
+/// The visits with which parts begin, and their number.
+fn parts(visits: &[Vec<Box3>], images: &[&dyn PartlyWritten]) -> Vec<usize> {
+    let shards = images.iter().filter_map(|image| Some(image.image().levels().first()?.shard_shape()));
+    let edge = shards.max_by_key(|edge| edge.iter().product::<i64>()).unwrap_or([1; 3]);
+    let part = |visit: &Vec<Box3>| visit.first().map(|chunk| [0, 1, 2].map(|a| chunk.lo[a] / edge[a]));
+    let is_new = |&n: &usize| n == 0 || part(&visits[n]) != part(&visits[n - 1]);
+    (0..visits.len()).filter(is_new).chain([visits.len()]).collect()
+}
+
+/// Where the batch ends that begins with a part: after as many as have no more than so many visits, and one at least.
+fn batch(begins: &[usize], from: usize, most: usize) -> usize {
+    let fit = begins[from + 1..].iter().take_while(|&&end| end - begins[from] <= most).count();
+    from + fit.max(1)
+}
+
+#[cfg(test)]
+mod tests;
