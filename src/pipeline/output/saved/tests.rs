@@ -1,5 +1,4 @@
 //! Fields whose writing is ended and gone on with.
-#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::Path;
