@@ -271,7 +271,7 @@ fn a_second_run_is_the_same_or_told() {
     }
     fs::create_dir(bench.path("other")).unwrap();
     bench.succeed("verify out/d.zarr --rerun --scratch other");
-    bench.fail("verify out/d.zarr --rerun --scratch nowhere", 1);
+    bench.fail("verify out/d.zarr --rerun --scratch nowhere", 2);
     assert!(bench.entries("other").is_empty());
     assert_eq!(bench.entries("out"), ["d.zarr", "p.png", "s.zarr"], "nothing is left beside");
     bench.write("cloud.xyz", &lines(&sphere([1.1, 2.0, 3.0], 2.0, 600, |_| true)));

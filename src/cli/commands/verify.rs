@@ -25,6 +25,9 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         let what = if store.exists() { "is no Zarr store" } else { "there is no such store" };
         return Err(Error::usage(what).at(store));
     }
+    if let Some(scratch) = args.scratch.as_ref().filter(|scratch| !scratch.is_dir()) {
+        return Err(Error::usage("there is no such folder for the second run; make it first").at(scratch));
+    }
     let again = args.rerun.then(|| Again::of(store)).transpose()?;
     let cancel = signals::cancel_on_signals()?;
     let resources = Resources::new(args.memory, args.threads, None, Some(store))?;
