@@ -1,16 +1,17 @@
 //! Where and how other programs open what is shown.
 
+use std::path::Path;
+
 use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 
-use super::shown::{Image, Shown};
+use super::described::Image;
+use super::shown::Shown;
+use super::state::address;
 
 /// Links and commands for the server at `origin`, such as `http://127.0.0.1:8000`, a line each.
 #[must_use]
 pub fn links(shown: &Shown, origin: &str) -> String {
-    let source = |image: &Image| {
-        let version = if image.is_version_2 { "zarr2" } else { "zarr3" };
-        format!("neuroglancer source  {origin}/data/{}/|{version}:\n", image.path)
-    };
+    let source = |image: &Image| format!("neuroglancer source  {origin}{}\n", address(image));
     let images: String = shown.images.iter().map(source).collect();
     let has_report = |folder: &super::folder::Folder| folder.root().join("report.html").is_file();
     let reports = shown.roots.iter().filter(|(_, folder)| has_report(folder)).map(|(name, _)| {
@@ -20,13 +21,24 @@ pub fn links(shown: &Shown, origin: &str) -> String {
         let name = mesh.name.as_ref().map_or(String::new(), |name| format!(", {name}"));
         format!("neuroglancer mesh    precomputed://{origin}/mesh  (segment {}: {}{name})\n", mesh.segment, mesh.path)
     });
-    let stores = shown.roots.iter().map(|(_, folder)| {
-        let store = folder.root().display();
-        format!("napari               napari --plugin napari-ome-zarr {store}\nFiji (MoBIE, N5)     {store}\n")
+    let stores = shown.roots.iter().map(|(name, folder)| {
+        let store = quoted(folder.root());
+        let of_store = |image: &&Image| image.path.split('/').next() == Some(name);
+        // Those read version 0.4 alone.
+        let is_older = shown.images.iter().find(of_store).is_some_and(|image| image.is_version_2);
+        let fiji = if is_older { format!("Fiji (MoBIE, N5)     {store}\n") } else { String::new() };
+        format!("napari               napari --plugin napari-ome-zarr {store}\n{fiji}")
     });
     // Parts of one file follow each other.
     let files = shown.meshes.chunk_by(|a, b| a.file == b.file).map(|parts| &parts[0].file);
-    let meshes = files.map(|file| format!("ParaView             paraview {}\n", file.display()));
+    let meshes = files.map(|file| format!("ParaView             paraview {}\n", quoted(file)));
     let rest: String = reports.chain(segments).chain(stores).chain(meshes).collect();
     format!("page                 {origin}/\n{images}{rest}")
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:@,".contains(c);
+    if text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }

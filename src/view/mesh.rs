@@ -2,10 +2,17 @@
 
 use std::path::Path;
 
+use super::shown::MeshFile;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::source::Source;
 use crate::io::geometry::read::sources::read_source;
 use crate::io::geometry::write::precomputed;
+
+/// The least and largest coordinates of a mesh; none where it cannot be read, which is told when it is asked for.
+pub(super) fn bounds(mesh: &MeshFile) -> Option<([f64; 3], [f64; 3])> {
+    let Ok(Source::Mesh(mesh)) = read_source(&mesh.file) else { return None };
+    mesh.bounds()
+}
 
 /// The bytes of a mesh file whose unit has so many metres.
 ///

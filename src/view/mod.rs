@@ -1,11 +1,12 @@
 //! A server for looking at results in a browser: a page with neuroglancer, the files of a store or of another program's
 //! OME-Zarr, and its meshes in a form that the page can draw. Reads only, on this machine only.
 //!
-//! `folder` and `ranges` hold what a request may get of a file, `shown` what lies in a folder that can be shown, `ready` what
-//! of it is there in a form that the page can draw, `state` and
+//! `folder` and `ranges` hold what a request may get of a file, `shown` what lies in a folder that can be shown, `described` what
+//! is said of its images, `ready` what of it is there in a form that the page can draw, `state` and
 //! `links` how the page and other programs are told of it, `mesh` the meshes, `page` the bundled page, `server` the connections.
 
 mod answers;
+mod described;
 mod folder;
 mod links;
 mod listing;

@@ -4,14 +4,13 @@
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use serde_json::Value;
-
+use super::described::{Image, Kind, image, multiscale};
 use super::folder::Folder;
 use super::listing::{file_name, files, folders, is_mesh};
 use super::ready::Ready;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::point_file::PointFile;
-use crate::io::geometry::read::points::{LengthUnit, read_points};
+use crate::io::geometry::read::points::read_points;
 use crate::io::ome_zarr::{GROWING, Live, LiveState, TIMES, live};
 use crate::pipeline::output::viewer_mesh::{PRECOMPUTED, SIMPLIFIED};
 use crate::pipeline::segment::MARKS;
@@ -23,8 +22,6 @@ const MOST: usize = 4096;
 const MOST_FIELDS: usize = 6;
 /// Marks that are shown of a store, at most.
 const MOST_MARKS: usize = 20_000;
-/// A file of metadata is shorter than this.
-const MOST_BYTES: u64 = 16 << 20;
 
 /// Everything that is shown.
 #[derive(Clone, Debug)]
@@ -37,49 +34,19 @@ pub struct Shown {
     pub(super) meshes: Vec<MeshFile>,
     /// Surfaces that still move, of stores that live, and a number that is another when one has moved.
     pub(super) growing: (Vec<MeshFile>, u64),
-    /// Marks of segmentations, physical coordinates.
-    pub(super) marks: Vec<[f64; 3]>,
+    /// Marks of segmentations, of each store that has some.
+    pub(super) marks: Vec<Marks>,
 }
 
-/// What an image's values are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
-    /// Grey values.
-    Picture,
-    /// Numbers of objects.
-    Labels,
-    /// A field beside an image, such as a distance.
-    Field,
-}
-
-/// A multiscale image.
+/// The marks of a store.
 #[derive(Clone, Debug)]
-pub(super) struct Image {
-    /// Its path on the server, without a slash at its ends.
-    pub(super) path: String,
-    pub(super) name: String,
-    pub(super) kind: Kind,
-    /// Whether it is a Zarr of version 2, as OME-Zarr 0.4 is.
-    pub(super) is_version_2: bool,
-    /// Whether a voxel has four bytes or more.
-    pub(super) is_wide: bool,
-    pub(super) axes: Vec<Axis>,
-    /// The values from black to white.
-    pub(super) window: Option<[f64; 2]>,
-    /// Colours of labels: number, red, green, blue.
-    pub(super) colors: Vec<(u64, [u8; 3])>,
-}
-
-/// An axis of an image.
-#[derive(Clone, Debug)]
-pub(super) struct Axis {
-    pub(super) name: String,
-    /// Metres of a unit; none where the axis has no length.
-    pub(super) metres: Option<f64>,
-    pub(super) voxels: u64,
-    /// In units of the axis.
-    pub(super) spacing: f64,
-    pub(super) origin: f64,
+pub(super) struct Marks {
+    /// The store's name on the server.
+    pub(super) root: String,
+    /// Physical coordinates.
+    pub(super) places: Vec<[f64; 3]>,
+    /// The time of each, counted from 0, where they have times.
+    pub(super) times: Vec<i64>,
 }
 
 /// A mesh.
@@ -136,6 +103,8 @@ impl Shown {
             // A store without an image of its own, such as one that was just begun.
             if shown.roots.is_empty() {
                 shown.add_store(path)?;
+            } else {
+                files(path).iter().filter(|file| is_mesh(file)).try_for_each(|file| shown.add_mesh(file))?;
             }
         }
         shown.thin_fields();
@@ -145,7 +114,7 @@ impl Shown {
             return Err(Error::input(what).at(path));
         }
         if shown.images.is_empty() && shown.meshes.is_empty() && !shown.is_live() {
-            let what = "holds nothing that can be shown; give an OME-Zarr store, a folder of some, or a PLY mesh";
+            let what = "holds nothing that can be shown; give an OME-Zarr store, a folder of some, or a mesh";
             return Err(Error::input(what).at(path));
         }
         Ok(shown)
@@ -170,21 +139,20 @@ impl Shown {
         let folder = Folder::new(path)?;
         let name = self.free_name(folder.root());
         self.add_group(&name, folder.root(), DEEPEST);
-        self.add_marks(&folder.root().join(MARKS));
+        self.add_marks(&name, &folder.root().join(MARKS));
         self.roots.push((name, folder));
         Ok(())
     }
 
     /// Adds the marks of a store, every n-th where there are more than a page can hold.
-    fn add_marks(&mut self, path: &Path) {
+    fn add_marks(&mut self, root: &str, path: &Path) {
         // A store without marks, or with a table of another program, is shown without.
         let Ok(PointFile { cloud, times, .. }) = read_points(path) else { return };
-        // Those of other times lie where the objects are then.
-        let is_of_first = |n: usize| times.get(n) == times.first();
-        let shown: Vec<[f64; 3]> =
-            cloud.positions.iter().enumerate().filter(|(n, _)| is_of_first(*n)).map(|(_, place)| *place).collect();
-        let every = shown.len().div_ceil(MOST_MARKS).max(1);
-        self.marks.extend(shown.iter().step_by(every));
+        let every = cloud.positions.len().div_ceil(MOST_MARKS).max(1);
+        let places: Vec<[f64; 3]> = cloud.positions.iter().copied().step_by(every).collect();
+        if !places.is_empty() {
+            self.marks.push(Marks { root: root.into(), places, times: times.into_iter().step_by(every).collect() });
+        }
     }
 
     fn add_mesh(&mut self, path: &Path) -> Result<()> {
@@ -282,92 +250,4 @@ impl Shown {
             self.add_group(&format!("{path}/{}", file_name(&below)), &below, depth - 1);
         }
     }
-}
-
-/// Attributes of a multiscale image, and whether its Zarr is of version 2.
-struct Multiscale {
-    attributes: Value,
-    is_version_2: bool,
-}
-
-impl Multiscale {
-    /// Whether its first axis is one of time.
-    fn has_time(&self) -> bool {
-        self.attributes["multiscales"][0]["axes"][0]["type"] == "time"
-    }
-}
-
-fn multiscale(folder: &Path) -> Option<Multiscale> {
-    let of = |attributes: Value, is_version_2: bool| {
-        attributes["multiscales"][0]["datasets"].is_array().then_some(Multiscale { attributes, is_version_2 })
-    };
-    match json(&folder.join("zarr.json")) {
-        Some(mut group) => of(group["attributes"]["ome"].take(), false),
-        None => of(json(&folder.join(".zattrs"))?, true),
-    }
-}
-
-fn json(path: &Path) -> Option<Value> {
-    let is_short = std::fs::metadata(path).ok()?.len() <= MOST_BYTES;
-    serde_json::from_slice(&std::fs::read(path).ok().filter(|_| is_short)?).ok()
-}
-
-fn image(path: &str, folder: &Path, found: &Multiscale) -> Option<Image> {
-    let described = &found.attributes["multiscales"][0];
-    let finest = &described["datasets"][0];
-    let array = folder.join(finest["path"].as_str()?);
-    let array = json(&array.join(if found.is_version_2 { ".zarray" } else { "zarr.json" }))?;
-    let transforms = [&finest["coordinateTransformations"], &described["coordinateTransformations"]];
-    let vector = |kind: &str, n: usize, neutral: f64, joined: fn(f64, f64) -> f64| {
-        let all = transforms.iter().flat_map(|list| list.as_array().into_iter().flatten());
-        all.filter_map(|t| t[kind][n].as_f64()).fold(neutral, joined)
-    };
-    let axis = |(n, axis): (usize, &Value)| {
-        // Version 0.3 named axes by words alone.
-        let name = axis["name"].as_str().or(axis.as_str())?;
-        let unit = axis["unit"].as_str().map(LengthUnit::named);
-        let is_space = axis["type"].as_str().map_or(["x", "y", "z"].contains(&name), |kind| kind == "space");
-        Some(Axis {
-            name: name.to_owned(),
-            metres: unit.flatten().map(|unit| unit.metres).filter(|_| is_space),
-            voxels: array["shape"][n].as_u64()?,
-            spacing: vector("scale", n, 1.0, |a, b| a * b),
-            origin: vector("translation", n, 0.0, |a, b| a + b),
-        })
-    };
-    let axes: Vec<Axis> = described["axes"].as_array()?.iter().enumerate().map(axis).collect::<Option<_>>()?;
-    let window = &found.attributes["omero"]["channels"][0]["window"];
-    let is_labels = found.attributes["image-label"].is_object() || path.contains("/labels/");
-    let is_field = path.contains('/');
-    Some(Image {
-        path: path.to_owned(),
-        name: described["name"].as_str().filter(|name| !name.is_empty()).unwrap_or(path).to_owned(),
-        kind: if is_labels {
-            Kind::Labels
-        } else if is_field {
-            Kind::Field
-        } else {
-            Kind::Picture
-        },
-        is_version_2: found.is_version_2,
-        is_wide: is_wide(&array),
-        axes,
-        window: window["start"].as_f64().zip(window["end"].as_f64()).map(|(low, high)| [low, high]),
-        colors: colors(&found.attributes["image-label"]["colors"]),
-    })
-}
-
-/// Whether an array's voxels have four bytes or more: its type is `float32`, or `<f4` in version 2.
-fn is_wide(array: &Value) -> bool {
-    let name = array["data_type"].as_str().or(array["dtype"].as_str()).unwrap_or_default();
-    let size = name.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(0);
-    if array["dtype"].is_string() { size >= 4 } else { size >= 32 }
-}
-
-fn colors(list: &Value) -> Vec<(u64, [u8; 3])> {
-    let channel = |color: &Value, n: usize| color["rgba"][n].as_u64().and_then(|v| u8::try_from(v).ok());
-    let color = |color: &Value| {
-        Some((color["label-value"].as_u64()?, [channel(color, 0)?, channel(color, 1)?, channel(color, 2)?]))
-    };
-    list.as_array().into_iter().flatten().filter_map(color).collect()
 }

@@ -20,6 +20,7 @@ use crate::common::random::Random;
 use crate::common::stores::{contents, same};
 use crate::common::tiff_bytes::{Value as Tag, bytes_u16, gray_page, tiff_file};
 use crate::common::{python, shipped};
+use crate::view::Served;
 
 const DROPLET: &str = "stacks/napari-stress-ExampleTifSequence.tif";
 const TIMES: u32 = 21;
@@ -353,6 +354,22 @@ fn a_batch_lists_each_time() {
     assert_eq!(times, [(Some(9), Some(1)), (Some(10), Some(1))]);
     let table = fs::read_to_string(bench.path("out/all/summary.csv")).unwrap();
     assert!(table.starts_with("item,object,time,state,") && table.contains("\ndrop,1,10,done,"), "{table}");
+}
+
+/// Marks of each time are seen at that time.
+#[test]
+fn pages_show_marks_at_their_times() {
+    let bench = bench();
+    bench.write("two.csv", &marks([3, 4]));
+    bench.succeed("segment drop.tif --points two.csv --time 3:5 --max-steps 1 -q -o out/x.zarr");
+    let state = Served::new(&bench, "out/x.zarr").json("/state.json");
+    let marks = state["layers"].as_array().unwrap().iter().find(|layer| layer["name"] == "marks").unwrap();
+    assert_eq!(marks["source"]["transform"]["outputDimensions"]["t"], serde_json::json!([1.0, ""]));
+    let points = marks["annotations"].as_array().unwrap();
+    let table = fs::read_to_string(bench.path("two.csv")).unwrap();
+    let told: Vec<f64> = table.lines().skip(1).map(|line| line.split(',').nth(2).unwrap().parse().unwrap()).collect();
+    let shown: Vec<f64> = points.iter().map(|point| point["point"][3].as_f64().unwrap()).collect();
+    assert!(shown == told && told.contains(&3.0) && told.contains(&4.0));
 }
 
 #[test]

@@ -13,13 +13,13 @@ use crate::common::patience::{PATIENCE, wait_until};
 use crate::common::random::Random;
 
 /// A server of its own, ended when it is dropped.
-struct Served {
+pub(crate) struct Served {
     child: Child,
     address: String,
 }
 
 impl Served {
-    fn new(bench: &Bench, what: &str) -> Self {
+    pub(crate) fn new(bench: &Bench, what: &str) -> Self {
         let mut child =
             bench.command(&format!("view {what} --no-open --for 5min")).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
@@ -49,7 +49,7 @@ impl Served {
         self.ask("GET", path, "")
     }
 
-    fn json(&self, path: &str) -> serde_json::Value {
+    pub(crate) fn json(&self, path: &str) -> serde_json::Value {
         serde_json::from_slice(&self.get(path).body).unwrap()
     }
 }
@@ -195,6 +195,54 @@ fn the_page_finds_all_that_its_state_names() {
     assert_eq!(state["position"], serde_json::json!([20.0, 18.0, 10.0]));
     assert_eq!(state["dimensions"]["z"], serde_json::json!([1e-6, "m"]));
     assert_eq!(served.json("/live.json")["running"], false);
+}
+
+/// Names that mean something in addresses, and several stores, of which the first one is seen.
+#[test]
+fn stores_of_any_name_are_shown_apart() {
+    let bench = store();
+    let odd = "50% #2|a?b%20.zarr";
+    fs::rename(bench.path("out/ball.zarr"), bench.path("out").join(odd)).unwrap();
+    bench.succeed("distance marks.csv --like image.tif -q -o out/z.zarr");
+    fs::copy(bench.path("out").join(odd).join("meshes/surface.ply"), bench.path("out/beside.ply")).unwrap();
+    let served = Served::new(&bench, "out");
+    let state = served.json("/state.json");
+    let layers = state["layers"].as_array().unwrap();
+    let seen = |layer: &serde_json::Value| layer["visible"].as_bool().unwrap();
+    let names: Vec<(&str, bool)> = layers.iter().map(|layer| (layer["name"].as_str().unwrap(), seen(layer))).collect();
+    let of_odd = |name: &str| format!("50% #2|a?b%20 {name}");
+    let [image, labels, distance, surfaces, marks] =
+        ["image", "segmentation", "distance", "surfaces", "marks"].map(of_odd);
+    for wanted in [(image.as_str(), true), (&labels, true), (&distance, false), (&surfaces, true), (&marks, true)] {
+        assert!(names.contains(&wanted), "{wanted:?} in {names:?}");
+    }
+    assert!(names.contains(&("z distance", false)) && names.contains(&("beside.ply", false)), "{names:?}");
+    let sources = layers.iter().filter_map(|layer| layer["source"]["url"].as_str()?.strip_suffix("|zarr3:"));
+    let sources: Vec<&str> = sources.collect();
+    assert!(sources.len() > 4);
+    for source in sources {
+        assert!(!source.contains(['#', '?', '|', ' ']), "{source}");
+        assert_eq!(served.get(&format!("{source}zarr.json")).code, 200, "{source}");
+    }
+    let told = bench.succeed("view out --no-open --for 1s --print-links");
+    assert!(told.contains("/50%25%20%232%7Ca%3Fb%2520.zarr/|zarr3:") && told.contains(&format!("{odd}'")), "{told}");
+    assert!(!told.contains("Fiji"), "these read version 0.4 alone: {told}");
+}
+
+/// A page of a mesh alone looks at that, in its own numbers.
+#[test]
+fn a_mesh_alone_fills_the_page() {
+    let bench = store();
+    fs::copy(bench.path("out/ball.zarr/meshes/surface.ply"), bench.path("ball.ply")).unwrap();
+    let state = Served::new(&bench, "ball.ply").json("/state.json");
+    let (ball, unit) = (Ball::small(), state["dimensions"]["x"][0].as_f64().unwrap());
+    for a in 0..3 {
+        let at = unit * state["position"][a].as_f64().unwrap();
+        assert!((at - ball.centre[a]).abs() < 1.0, "{state}");
+    }
+    let wide = unit * state["projectionScale"].as_f64().unwrap();
+    assert!(wide > 2.0 * ball.radius && wide < 6.0 * ball.radius, "{wide}");
+    assert_eq!((&state["dimensions"]["x"][1], &state["showScaleBar"]), (&"".into(), &false.into()));
 }
 
 /// The mesh of the page against the file that it was made of.

@@ -79,7 +79,8 @@ fn farewell(output: &Path) -> String {
         "\npicture  {store}/picture.png\n\
          mesh     {store}/meshes/surface.ply\n\
          report   {store}/report.html\n\n\
-         Look at it:        pip install \"napari[all]\" napari-ome-zarr; napari --plugin napari-ome-zarr {store}\n\
+         Look at it:        strandline view {store}\n\
+         Or in napari:      pip install \"napari[all]\" napari-ome-zarr; napari --plugin napari-ome-zarr {store}\n\
          Your own stack:    strandline segment STACK.tif --points MARKS.csv -o OUT.zarr\n\n\
          {CITATION}\n"
     )

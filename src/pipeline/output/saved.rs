@@ -191,9 +191,9 @@ mod tests {
     use crate::store::checkpoint::Checkpoints;
     use crate::store::{BoxSource, ElementType, Scratch};
 
-    /// Ten shards of 128^3, of 60 chunks of 64^3, and three coarser levels.
-    const SHAPE: [i64; 3] = [600, 140, 70];
-    const CHUNKS: usize = 60;
+    /// A row of 50 shards of two chunks each, and coarser levels.
+    const SHAPE: [i64; 3] = [6400, 20, 10];
+    const CHUNKS: usize = 100;
 
     /// A field that is zero at one end; it can be read so many times.
     struct Field {
@@ -327,20 +327,20 @@ mod tests {
     #[test]
     fn a_run_that_fails_is_gone_on_with_by_any_number_of_threads() {
         let wanted = whole(Compression::Fast);
-        // Batches are of 32 chunks, which are four parts, in two threads, and of 48, which are seven, in three.
-        for [(first, before), (second, rest)] in [[(2, 40), (1, 28)], [(3, 50), (2, 12)]] {
+        // Batches are of 32 shards in two threads, and of 16 in one: each run gets one farther than the one before.
+        for [(first, before), (second, then)] in [[(1, 40), (2, 66)], [(2, 70), (1, 33)]] {
             let folder = tempfile::tempdir().unwrap();
             let run = Run::new(folder.path(), first, before);
             let (failed, _, said) = run.write(run.begun(), Duration::ZERO);
             assert_eq!((failed.unwrap_err().to_string().as_str(), said.as_str()), ("no more", ""));
             assert!(!folder.path().join("out.zarr").exists());
-            let run = Run { threads: second, times: 10, ..run };
+            let run = Run { threads: second, times: then, ..run };
             let (failed, _, said) = run.write(run.resumed(), Duration::ZERO);
             assert!(failed.is_err() && said.contains("write field: goes on where "), "{said}");
             let run = Run { times: usize::MAX, ..run };
-            let (written, read, _) = run.write(run.resumed(), Duration::ZERO);
+            let (written, read, said) = run.write(run.resumed(), Duration::ZERO);
             written.unwrap();
-            assert_eq!(read, rest);
+            assert_eq!((read, said.as_str()), (4, "write field: goes on where 48 of 50 parts are written"));
             assert!(files(folder.path()) == wanted, "{first} and {second} threads");
             assert!(!folder.path().join("c.checkpoint").exists());
         }
@@ -363,7 +363,7 @@ mod tests {
         ];
         for (fault, compression, told) in faults {
             let folder = tempfile::tempdir().unwrap();
-            let run = Run::new(folder.path(), 2, 40);
+            let run = Run::new(folder.path(), 2, 70);
             assert!(run.write(run.begun(), Duration::ZERO).0.is_err());
             fault(&shards(folder.path())[2]);
             // Ended once more: what was of no use is not named again.
@@ -381,7 +381,7 @@ mod tests {
     #[test]
     fn of_a_live_store_nothing_is_put_by() {
         let folder = tempfile::tempdir().unwrap();
-        let run = Run { is_live: true, ..Run::new(folder.path(), 2, 40) };
+        let run = Run { is_live: true, ..Run::new(folder.path(), 2, 70) };
         assert!(run.write(run.begun(), Duration::ZERO).0.is_err());
         assert!(folder.path().join("out.zarr").exists() && !folder.path().join("c.checkpoint").exists());
     }
