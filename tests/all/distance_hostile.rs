@@ -316,6 +316,9 @@ fn signals_end_a_distance_in_order() {
         let rest: Vec<String> = lines.map(Result::unwrap).collect();
         assert_eq!(child.wait().unwrap().code(), Some(code), "{stage}: {rest:?}");
         assert!(rest.last().unwrap().contains("interrupted"), "{rest:?}");
-        assert!(bench.entries("out").is_empty() && bench.entries("scratch").is_empty(), "{stage}: something is left");
+        // What SIGTERM ends may be gone on with.
+        let left = bench.entries("out");
+        let is_kept = signal == "TERM" && left == ["x.zarr.checkpoint"];
+        assert!((left.is_empty() || is_kept) && bench.entries("scratch").is_empty(), "{stage}: {left:?} is left");
     }
 }
