@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::io::geometry::read::points::LengthUnit;
+use crate::io::stack::interval::seconds;
 
 /// A file of metadata is shorter than this.
 const MOST_BYTES: u64 = 16 << 20;
@@ -124,19 +125,6 @@ pub(super) fn image(path: &str, folder: &Path, found: &Multiscale) -> Option<Ima
         axes,
         window: window["start"].as_f64().zip(window["end"].as_f64()).map(|(low, high)| [low, high]),
         colors: colors(&found.attributes["image-label"]["colors"]),
-    })
-}
-
-/// The seconds of a unit of time as OME-Zarr names it.
-fn seconds(unit: &str) -> Option<f64> {
-    Some(match unit {
-        "microsecond" => 1e-6,
-        "millisecond" => 1e-3,
-        "second" => 1.0,
-        "minute" => 60.0,
-        "hour" => 3600.0,
-        "day" => 86400.0,
-        _ => return None,
     })
 }
 

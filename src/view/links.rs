@@ -6,7 +6,7 @@ use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 
 use super::described::Image;
 use super::shown::Shown;
-use super::state::address;
+use super::state::{address, root_of};
 
 /// Links and commands for the server at `origin`, such as `http://127.0.0.1:8000`, a line each.
 #[must_use]
@@ -23,7 +23,7 @@ pub fn links(shown: &Shown, origin: &str) -> String {
     });
     let stores = shown.roots.iter().map(|(name, folder)| {
         let store = quoted(folder.root());
-        let of_store = |image: &&Image| image.path.split('/').next() == Some(name);
+        let of_store = |image: &&Image| root_of(&image.path) == name;
         // Those read version 0.4 alone.
         let is_older = shown.images.iter().find(of_store).is_some_and(|image| image.is_version_2);
         let fiji = if is_older { format!("Fiji (MoBIE, N5)     {store}\n") } else { String::new() };

@@ -47,7 +47,7 @@ pub(super) fn state(shown: &Shown) -> Value {
 }
 
 /// The store that a path on the server leads into.
-fn root_of(path: &str) -> &str {
+pub(super) fn root_of(path: &str) -> &str {
     path.split('/').next().unwrap_or_default()
 }
 

@@ -236,17 +236,15 @@ pub(crate) fn reported(store: &Path) -> Option<(Vec<Object>, f64, u64)> {
     };
     // A time of which nothing could be solved has a reason and no objects.
     let at_time = |told: &Value| {
-        let (time, objects) = (told["time"].as_u64(), all(told["time"].as_u64(), told));
+        let time = told["time"].as_u64();
+        let objects = all(time, told);
         if objects.is_empty() { vec![one(time, told)] } else { objects }
     };
-    let mut objects = match result["times"].as_array() {
+    // Of other commands the result is what was found.
+    let whole = || (!result["objects"].is_array()).then(|| one(None, result));
+    let mut objects: Vec<Object> = match result["times"].as_array() {
         Some(times) => times.iter().flat_map(at_time).collect(),
-        None if result["objects"].is_array() => all(None, result),
-        None => {
-            let mut all = all(None, result);
-            all.push(one(None, result));
-            all
-        }
+        None => all(None, result).into_iter().chain(whole()).collect(),
     };
     objects.sort_by_key(|object| (object.time, object.label));
     Some((objects, report["seconds"].as_f64()?, report["peak_rss_bytes"].as_u64()?))
