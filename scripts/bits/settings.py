@@ -20,7 +20,7 @@ def distances():
     yield f"{clouds} --method fmm --precision f64"
     yield f"{clouds} --method vdt --precision f16 --closest-point"
     yield f"{clouds} --method vdt --ranks 3 --labels"
-    yield "distance {made}/cloud-a.csv {made}/cloud-b.csv --spacing 0.012 -o {out}/out.zarr --labels --closest-point --memory 288MiB"
+    yield "distance {made}/cloud-a.csv {made}/cloud-b.csv --spacing 0.012 -o {out}/out.zarr --labels --closest-point --memory 352MiB"
     for method in METHODS:
         yield f"distance {{made}}/ball.obj --spacing 0.05 --padding 5 -o {{out}}/out.zarr --signed --method {method}"
     yield "distance {made}/ball.obj {made}/cloud-b.csv --spacing 0.05 -o {out}/out.zarr --labels --closest-point"

@@ -252,10 +252,11 @@ const VISITS_PER_THREAD: usize = 8;
 /// shard, in the finest level and in the coarser one that it makes whole, and of each thread a chunk as voxels, reduced, as bytes and compressed.
 pub(crate) fn held(geometry: &Geometry, elements: &[ElementType], threads: u64) -> u64 {
     let chunk = COARSE_EDGE.pow(3) as u64 * 8;
-    let levels = 1 + u64::from(plan_levels(geometry).len() > 1);
+    let levels: Vec<u64> = plan_levels(geometry).iter().take(2).map(|level| level.geometry.domain().volume()).collect();
     let bytes = |element: &ElementType| {
         let (shard, size) = (shard_bytes(geometry.shape, *element), element.size() as u64);
-        let waiting = levels * threads.saturating_mul(shard).min(geometry.domain().volume().saturating_mul(size));
+        let of_level = |voxels: &u64| threads.saturating_mul(shard).min(voxels.saturating_mul(size));
+        let waiting = levels.iter().map(of_level).fold(0, u64::saturating_add);
         waiting.saturating_add(threads * 4 * chunk * size)
     };
     // A thread completes one shard at a time.
