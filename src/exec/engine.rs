@@ -6,7 +6,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::cancel::Cancel;
-use super::comm::{Comm, SelfComm};
+use super::comm::messages::{Comm, SelfComm};
 use super::memory::budget::{Budget, machine_memory, peak_resident};
 use super::memory::footprint::{Account, Footprint, Hold};
 use super::progress::heard::{OfRank, Progress};

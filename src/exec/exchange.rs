@@ -10,7 +10,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::comm::Comm;
+use super::comm::messages::Comm;
 use super::halo::HaloPlan;
 use super::ownership::Ownership;
 use crate::error::{Error, Result};

@@ -15,11 +15,15 @@ mod relax;
 mod save_points;
 mod schedule;
 mod side_by_side;
-mod thread_comm;
 mod workers;
 
 pub use cancel::Cancel;
-pub use comm::{Comm, SelfComm};
+pub use comm::launch::{Launched, launched};
+pub use comm::messages::{Comm, RankTraffic, SelfComm};
+#[cfg(feature = "mpi")]
+pub use comm::mpi::MpiComm;
+pub use comm::threads::ThreadComm;
+pub use comm::traffic::Counted;
 pub use engine::{Engine, Stage, StageReport};
 pub use exchange::{Exchange, Note};
 pub use fixed_point::{FixedPoint, relax_to_fixed_point};
@@ -32,5 +36,4 @@ pub use progress::outlook::{Outlook, Plan};
 pub use relax::{Relax, Until, Waves};
 pub use save_points::{SavePoint, SavePoints, Saved};
 pub use schedule::{checkerboard, corner_colours, one_wave, sweep_waves};
-pub use thread_comm::ThreadComm;
 pub use workers::Workers;

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::comm::Comm;
+use super::comm::messages::Comm;
 use super::halo::HaloPlan;
 use crate::error::Result;
 use crate::grid::{BrickId, BrickSet};

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::comm::Comm;
+use super::comm::messages::Comm;
+use super::comm::threads::ThreadComm;
 use super::engine::{Engine, Stage, StageReport};
-use super::thread_comm::ThreadComm;
 use crate::error::{Error, Result};
 
 impl Stage<'_> {

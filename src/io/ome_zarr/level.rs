@@ -43,8 +43,8 @@ struct Pending {
 }
 
 impl LevelWriter {
-    /// Begins the level in `folder`; errors name `store`, what the whole will be called.
-    pub(super) fn create(
+    /// The level in `folder`; errors name `store`, what the whole will be called.
+    pub(super) fn new(
         folder: &Path,
         store: &Path,
         plan: LevelPlan,
@@ -53,7 +53,7 @@ impl LevelWriter {
         layout: ShardLayout,
     ) -> Result<Self> {
         let codec = ChunkCodec::new(element, packed, layout.version)?;
-        let level = Self {
+        Ok(Self {
             folder: folder.to_path_buf(),
             store: store.to_path_buf(),
             plan,
@@ -62,9 +62,12 @@ impl LevelWriter {
             codec,
             root: None,
             pending: Mutex::default(),
-        };
-        layout.version.write(folder, &level.document())?;
-        Ok(level)
+        })
+    }
+
+    /// Writes what says how it lies in its files.
+    pub(super) fn describe(&self) -> Result<()> {
+        self.layout.version.write(&self.folder, &self.document())
     }
 
     /// What says how its voxels lie in its files, as Zarr 3 has it.
@@ -225,7 +228,19 @@ mod tests {
         let geometry = Geometry { shape, spacing: [1.0; 3], origin: [0.0; 3], unit: None };
         let (plan, layout) =
             (LevelPlan { geometry, factors: [1; 3] }, ShardLayout::new(shape, element, OmeVersion::V05));
-        LevelWriter::create(&folder.join("0"), folder, plan, element, packed, layout).unwrap()
+        described(&folder.join("0"), plan, element, packed, layout)
+    }
+
+    fn described(
+        folder: &Path,
+        plan: LevelPlan,
+        element: ElementType,
+        packed: (Content, Compression),
+        layout: ShardLayout,
+    ) -> LevelWriter {
+        let level = LevelWriter::new(folder, folder, plan, element, packed, layout).unwrap();
+        level.describe().unwrap();
+        level
     }
 
     /// The array as the `zarrs` crate reads it, which takes no part in laying out or writing shards.
@@ -287,7 +302,7 @@ mod tests {
             let plan = LevelPlan { geometry: Geometry::new(shape, [1.0; 3], [0.0; 3]), factors: [1; 3] };
             let layout = ShardLayout { chunk: [64, 64, 30], shard: [128, 128, 30], version: OmeVersion::V04 };
             let path = folder.path().join("0");
-            let level = LevelWriter::create(&path, folder.path(), plan, ElementType::U16, packed, layout).unwrap();
+            let level = described(&path, plan, ElementType::U16, packed, layout);
             let mut values = Vec::new();
             for shard in level.shards() {
                 Box3::from_shape(shape).cut(&whole, &shard, &mut values);

@@ -32,6 +32,6 @@ pub use read::{ImageReader, StoredLevel};
 pub use root::{Live, LiveState, Root, live};
 pub use series::{TIMES, TimeAxis, time_name};
 pub use shard::{joined_bytes, shard_bytes};
-pub use store::{ImageWriter, StoreWriter};
+pub use store::{ImageWriter, SharedStore, StoreWriter};
 pub use sums::{CHECKSUMS, FileSum, first_misfit, listed_sums, store_files};
 pub use version::OmeVersion;

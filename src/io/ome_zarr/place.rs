@@ -1,5 +1,5 @@
 //! Where a store stands while it is made: under a hidden name beside its final one until it is whole, or, a live one, under its
-//! own name from the start.
+//! own name from the start; or where another process of the same run has begun it.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -23,6 +23,16 @@ pub(super) enum Place {
     Hidden(Hidden),
     /// Dropped before it is finished it stays, and says so; without a shard in it it goes.
     Live(Standing),
+    /// Another process has begun it, and finishes it; this one adds shards.
+    Joined(Joined),
+}
+
+/// A folder that another process of the run looks after.
+#[derive(Debug)]
+pub(super) struct Joined {
+    pub(super) folder: PathBuf,
+    /// Whether it stands under its own name already.
+    pub(super) is_live: bool,
 }
 
 /// A folder under a hidden name.
@@ -111,11 +121,22 @@ impl Place {
         Ok(Self::Live(Standing { path, root, finished: false, replaced, _claim: claim, _unfinished: unfinished }))
     }
 
+    /// Whether the store stands, or is to stand, under its own name while it is written.
+    pub(super) fn is_live(&self) -> bool {
+        matches!(self, Self::Live(_) | Self::Joined(Joined { is_live: true, .. }))
+    }
+
+    /// Whether another process looks after it.
+    pub(super) fn is_joined(&self) -> bool {
+        matches!(self, Self::Joined(_))
+    }
+
     /// The folder.
     pub(super) fn folder(&self) -> &Path {
         match self {
             Self::Hidden(hidden) => hidden.partial.path(),
             Self::Live(standing) => &standing.path,
+            Self::Joined(joined) => &joined.folder,
         }
     }
 
@@ -125,12 +146,14 @@ impl Place {
             Self::Live(standing) => standing.root.check_place(),
             // A live store says once more how far it is, so its sums come last.
             Self::Hidden(_) => root.write_sums(),
+            Self::Joined(_) => return root.flush_shards().map_err(|error| error.at(path)),
         }
         .map_err(|error| error.at(path))?;
         sync_tree(self.folder()).map_err(|error| error.at(path))?;
         match self {
             Self::Hidden(hidden) => hidden.finish(path, overwrite),
             Self::Live(standing) => standing.finish(),
+            Self::Joined(_) => Ok(()),
         }
     }
 }

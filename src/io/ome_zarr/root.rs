@@ -111,6 +111,27 @@ impl Root {
         self.sums.beginning(&format!("{}/", inside.to_string_lossy().replace('\\', "/")))
     }
 
+    /// The sums of all shards that are written, by their paths in the store.
+    pub(super) fn all_sums(&self) -> Vec<(String, FileSum)> {
+        self.sums.beginning("")
+    }
+
+    /// Takes over the sums of shards that another process of the run has written.
+    pub(super) fn take_sums(&self, sums: Vec<(String, FileSum)>) {
+        self.written.fetch_add(sums.len() as u64, Relaxed);
+        sums.into_iter().for_each(|(path, sum)| self.sums.put(&path, sum));
+    }
+
+    /// Sees to it that all shards written here are on the disk.
+    pub(super) fn flush_shards(&self) -> Result<()> {
+        let flush = |path: &str| std::fs::File::open(self.folder.join(path)).and_then(|file| file.sync_all());
+        self.sums
+            .beginning("")
+            .iter()
+            .try_for_each(|(path, _)| flush(path))
+            .map_err(|error| super::files::io_error("the shards cannot be written out", &error))
+    }
+
     /// Writes the checksums of all files, which are whole.
     pub(super) fn write_sums(&self) -> Result<()> {
         self.sums.write(&self.folder)

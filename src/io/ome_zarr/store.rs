@@ -3,13 +3,14 @@
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::compression::{Compression, Content};
 use super::files::create_parent;
 use super::level::LevelWriter;
 use super::metadata::{self, ImageSpec, LabelSpec};
-use super::place::{Place, check_target, put_back};
+use super::place::{Joined, Place, check_target, put_back};
 use super::pyramid::{LevelPlan, plan_levels};
 use super::root::Root;
 use super::shard::ShardLayout;
@@ -28,6 +29,15 @@ pub struct StoreWriter {
     place: Place,
     /// Names of the label images; also the lock under which group documents are written.
     labels: Mutex<Vec<String>>,
+}
+
+/// A store that another process has begun.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SharedStore {
+    path: PathBuf,
+    folder: PathBuf,
+    version: OmeVersion,
+    is_live: bool,
 }
 
 /// A multiscale image in the making: its levels, finest first.
@@ -90,6 +100,38 @@ impl StoreWriter {
         let root = Arc::new(Root::new(&path, version));
         let place = Place::live(&path, root.clone())?;
         Self::begin(path, overwrite, root, place)
+    }
+
+    /// Adds shards to a store that another process of the same run has begun with the same settings, in the folder that it
+    /// says, and finishes. Images are begun here as there; all that describes them is written there alone.
+    #[must_use]
+    pub fn shared(joined: &SharedStore) -> Self {
+        let SharedStore { path, folder, version, is_live } = joined.clone();
+        let root = Arc::new(Root::new(&folder, version));
+        let place = Place::Joined(Joined { folder, is_live });
+        Self { path, overwrite: true, compression: Compression::default(), root, place, labels: Mutex::default() }
+    }
+
+    /// What other processes need to join it.
+    #[must_use]
+    pub fn share(&self) -> SharedStore {
+        SharedStore {
+            path: self.path.clone(),
+            folder: self.folder().to_path_buf(),
+            version: self.version(),
+            is_live: self.place.is_live(),
+        }
+    }
+
+    /// The sums of the shards that were written by this process, by their paths in the store.
+    #[must_use]
+    pub fn sums(&self) -> Vec<(String, FileSum)> {
+        self.root.all_sums()
+    }
+
+    /// Takes over the sums of shards that others who joined have written.
+    pub fn take_sums(&self, sums: Vec<(String, FileSum)>) {
+        self.root.take_sums(sums);
     }
 
     fn begin(path: PathBuf, overwrite: bool, root: Arc<Root>, place: Place) -> Result<Self> {
@@ -217,6 +259,9 @@ impl StoreWriter {
         let mut names = self.lock();
         names.push(name.to_owned());
         names.sort();
+        if self.place.is_joined() {
+            return Ok(());
+        }
         self.root.version().write(&self.inside("labels"), &metadata::group(Some(metadata::label_list(&names))))
     }
 
@@ -242,14 +287,16 @@ impl StoreWriter {
         (element, content): (ElementType, Content),
     ) -> Result<ImageWriter> {
         let folder = self.inside(group);
-        assert!(!folder.join("0").exists(), "the store holds an image at {group:?} already");
+        assert!(self.place.is_joined() || !folder.join("0").exists(), "the store holds an image at {group:?} already");
         self.ensure_groups(Path::new(group))?;
         let packed = (content, self.compression);
         let create = |(level, plan): (usize, LevelPlan)| {
-            let halved = if self.live().is_some() { level } else { 0 };
+            let halved = if self.place.is_live() { level } else { 0 };
             let layout = ShardLayout::halved(plan.geometry.shape, element, self.root.version(), halved);
-            let level =
-                LevelWriter::create(&folder.join(level.to_string()), &self.path, plan, element, packed, layout)?;
+            let level = LevelWriter::new(&folder.join(level.to_string()), &self.path, plan, element, packed, layout)?;
+            if !self.place.is_joined() {
+                level.describe()?;
+            }
             Ok(level.counted_by(self.root.clone()))
         };
         let levels = levels.into_iter().enumerate().map(create).collect::<Result<_>>()?;
@@ -260,6 +307,7 @@ impl StoreWriter {
     /// Says what the image in a group is, last: who reads that finds the levels that it names.
     fn write_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
         match group {
+            _ if self.place.is_joined() => Ok(()),
             "" => self.root.describe(attributes),
             _ => self.root.version().write(&self.inside(group), &metadata::group(Some(attributes))),
         }
@@ -267,6 +315,9 @@ impl StoreWriter {
 
     /// Makes sure that `group` and all groups above it say that they are groups.
     fn ensure_groups(&self, group: &Path) -> Result<()> {
+        if self.place.is_joined() {
+            return Ok(());
+        }
         let _alone = self.lock();
         for folder in group.ancestors() {
             let (folder, version) = (self.place.folder().join(folder), self.root.version());

@@ -6,13 +6,14 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::files::write_json;
 use crate::error::{Error, Result};
 
 /// A version of OME-Zarr.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum OmeVersion {
     /// Zarr 2, a file for each chunk: what every reader knows.
     V04,

@@ -3,7 +3,7 @@
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
-use super::comm::Comm;
+use super::messages::Comm;
 use crate::error::{Error, Result};
 
 /// One rank's ends of the channels.

@@ -40,6 +40,11 @@ pub trait Comm: Send + Sync {
         self.collect(with)
     }
 
+    /// What was sent so far, where it is counted.
+    fn traffic(&self) -> RankTraffic {
+        RankTraffic::default()
+    }
+
     /// What all ranks give, in order of their numbers.
     ///
     /// # Errors
@@ -81,6 +86,17 @@ pub trait Comm: Send + Sync {
 
 fn numbers(bytes: &[u8]) -> impl Iterator<Item = f64> {
     bytes.as_chunks().0.iter().map(|word| f64::from_le_bytes(*word))
+}
+
+/// What a rank has sent, and how long it waited.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RankTraffic {
+    /// Bytes sent to others.
+    pub bytes_sent: u64,
+    /// Messages with something in them.
+    pub messages: u64,
+    /// Wall time in which this rank waited for others.
+    pub seconds_waiting: f64,
 }
 
 /// One rank that owns every brick: its neighbours' faces are already in its own arena.
