@@ -44,6 +44,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let typed: Vec<String> = arguments.iter().map(|a| a.to_string_lossy().into_owned()).collect();
     let ended = catch_unwind(AssertUnwindSafe(|| {
         terminal::signals::listen_for_wishes()?;
+        terminal::world::check(&cli.command)?;
         execute(cli, &typed)
     }));
     if !terminal::signals::speak_last() {
@@ -52,21 +53,23 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             std::thread::park();
         }
     }
-    match ended {
+    let code = match ended {
         Ok(Ok(())) => {
             terminal::log::success();
-            ExitCode::SUCCESS
+            0
         }
         Ok(Err(error)) => {
             let error = terminal::signals::seen(error);
             tell(&error);
-            ExitCode::from(error.exit_code())
+            error.exit_code()
         }
         Err(_) => {
             complain("this is a fault of strandline; please report it with the lines above and the command");
-            ExitCode::from(1)
+            1
         }
-    }
+    };
+    terminal::world::leave(code);
+    ExitCode::from(code)
 }
 
 /// Whether events are to be lines of JSON, of a command that is not understood.

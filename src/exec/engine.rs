@@ -78,6 +78,12 @@ impl Engine {
         Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, outlook, saving: None, reports })
     }
 
+    /// The engine of one rank of a run of which all ranks do the same, each on its own part.
+    #[must_use]
+    pub fn as_rank(self, comm: Arc<dyn Comm>) -> Self {
+        Self { comm, ..self }
+    }
+
     /// The engine with so many ranks, 1 or more, for stages that can be shared out: see [`Stage::on_ranks`].
     #[must_use]
     pub fn with_ranks(self, ranks: usize) -> Self {
@@ -87,7 +93,8 @@ impl Engine {
     /// The engine of a run that puts by what it has solved; one rank alone does.
     #[must_use]
     pub fn with_save_points(self, saving: Option<Arc<SavePoints>>) -> Self {
-        Self { saving: saving.filter(|_| self.ranks == 1), ..self }
+        let is_alone = self.ranks == 1 && self.comm.ranks() == 1;
+        Self { saving: saving.filter(|_| is_alone), ..self }
     }
 
     /// What a run that puts by what it has solved was asked for, and what its inputs hold.

@@ -1,6 +1,7 @@
 //! Which tiles are computed, when and where: the halo, the schedules, the one loop over bricks, the memory budget.
 //! The only threads of the crate.
 
+mod borrow;
 mod cancel;
 mod comm;
 mod engine;
@@ -17,6 +18,7 @@ mod schedule;
 mod side_by_side;
 mod workers;
 
+pub use borrow::{borrow_bricks, read_with_borrowed};
 pub use cancel::Cancel;
 pub use comm::launch::{Launched, launched};
 pub use comm::messages::{Comm, RankTraffic, SelfComm};
@@ -33,6 +35,7 @@ pub use memory::footprint::{Footprint, Hold, Lent};
 pub use ownership::Ownership;
 pub use progress::heard::{Progress, Silent};
 pub use progress::outlook::{Outlook, Plan};
+pub use ranks::as_threads;
 pub use relax::{Relax, Until, Waves};
 pub use save_points::{SavePoint, SavePoints, Saved};
 pub use schedule::{checkerboard, corner_colours, one_wave, sweep_waves};

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::comm::messages::Comm;
 use super::comm::threads::ThreadComm;
+use super::comm::traffic::Counted;
 use super::engine::{Engine, Stage, StageReport};
 use crate::error::{Error, Result};
 
@@ -22,39 +23,44 @@ impl Stage<'_> {
         if engine.ranks() == 1 {
             return Ok(vec![work(self, engine)?]);
         }
-        let (work, first_error) = (&work, &Mutex::new(None));
-        let fail = |error| _ = first_error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-        let done: Vec<Option<(R, StageReport)>> = std::thread::scope(|scope| {
-            let mut started = Vec::new();
-            for comm in ThreadComm::connected(engine.ranks()) {
-                let rank = std::thread::Builder::new().name(format!("strandline-rank-{}", comm.rank()));
-                let run = move || {
-                    let comm: Arc<dyn Comm> = Arc::new(comm);
-                    let done = run_rank(engine, &comm, work).map_err(fail).ok();
-                    // Only now do others learn that this rank is gone, so the first error is the one that ended the
-                    // run.
-                    drop(comm);
-                    done
-                };
-                match rank.spawn_scoped(scope, run) {
-                    Ok(rank) => started.push(rank),
-                    Err(e) => {
-                        fail(Error::from_io("cannot start a thread for each rank; give fewer --ranks", &e));
-                        break;
-                    }
-                }
-            }
-            started
-                .into_iter()
-                .map(|rank| rank.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-                .collect()
-        });
-        if let Some(error) = first_error.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            return Err(error);
-        }
-        let (results, reports): (Vec<R>, Vec<StageReport>) = done.into_iter().flatten().unzip();
+        let done = as_threads(engine.ranks(), |comm| run_rank(engine, &comm, &work))?;
+        let (results, reports): (Vec<R>, Vec<StageReport>) = done.into_iter().unzip();
         self.add_ranks(&reports);
         Ok(results)
+    }
+}
+
+/// Runs `work` on so many ranks that are threads of this process, each connected with all others. Results are in order of ranks.
+///
+/// # Errors
+/// Of the rank that failed first; the others end when they wait for it.
+pub fn as_threads<R: Send>(ranks: usize, work: impl Fn(Arc<dyn Comm>) -> Result<R> + Sync) -> Result<Vec<R>> {
+    let (work, first_error) = (&work, &Mutex::new(None));
+    let fail = |error| _ = first_error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    let done: Vec<Option<R>> = std::thread::scope(|scope| {
+        let mut started = Vec::new();
+        for comm in ThreadComm::connected(ranks) {
+            let rank = std::thread::Builder::new().name(format!("strandline-rank-{}", comm.rank()));
+            let run = move || {
+                let comm: Arc<dyn Comm> = Arc::new(Counted::new(comm));
+                let done = work(comm.clone()).map_err(fail).ok();
+                // Only now do others learn that this rank is gone, so the first error is the one that ended the run.
+                drop(comm);
+                done
+            };
+            match rank.spawn_scoped(scope, run) {
+                Ok(rank) => started.push(rank),
+                Err(e) => {
+                    fail(Error::from_io("cannot start a thread for each rank; give fewer --ranks", &e));
+                    break;
+                }
+            }
+        }
+        started.into_iter().map(|rank| rank.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    });
+    match first_error.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        Some(error) => Err(error),
+        None => Ok(done.into_iter().flatten().collect()),
     }
 }
 

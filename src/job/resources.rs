@@ -9,6 +9,15 @@ use crate::exec::{Budget, Cancel, Engine, Progress, machine_memory};
 use crate::grid::digits::bytes;
 use crate::store::Scratch;
 
+/// How many ranks share something.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sharing {
+    /// The machine, each as a process.
+    pub(crate) machine: usize,
+    /// This process, each as a thread.
+    pub(crate) process: usize,
+}
+
 const MOST_THREADS: usize = 1024;
 
 /// What a run may use.
@@ -53,6 +62,14 @@ impl Resources {
             return Err(Error::usage(what).at(&scratch));
         }
         Ok(Self { memory, threads, scratch })
+    }
+
+    /// What one of several ranks may use: of what was given for a process its share of that; of what was not, and so is the
+    /// machine's, its share of the machine.
+    pub(crate) fn share(self, sharing: Sharing, gave: [bool; 2]) -> Self {
+        let [gave_memory, gave_threads] = gave;
+        let of = |gave: bool| sharing.process * if gave { 1 } else { sharing.machine };
+        Self { memory: self.memory / of(gave_memory) as u64, threads: (self.threads / of(gave_threads)).max(1), ..self }
     }
 
     /// An engine that keeps to them. Jobs take what they hold off its window.

@@ -54,6 +54,7 @@ fn cube_error<P: Stored>(lab: &Lab, count: i64, method: Method, schedule: Schedu
             set: &set,
             options: everywhere(false),
             early: None,
+            borrows: &[],
         },
         schedule,
     )

@@ -43,7 +43,15 @@ fn fsm<P: Stored>(
     let stage = lab.engine.stage("distance", 0);
     let solve = Method::FSM.solver::<P>().solve;
     let solved = solve(
-        &Solving { stage: &stage, engine: &lab.engine, sources: &sources, set: &set, options, early: None },
+        &Solving {
+            stage: &stage,
+            engine: &lab.engine,
+            sources: &sources,
+            set: &set,
+            options,
+            early: None,
+            borrows: &[],
+        },
         schedule,
     )
     .expect("room for a distance");

@@ -12,7 +12,7 @@ use strandline::error::Result;
 use strandline::grid::{Box3, BrickGrid, BrickSet, Geometry, PointBins};
 use strandline::io::ome_zarr::{Content, ImageSpec, LiveState, StoreWriter};
 use strandline::pipeline::distance::{
-    Early, Method, Options, Passed, SOLVERS, Schedule, Solved, Sources, solve_watched,
+    Early, Method, Options, Passed, Reads, SOLVERS, Schedule, Solved, Sources, solve_watched,
 };
 use strandline::store::ElementType;
 
@@ -66,7 +66,15 @@ fn what_a_front_has_passed_is_final() {
             let order = (Method::named(row.name).unwrap(), Schedule::Front);
             let options = Options::up_to(f64::INFINITY);
             let set = BrickSet::dense(grid);
-            let solved = solve_watched::<f32>(&stage, &sources, &set, order, options, Some(&watched)).unwrap();
+            let solved = solve_watched::<f32>(
+                &stage,
+                &sources,
+                &set,
+                order,
+                options,
+                Reads { early: Some(&watched), boxes: &[] },
+            )
+            .unwrap();
             let seen = watched.seen.into_inner().unwrap();
             assert!(seen.len() > 20, "{}: only {} boxes were read early", row.name, seen.len());
             for (part, values) in seen {

@@ -274,7 +274,15 @@ fn one_rank_that_fails_ends_those_that_solve() {
         let ownership = strandline::exec::Ownership::balanced(&BrickSet::dense(grid), 3);
         let own = Arc::new(ownership.part(&BrickSet::dense(grid), engine.comm().rank(), &plan));
         (solver.solve)(
-            &Solving { stage, engine, sources: &sources, set: &own, options: case.options(), early: None },
+            &Solving {
+                stage,
+                engine,
+                sources: &sources,
+                set: &own,
+                options: case.options(),
+                early: None,
+                borrows: &[],
+            },
             Schedule::Front,
         )
         .map(|solved| solved.fixed_voxels)

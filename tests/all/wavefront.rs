@@ -140,7 +140,15 @@ fn ours<P: Precision>(
     let options = Options { farthest: f64::INFINITY, neighbours, sources: true, labels: false };
     let solve = method.solver::<P>().solve;
     let solved = solve(
-        &Solving { stage: &stage, engine: &lab.engine, sources: &sources, set: &set, options, early: None },
+        &Solving {
+            stage: &stage,
+            engine: &lab.engine,
+            sources: &sources,
+            set: &set,
+            options,
+            early: None,
+            borrows: &[],
+        },
         schedule,
     )
     .expect("room for a distance");
@@ -339,7 +347,15 @@ fn a_box_of_triangles_has_its_distance() {
         let options = Options { farthest: f64::INFINITY, neighbours, sources: true, labels: false };
         let solve = Method::DP.solver::<f32>().solve;
         let solved = solve(
-            &Solving { stage: &stage, engine: &lab.engine, sources: &sources, set: &set, options, early: None },
+            &Solving {
+                stage: &stage,
+                engine: &lab.engine,
+                sources: &sources,
+                set: &set,
+                options,
+                early: None,
+                borrows: &[],
+            },
             schedule,
         )
         .expect("room for a distance");

@@ -14,25 +14,27 @@ use crate::cli::inputs::sources::{Read, read_sets};
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
-use crate::cli::outputs::store::begin_store;
+use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
 use crate::cli::outputs::survival::{finished_before, save_points};
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
+use crate::cli::report::ranks::{RankReport, gather_ranks};
 use crate::cli::report::run_report::{Ran, Report};
 use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::log;
 use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, place, triple};
+use crate::cli::terminal::world;
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Engine, Plan, Progress};
+use crate::exec::{Budget, Cancel, Comm, Engine, Plan, Progress, SelfComm, as_threads};
 use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::write::formats::Values;
 use crate::io::ome_zarr::StoreWriter;
 use crate::job::disk::Disk;
-use crate::job::resources::Resources;
+use crate::job::resources::{Resources, Sharing};
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::{
     DistanceSettings, Init, Needs, Schedule, Writes, check_iterations, distance, outside_note,
@@ -53,6 +55,8 @@ struct Job {
     console: Arc<Console>,
     cancel: Cancel,
     started: Instant,
+    /// The ranks that run this job, each on its own part.
+    comm: Arc<dyn Comm>,
 }
 
 /// Runs the command.
@@ -69,11 +73,22 @@ fn begin(mut args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[Strin
     let mesh = middle.as_ref().and_then(|choice| choice.mesh.clone());
     let output = &mut args.job.output;
     let files = [output.report.clone(), mesh];
-    if finished_before(output, &files, typed)? { Ok(()) } else { Job::new(args, middle, typed)?.run_precise() }
+    if finished_before(output, &files, typed)? {
+        return Ok(());
+    }
+    settings::check_ranks(args.job.ranks)?;
+    if middle.is_some() {
+        return Job::new(args, middle, typed, Arc::new(SelfComm))?.run_precise();
+    }
+    let comm = world::ranks()?;
+    if args.job.ranks == 1 || comm.ranks() > 1 {
+        return Job::new(args, None, typed, comm)?.run_precise();
+    }
+    as_threads(args.job.ranks, |comm| Job::new(args.clone(), None, typed, comm)?.run_precise()).map(drop)
 }
 
 impl Job {
-    fn new(args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[String]) -> Result<Self> {
+    fn new(args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[String], comm: Arc<dyn Comm>) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
         let mut settings = settings(&args)?;
@@ -88,7 +103,13 @@ impl Job {
         outputs.check()?;
         mesh.as_deref().map(mesh_format).transpose()?;
         let resources = settings::resources(&args.job.resources, args.job.output.store())?;
-        let console = Arc::new(Console::new(Voice::of_run(&args.job.output)));
+        let resources = resources.share(
+            sharing(&args, middle.is_some()),
+            [args.job.resources.memory.is_some(), args.job.resources.threads.is_some()],
+        );
+        // The first rank speaks for all.
+        let voice = if comm.rank() == 0 { Voice::of_run(&args.job.output) } else { Voice::Quiet };
+        let console = Arc::new(Console::new(voice));
         let mut notes = Vec::new();
         let given = grid::given(&args.job.grid, &mut notes)?;
         for note in &notes {
@@ -109,7 +130,7 @@ impl Job {
             settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
         }
         let typed = typed.to_vec();
-        Ok(Self { args, middle, typed, settings, resources, sets, geometry, console, cancel, started })
+        Ok(Self { args, middle, typed, settings, resources, sets, geometry, console, cancel, started, comm })
     }
 
     fn run_precise(&self) -> Result<()> {
@@ -122,10 +143,10 @@ impl Job {
 
     fn run<P: Precision>(&self) -> Result<()> {
         self.settings.check_on::<P>(&self.geometry, &self.sets)?;
-        let (threads, ranks) = (self.resources.threads, self.args.job.ranks);
-        let needs = self.needs::<P>(threads, ranks);
+        let threads = self.resources.threads;
+        let needs = self.needs::<P>(threads);
         let plan = self.plan(&needs);
-        if self.args.job.output.dry_run {
+        if self.args.job.output.dry_run && self.comm.rank() == 0 {
             print(&format!("{plan}\n"))?;
             let written = if self.args.job.output.store().is_some() { self.written() } else { 0 };
             log::plan(Budget::least(needs.held), needs.scratch, written, needs.seconds);
@@ -135,15 +156,20 @@ impl Job {
             return Ok(());
         }
         self.console.say(&plan);
-        let saving = save_points(&self.args.job.output, &self.typed, self.console.as_ref())?;
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
-        let engine = engine.with_ranks(self.args.job.ranks).with_save_points(saving);
+        let engine = engine.with_ranks(self.ranks_inside()).as_rank(self.comm.clone());
+        let saving = if self.comm.ranks() == 1 {
+            save_points(&self.args.job.output, &self.typed, self.console.as_ref())?
+        } else {
+            None
+        };
+        let engine = engine.with_save_points(saving);
         engine.outlook().expect(with_page(self.stages::<P>(threads), self.args.job.output.store().is_some()));
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
         engine.settle_save_points(&result);
         let found = result?;
-        if !self.args.job.output.quiet {
+        if !self.args.job.output.quiet && self.comm.rank() == 0 {
             let output = &self.args.job.output;
             let [labels_in, pairs_in] = ["", "meshes/pairs.csv"]
                 .map(|table| table::whole_in(output.store().is_some(), output.report.is_some(), table));
@@ -156,7 +182,7 @@ impl Job {
     fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {
         let output = &self.args.job.output;
         let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
-        let (store, telling) = begin_store(output, engine)?;
+        let (store, telling) = begin_store_on_ranks(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
         let replace = output.overwrite;
         let thickness = Values { name: "thickness", at: None };
@@ -165,20 +191,25 @@ impl Job {
         let has_surface = self.middle.is_some();
         let mut drawing = Drawing::new(store.as_ref().filter(|_| has_surface), to, &self.geometry, true)?;
         let found = self.solve::<P>(engine, store.as_ref(), &mut drawing)?;
+        let ranks = gather_ranks(engine)?;
+        let store = join_store(store, engine)?;
+        if self.comm.rank() > 0 {
+            return Ok(found);
+        }
         let (geometry, segments) = (&self.geometry, Segments::Pairs);
         let (file, copy) = drawing.finish(&ForViewers { engine, store: store.as_ref(), geometry, segments })?;
         let found = found.with_copy(copy);
         note_anchor(mesh, &self.geometry, &self.console);
         if let Some(store) = store {
             let written = Written { store: &store, engine, console: self.console.as_ref() };
-            written.write(&self.evidence(), || self.report(engine, &found))?;
+            written.write(&self.evidence(), || self.report(engine, &ranks, &found))?;
             engine.check()?;
             drop(telling);
             store.finish()?;
         }
         file.map_or(Ok(()), Finished::place)?;
         match &output.report {
-            Some(path) => self.report(engine, &found).write(path, output.overwrite)?,
+            Some(path) => self.report(engine, &ranks, &found).write(path, output.overwrite)?,
             None => engine.check()?,
         }
         Ok(found)
@@ -204,12 +235,20 @@ impl Job {
         Some(MiddleSettings { distance: self.settings, surface, labels })
     }
 
-    fn needs<P: Precision>(&self, threads: usize, ranks: usize) -> Needs {
+    /// Ranks that share stages inside of this process.
+    fn ranks_inside(&self) -> usize {
+        if self.middle.is_some() { self.args.job.ranks } else { 1 }
+    }
+
+    /// What this rank takes.
+    fn needs<P: Precision>(&self, threads: usize) -> Needs {
         let writes = self.args.job.output.store().is_some();
+        let shared = [threads, self.ranks_inside()];
         if let Some(middle) = self.middle_settings() {
-            return middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes);
+            return middle.needs::<P>(&self.geometry, &self.sets, shared[0], shared[1], writes);
         }
-        self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], self.writes())
+        let needs = self.settings.needs::<P>(&self.geometry, &self.sets, shared, self.writes());
+        needs.of_rank(self.comm.ranks() as u64, threads as u64)
     }
 
     /// The stages of the run, and what each will probably take.
@@ -297,14 +336,20 @@ impl Job {
         }
     }
 
-    fn report<'a>(&self, engine: &Engine, found: &'a Found) -> Report<Settings, &'a Found> {
+    fn report<'a>(
+        &self,
+        engine: &Engine,
+        rank_reports: &[RankReport],
+        found: &'a Found,
+    ) -> Report<Settings, &'a Found> {
         let ran = Ran {
             command: if self.middle.is_some() { "middle" } else { "distance" },
             typed: &self.typed,
             resources: &self.resources,
             console: &self.console,
             engine,
-            ranks: engine.ranks(),
+            ranks: engine.ranks().max(self.comm.ranks()),
+            rank_reports,
             started: self.started,
         };
         Report::new(
@@ -314,6 +359,12 @@ impl Job {
             found,
         )
     }
+}
+
+/// How many ranks share this process or this machine, and what they may use.
+fn sharing(args: &DistanceJobArgs, is_middle: bool) -> Sharing {
+    let threads = if is_middle { 1 } else { args.job.ranks };
+    Sharing { machine: world::on_this_machine(), process: if world::on_this_machine() > 1 { 1 } else { threads } }
 }
 
 /// The settings that the flags mean.

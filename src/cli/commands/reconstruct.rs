@@ -279,6 +279,7 @@ impl Job {
             console: &self.console,
             engine,
             ranks: engine.ranks(),
+            rank_reports: &[],
             started: self.started,
         };
         Report::new(

@@ -375,6 +375,7 @@ impl Job {
             console: &self.console,
             engine,
             ranks: engine.comm().ranks(),
+            rank_reports: &[],
             started: self.started,
         };
         Report::new(&ran, settings, &outcome.geometry, Found::new(outcome, &self.marks.origins))

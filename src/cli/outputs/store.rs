@@ -1,10 +1,71 @@
 //! The store that a run writes, as its flags ask for it.
 
 use crate::cli::args::common::OutputArgs;
-use crate::error::Result;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, Result};
 use crate::exec::Engine;
-use crate::io::ome_zarr::StoreWriter;
+use crate::io::ome_zarr::{SharedStore, StoreWriter};
 use crate::job::live::Telling;
+use crate::store::checkpoint::{pack, unpack};
+
+/// Begins the store on the first rank; the others add to it.
+///
+/// # Errors
+/// As [`StoreWriter::create`], and when another rank is gone.
+pub(crate) fn begin_store_on_ranks(
+    output: &OutputArgs,
+    engine: &Engine,
+) -> Result<(Option<StoreWriter>, Option<Telling>)> {
+    let comm = engine.comm();
+    let is_first = comm.rank() == 0;
+    let (store, telling) = if is_first { begin_store(output, engine)? } else { (None, None) };
+    if comm.ranks() == 1 {
+        return Ok((store, telling));
+    }
+    let told = if is_first { packed(&store.as_ref().map(StoreWriter::share))? } else { Vec::new() };
+    let shared: Option<SharedStore> = unpacked(comm.gather(told)?.first())?;
+    if is_first {
+        return Ok((store, telling));
+    }
+    Ok((shared.map(|shared| StoreWriter::shared(&shared).packed(output.compress.into())), None))
+}
+
+/// Tells the first rank what the others have written; these are done with the store then.
+///
+/// # Errors
+/// When shards cannot be written out to the disk, or another rank is gone.
+pub(crate) fn join_store(store: Option<StoreWriter>, engine: &Engine) -> Result<Option<StoreWriter>> {
+    let comm = engine.comm();
+    if comm.ranks() == 1 {
+        return Ok(store);
+    }
+    // All have one, or none has.
+    let Some(store) = store else { return Ok(None) };
+    let sums = if comm.rank() == 0 { Vec::new() } else { store.sums() };
+    let mut first = Some(store);
+    if comm.rank() > 0
+        && let Some(store) = first.take()
+    {
+        store.finish()?;
+    }
+    for told in comm.gather(packed(&sums)?)? {
+        if let Some(store) = &first {
+            store.take_sums(unpacked(Some(&told))?);
+        }
+    }
+    Ok(first)
+}
+
+fn packed<R: Serialize>(record: &R) -> Result<Vec<u8>> {
+    pack(record).map_err(|error| Error::failed(format!("the store cannot be told to other ranks: {error}")))
+}
+
+fn unpacked<R: DeserializeOwned>(bytes: Option<&Vec<u8>>) -> Result<R> {
+    let read = unpack(bytes.map_or(&[], Vec::as_slice));
+    read.map_err(|error| Error::failed(format!("what another rank tells of the store cannot be read: {error}")))
+}
 
 /// Begins the store, where there is to be one; one that is live says how far the run is, until what comes with it goes.
 ///

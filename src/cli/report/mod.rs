@@ -5,6 +5,7 @@ pub(crate) mod lines;
 pub(crate) mod neighbours;
 pub(crate) mod page;
 pub(crate) mod picture;
+pub(crate) mod ranks;
 pub(crate) mod reconstruction;
 pub(crate) mod run_report;
 pub(crate) mod series;

@@ -7,6 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::neighbours::{Contact, Neighbours};
+use super::ranks::RankReport;
 use super::settings::Moved;
 use crate::cli::inputs::over_time::Origin;
 use crate::cli::terminal::console::Console;
@@ -30,6 +31,8 @@ pub(crate) struct Report<S, R> {
     pub(crate) grid: Grid,
     pub(crate) threads: usize,
     pub(crate) ranks: usize,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) rank_reports: Vec<RankReport>,
     pub(crate) memory_budget_bytes: u64,
     pub(crate) peak_rss_bytes: u64,
     pub(crate) seconds: f64,
@@ -279,6 +282,8 @@ pub(crate) struct Ran<'a> {
     pub(crate) console: &'a Console,
     pub(crate) engine: &'a Engine,
     pub(crate) ranks: usize,
+    /// What each of several ranks did.
+    pub(crate) rank_reports: &'a [RankReport],
     pub(crate) started: Instant,
 }
 
@@ -293,6 +298,7 @@ impl<S: Serialize, R: Serialize> Report<S, R> {
             grid: Grid::new(geometry),
             threads: ran.engine.threads(),
             ranks: ran.ranks,
+            rank_reports: ran.rank_reports.to_vec(),
             memory_budget_bytes: ran.resources.memory,
             peak_rss_bytes: peak_resident(),
             seconds: ran.started.elapsed().as_secs_f64(),

@@ -5,3 +5,4 @@ pub(crate) mod log;
 pub(crate) mod parent;
 pub(crate) mod signals;
 pub(crate) mod text;
+pub(crate) mod world;

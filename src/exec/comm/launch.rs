@@ -5,12 +5,15 @@
 pub struct Launched {
     /// Processes, this one too.
     pub processes: usize,
+    /// Those of them on this machine.
+    pub on_this_machine: usize,
     /// The variable that says so.
     pub variable: &'static str,
 }
 
-/// Open MPI's own; that of MPICH, Intel MPI and their kin.
-const VARIABLES: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
+/// What says how many there are, and how many on this machine: Open MPI's own; those of MPICH, Intel MPI and their kin.
+const VARIABLES: [[&str; 2]; 2] =
+    [["OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_LOCAL_SIZE"], ["PMI_SIZE", "MPI_LOCALNRANKS"]];
 
 /// What a launcher says, where it has started several. `srun` alone says nothing: without MPI it is used to start programs that
 /// have nothing to do with each other.
@@ -20,9 +23,11 @@ pub fn launched() -> Option<Launched> {
 }
 
 fn launched_by(environment: impl Fn(&str) -> Option<String>) -> Option<Launched> {
-    VARIABLES.into_iter().find_map(|variable| {
-        let processes: usize = environment(variable)?.trim().parse().ok()?;
-        (processes > 1).then_some(Launched { processes, variable })
+    let number = |name: &str| environment(name)?.trim().parse::<usize>().ok();
+    VARIABLES.into_iter().find_map(|[variable, local]| {
+        let processes = number(variable).filter(|&processes| processes > 1)?;
+        let on_this_machine = number(local).unwrap_or(1).clamp(1, processes);
+        Some(Launched { processes, on_this_machine, variable })
     })
 }
 
@@ -36,8 +41,8 @@ mod tests {
             launched_by(|name| set.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
         };
         assert_eq!(found(&[]), None);
-        let open = found(&[("OMPI_COMM_WORLD_SIZE", "8"), ("OMPI_COMM_WORLD_RANK", "3")]);
-        assert_eq!(open, Some(Launched { processes: 8, variable: "OMPI_COMM_WORLD_SIZE" }));
+        let open = found(&[("OMPI_COMM_WORLD_SIZE", "8"), ("OMPI_COMM_WORLD_LOCAL_SIZE", "4")]);
+        assert_eq!(open, Some(Launched { processes: 8, on_this_machine: 4, variable: "OMPI_COMM_WORLD_SIZE" }));
         assert_eq!(found(&[("PMI_SIZE", "2")]).map(|launched| launched.processes), Some(2));
         // One process is none of several, and what is no number says nothing.
         assert_eq!(found(&[("OMPI_COMM_WORLD_SIZE", "1")]), None);

@@ -4,6 +4,8 @@
 //! wave of bricks (neighbours on other ranks need the faces that changed), for each sum that decides something, and
 //! before a shared decision. Messages are bytes, little-endian, so that they may leave the process.
 
+use std::sync::Arc;
+
 use crate::error::Result;
 
 /// The ranks of a run.
@@ -81,6 +83,28 @@ pub trait Comm: Send + Sync {
     fn sum(&self, partial: &[f64]) -> Result<f64> {
         let all = self.gather(partial.iter().flat_map(|value| value.to_le_bytes()).collect())?;
         Ok(all.iter().flat_map(|bytes| numbers(bytes)).sum())
+    }
+}
+
+impl<C: Comm + ?Sized> Comm for Arc<C> {
+    fn rank(&self) -> usize {
+        self.as_ref().rank()
+    }
+
+    fn ranks(&self) -> usize {
+        self.as_ref().ranks()
+    }
+
+    fn post(&self, with: &[usize], messages: Vec<Vec<u8>>) -> Result<()> {
+        self.as_ref().post(with, messages)
+    }
+
+    fn collect(&self, with: &[usize]) -> Result<Vec<Vec<u8>>> {
+        self.as_ref().collect(with)
+    }
+
+    fn traffic(&self) -> RankTraffic {
+        self.as_ref().traffic()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::ranks::solve_watched;
+use super::ranks::{Reads, solve_watched};
 use super::readout::early::Early;
 use super::readout::found::DistanceFound;
 use super::readout::images::Wanted;
@@ -102,6 +102,7 @@ pub fn distance_kept<P: Precision>(
         None => Writes::Nothing,
     };
     let needs = settings.needs::<P>(geometry, sets, [engine.threads(), engine.ranks()], writes);
+    let needs = needs.of_rank(engine.comm().ranks() as u64, engine.threads() as u64);
     let held = engine.reserve(needs.footprint)?;
     let lent = held.lend(needs.later);
     let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));
@@ -110,7 +111,8 @@ pub fn distance_kept<P: Precision>(
     let reading = Reading::new(read_out, engine, store)?;
     // Only who watches a store gains by seeing its bricks one by one.
     let early = reads_early(settings, store).then_some(&reading as &dyn Early<P>);
-    solve_sets_watched::<P, _>(engine, geometry, sets, trees.as_ref(), (settings, early), |solved, _| {
+    let reads = Reads { early, boxes: &reading.reads() };
+    solve_sets_watched::<P, _>(engine, geometry, sets, trees.as_ref(), (settings, reads), |solved, _| {
         drop(lent);
         reading.finish(&solved)
     })
@@ -137,7 +139,7 @@ pub fn solve_sets<P: Precision, R>(
     settings: &DistanceSettings,
     then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
 ) -> Result<R> {
-    solve_sets_watched(engine, geometry, sets, trees, (settings, None), then)
+    solve_sets_watched(engine, geometry, sets, trees, (settings, Reads::default()), then)
 }
 
 /// The same; a front is read out as far as it has passed.
@@ -149,7 +151,7 @@ pub(crate) fn solve_sets_watched<P: Precision, R>(
     geometry: &Geometry,
     sets: &DataSets,
     trees: Option<&SourceTrees>,
-    (settings, early): (&DistanceSettings, Option<&dyn Early<P>>),
+    (settings, reads): (&DistanceSettings, Reads<'_, P>),
     then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
 ) -> Result<R> {
     settings.check_order()?;
@@ -180,7 +182,7 @@ pub(crate) fn solve_sets_watched<P: Precision, R>(
         labels: settings.labels,
     };
     let order = (settings.method, settings.schedule);
-    let solved = solve_watched::<P>(&stage, &sources, &set, order, options, early)?;
+    let solved = solve_watched::<P>(&stage, &sources, &set, order, options, reads)?;
     stage.finish();
     then(solved, &set)
 }

@@ -21,7 +21,7 @@ pub use checks::{check_iterations, outside_note, without_inside};
 pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets};
 pub(crate) use needs::tree_bytes;
 pub use needs::{Needs, Writes};
-pub use ranks::{solve, solve_watched};
+pub use ranks::{Reads, solve, solve_watched};
 pub use readout::early::Early;
 pub use readout::field::{DistanceWithSource, Solved};
 pub use readout::found::DistanceFound;
@@ -87,7 +87,7 @@ pub fn cloud_distance(
     farthest: f32,
 ) -> Result<BrickArray<f32>> {
     let options = Options::up_to(f64::from(farthest));
-    let solved = ranks::solve_once::<f32>(stage, sources, set, (method, Schedule::Front), options, None)?;
+    let solved = ranks::solve_once::<f32>(stage, sources, set, (method, Schedule::Front), options, Reads::default())?;
     let mut distance = BrickArray::with_faces(engine.scratch(), set)?;
     let (edge, len) = (set.grid().edge(), set.grid().brick_len());
     let workers = Workers::new(move || vec![0.0; len]);

@@ -34,6 +34,30 @@ impl Needs {
     }
 }
 
+/// Bytes of messages that a rank holds at a time: bricks that it lends and borrows, and as much for what waits to be sent.
+const MESSAGE_BYTES: u64 = 3 * (32 << 20);
+
+impl Needs {
+    /// The same for one of so many ranks of so many threads, each of which has its part of the fields, and of some bricks of others
+    /// copies; tables are of the whole grid.
+    #[must_use]
+    pub fn of_rank(self, ranks: u64, threads: u64) -> Self {
+        if ranks == 1 {
+            return self;
+        }
+        let footprint = self.footprint.and(Footprint::of_all(MESSAGE_BYTES));
+        let held = footprint.bytes(threads);
+        // At the most half of what is read is others'.
+        Self {
+            footprint,
+            held,
+            scratch: 2 * self.scratch.div_ceil(ranks),
+            seconds: self.seconds / ranks as f64,
+            ..self
+        }
+    }
+}
+
 /// What of a distance goes into a store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Writes {

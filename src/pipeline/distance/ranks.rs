@@ -7,9 +7,9 @@ use super::readout::early::Early;
 use super::readout::repair::looked_over;
 use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::exec::{HaloPlan, Ownership, Reach, Stage};
-use crate::grid::{Box3, BrickGrid, BrickSet};
+use crate::grid::{Box3, BrickGrid, BrickId, BrickSet};
 use crate::kernel::distance::state::precision::Precision;
 use crate::store::{BoxSource, Element};
 
@@ -27,7 +27,7 @@ pub fn solve<'a, P: Precision>(
     schedule: Schedule,
     options: Options,
 ) -> Result<Solved<'a, P>> {
-    solve_watched(stage, sources, set, (method, schedule), options, None)
+    solve_watched(stage, sources, set, (method, schedule), options, Reads::default())
 }
 
 /// The same; a front on one rank is read out as far as it has passed.
@@ -40,9 +40,9 @@ pub fn solve_watched<'a, P: Precision>(
     set: &BrickSet,
     (method, schedule): (Method, Schedule),
     options: Options,
-    early: Option<&dyn Early<P>>,
+    reads: Reads<'_, P>,
 ) -> Result<Solved<'a, P>> {
-    let solved = solve_once(stage, sources, set, (method, schedule), options, early)?;
+    let solved = solve_once(stage, sources, set, (method, schedule), options, reads)?;
     Ok(looked_over(solved, sources, options, (method.solver::<P>().tracks_sources(), schedule)))
 }
 
@@ -54,20 +54,27 @@ pub(super) fn solve_once<'a, P: Precision>(
     set: &BrickSet,
     (method, schedule): (Method, Schedule),
     options: Options,
-    early: Option<&dyn Early<P>>,
+    reads: Reads<'_, P>,
 ) -> Result<Solved<'a, P>> {
+    // Those that share a process, or are processes of their own.
+    let ranks = stage.ranks().max(stage.comm().ranks());
     // Others' bricks are read when all ranks are done.
-    let early = early.filter(|_| stage.ranks() == 1);
+    let early = reads.early.filter(|_| ranks == 1);
     let solver = method.solver::<P>();
     let one_heap = schedule != Schedule::Front && solver.textbook != Textbook::Sweeps;
-    let ownership =
-        if one_heap { Ownership::first(set, stage.ranks()) } else { Ownership::balanced(set, stage.ranks()) };
+    let ownership = if one_heap { Ownership::first(set, ranks) } else { Ownership::balanced(set, ranks) };
     // Sources are found by all 26 neighbours even where distances are not.
     let plan = HaloPlan::new(*set.grid(), Reach::All);
-    let parts = stage.on_ranks(|stage, engine| {
-        let own = Arc::new(ownership.part(set, engine.comm().rank(), &plan));
-        (solver.solve)(&Solving { stage, engine, sources, set: &own, options, early }, schedule)
+    let mut parts = stage.on_ranks(|stage, engine| {
+        let rank = engine.comm().rank();
+        let own = Arc::new(ownership.part(set, rank, &plan));
+        let borrows = reads.of_others(set.grid(), |id| ownership.owner(id) == rank);
+        (solver.solve)(&Solving { stage, engine, sources, set: &own, options, early, borrows: &borrows }, schedule)
     })?;
+    if stage.comm().ranks() > 1 {
+        // What this rank reads is its own part and what it has borrowed.
+        return parts.pop().ok_or_else(|| Error::failed("a rank has solved nothing"));
+    }
     let joined = Cut { grid: *set.grid(), ownership };
     let sum = |of: fn(&Solved<'a, P>) -> u64| parts.iter().map(of).sum();
     Ok(Solved {
@@ -78,6 +85,31 @@ pub(super) fn solve_once<'a, P: Precision>(
         fixed_voxels: sum(|part| part.fixed_voxels),
         triangle_distances: sum(|part| part.triangle_distances),
     })
+}
+
+/// What is read of a solved distance by the rank that asks for it.
+pub struct Reads<'r, P> {
+    /// Who reads bricks while others are still solved.
+    pub early: Option<&'r dyn Early<P>>,
+    /// The boxes that this rank of several reads when all is solved; what it owns, it reads anyway.
+    pub boxes: &'r [Box3],
+}
+
+impl<P> Default for Reads<'_, P> {
+    fn default() -> Self {
+        Self { early: None, boxes: &[] }
+    }
+}
+
+impl<P> Reads<'_, P> {
+    /// The bricks of the boxes that are not this rank's own, in order.
+    fn of_others(&self, grid: &BrickGrid, is_own: impl Fn(BrickId) -> bool) -> Vec<BrickId> {
+        let mut bricks: Vec<BrickId> = self.boxes.iter().flat_map(|part| grid.bricks_in(part)).collect();
+        bricks.sort_unstable();
+        bricks.dedup();
+        bricks.retain(|&id| !is_own(id));
+        bricks
+    }
 }
 
 /// How a field is cut.

@@ -1,6 +1,6 @@
 //! The distance methods on bricks: which kernel by which schedule, and the steps that methods share.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::readout::early::Early;
 use super::readout::field::{Solved, Values};
@@ -15,8 +15,8 @@ use super::seeding::initialise::{Seeded, Start, initialise};
 use super::seeding::outside::search_outside;
 use super::{Options, Schedule, Sources};
 use crate::error::Result;
-use crate::exec::{Engine, Stage, Workers};
-use crate::grid::{BrickSet, DataSets, SourceState};
+use crate::exec::{Engine, Stage, Workers, borrow_bricks};
+use crate::grid::{BrickId, BrickSet, DataSets, SourceState};
 use crate::kernel::distance::methods::all_neighbours::AllNeighbours;
 use crate::kernel::distance::methods::dijkstra_pythagoras::DijkstraPythagoras;
 use crate::kernel::distance::methods::fast_marching::FastMarching;
@@ -45,6 +45,8 @@ pub struct Solving<'j, 'a, P> {
     pub options: Options,
     /// Who reads bricks out while others are still solved.
     pub early: Option<&'j dyn Early<P>>,
+    /// Bricks of other ranks that are read here when all is solved, in order.
+    pub borrows: &'j [BrickId],
 }
 
 /// Who reads out early, and what from.
@@ -150,6 +152,7 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
             None => advance_front(self.stage, method, state, &seeded.bricks, bounds, None)?,
         }
         search_outside(self.stage, self.sources, method, state, self.options.farthest)?;
+        self.borrow_for(&values)?;
         Ok(values.read(seeded.fixed_voxels, seeded.triangle_distances))
     }
 
@@ -157,7 +160,7 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
         let (state, seeded) = self.start::<M>(Start::Fixed)?;
         sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations)?;
         search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
-        Ok(self.solved(method, state, &seeded))
+        self.solved(method, state, &seeded)
     }
 
     /// Distances, and along with them their sources, where these are asked for.
@@ -170,12 +173,12 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
             // An update that lowers nothing is none, so sweeps do not see that another label is as near.
             sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations)?;
             self.trace::<UpwindSum>(&state, &sources, &seeded)?;
-            return Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) });
+            return Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? });
         }
         let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &seeded.bricks)?;
         sweep_all(self.stage, &method, &state, &mut tracked, &seeded.bricks, iterations)?;
         drop(tracked);
-        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
+        Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
     }
 
     /// Distances, and then their sources, where these are asked for.
@@ -188,7 +191,7 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
         let bounds = (geometry.spacing, self.options.farthest);
         advance_front(self.stage, &method, &state, &seeded.bricks, bounds, None)?;
         self.trace::<R>(&state, &sources, &seeded)?;
-        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
+        Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
     }
 
     /// The data sets, where labels are wanted and these are several.
@@ -221,7 +224,7 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
         let (state, seeded) = self.start::<S>(Start::Fixed)?;
         heap_dijkstra(self.engine, self.sources.geometry, &method, self.options.neighbours, &state)?;
         search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
-        Ok(self.solved(method, state, &seeded))
+        self.solved(method, state, &seeded)
     }
 
     fn heap_marching<M: DistanceState<State = P> + 'a, S: TrackedSource>(
@@ -233,14 +236,35 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
         let state = BrickArray::new(self.engine.scratch(), self.set)?;
         let wanted = Wanted { sources: self.options.sources, labelled: self.labelled() };
         heap_marching(self.engine, self.sources.geometry, start, wanted, &state, &sources)?;
-        Ok(Solved { sources: Arc::new(SourceField(sources)), ..self.solved(method, state, &seeded) })
+        Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
     }
 
-    fn solved<M: DistanceState + 'a>(&self, method: M, state: BrickArray<M::State>, seeded: &Seeded) -> Solved<'a, P> {
-        self.values(method, state).read(seeded.fixed_voxels, seeded.triangle_distances)
+    fn solved<M: DistanceState + 'a>(
+        &self,
+        method: M,
+        state: BrickArray<M::State>,
+        seeded: &Seeded,
+    ) -> Result<Solved<'a, P>> {
+        let values = self.values(method, state);
+        self.borrow_for(&values)?;
+        Ok(values.read(seeded.fixed_voxels, seeded.triangle_distances))
     }
 
     fn values<M: DistanceState + 'a>(&self, method: M, state: BrickArray<M::State>) -> Arc<Values<M>> {
-        Arc::new(Values { method, state, farthest: self.options.farthest, buffers: Workers::new(Vec::new) })
+        let (farthest, buffers) = (self.options.farthest, Workers::new(Vec::new));
+        Arc::new(Values { method, state, borrowed: OnceLock::new(), farthest, buffers })
+    }
+
+    /// Gets what is read of other ranks' bricks, which are solved too.
+    fn borrow_for<M: DistanceState>(&self, values: &Values<M>) -> Result<()> {
+        if let Some(bricks) = borrow_bricks(self.stage, &values.state, M::UNKNOWN, self.borrows)? {
+            let _ = values.borrowed.set(bricks);
+        }
+        Ok(())
+    }
+
+    fn source_field(&self, sources: BrickArray<SourceState>) -> Result<Arc<SourceField>> {
+        let borrowed = borrow_bricks(self.stage, &sources, SourceState::FAR, self.borrows)?;
+        Ok(Arc::new(SourceField(sources, borrowed)))
     }
 }

@@ -3,4 +3,5 @@
 pub(crate) mod drawn;
 pub mod pyramid;
 pub(crate) mod saved;
+pub(crate) mod share;
 pub mod viewer_mesh;

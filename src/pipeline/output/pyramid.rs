@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering::{AcqRel, Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use super::saved::{PartlyWritten, in_batches};
+use super::share::{Piece, Share};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Saved, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, Slot};
@@ -122,7 +123,12 @@ impl<T: Element> Pyramid<T> {
     /// # Errors
     /// When a shard cannot be written.
     pub(crate) fn put_coarser(&self, chunk: &Box3, values: &[T], buffer: &mut Vec<T>) -> Result<()> {
-        let mut whole = self.reduce_into(1, chunk, values, buffer);
+        let whole = self.reduce_into(1, chunk, values, buffer);
+        self.complete(whole, buffer)
+    }
+
+    /// Writes a coarser level's shard that has become whole, and what becomes whole by that.
+    fn complete(&self, mut whole: Option<(usize, Box3)>, buffer: &mut Vec<T>) -> Result<()> {
         let mut voxels = Vec::new();
         while let Some((n, shard)) = whole.take() {
             let level = &self.image.levels()[n];
@@ -146,10 +152,37 @@ impl<T: Element> Pyramid<T> {
             self.reduce.reduce(values, chunk.shape(), level.factors(), buffer);
             coarser.waiting.write_box(&part, buffer);
         }
-        let shard = coarser.shards.of(part.lo);
-        // What other threads have put is seen by the one that finds nothing missing.
-        let before = coarser.missing[shard].fetch_sub(chunk.volume(), AcqRel);
-        (before == chunk.volume()).then(|| (n, coarser.shards.boxes[shard]))
+        coarser.came(n, &part, chunk.volume())
+    }
+
+    /// The boxes of level `n` that this rank has put there for others to write: of its visits, or of the shards that it has
+    /// written of the level below.
+    fn for_others(&self, n: usize, share: &Share<'_>) -> Result<Vec<(usize, Piece<T>)>> {
+        let (levels, coarser) = (self.image.levels(), &self.coarser[n - 1]);
+        let owner = |level: usize, voxel: [i64; 3]| {
+            let factors = levels[1..=level].iter().map(LevelWriter::factors);
+            share.owner(factors.fold(voxel, |voxel, factors| std::array::from_fn(|a| voxel[a] * factors[a])))
+        };
+        let below: Vec<Box3> = if n == 1 {
+            share.chunks().copied().collect()
+        } else {
+            let own = self.coarser[n - 2].shards.boxes.iter().filter(|shard| owner(n - 1, shard.lo) == share.rank());
+            own.flat_map(|shard| shard.tiles(levels[n - 1].chunk_shape())).collect()
+        };
+        let mut pieces = Vec::new();
+        for chunk in below {
+            let part = coarse_box(&chunk, levels[n].factors());
+            let to = owner(n, coarser.shards.boxes[coarser.shards.of(part.lo)].lo);
+            if to != share.rank() {
+                let mut values = vec![T::default(); part.len()];
+                coarser.waiting.read_box(&part, &mut values)?;
+                if values.iter().all(|&value| value == T::default()) {
+                    values.clear();
+                }
+                pieces.push((to, Piece { part, below: chunk.volume(), values }));
+            }
+        }
+        Ok(pieces)
     }
 
     /// Takes all chunks once more, of a finest level that has changed since.
@@ -180,6 +213,19 @@ impl<T: Element> PartlyWritten for Pyramid<T> {
         waiting.map(|bricks| Box::new(bricks) as Box<dyn SavedField>).collect()
     }
 
+    fn join(&self, share: &Share<'_>) -> Result<()> {
+        let mut buffer = Vec::new();
+        for (n, coarser) in (1..).zip(&self.coarser) {
+            for piece in share.exchange(&self.for_others(n, share)?)? {
+                if !piece.values.is_empty() {
+                    coarser.waiting.write_box(&piece.part, &piece.values);
+                }
+                self.complete(coarser.came(n, &piece.part, piece.below), &mut buffer)?;
+            }
+        }
+        Ok(())
+    }
+
     fn go_on(&self, missing: &[Vec<u64>], saved: &Saved, first: usize) -> Result<()> {
         for (n, (coarser, known)) in self.coarser.iter().zip(missing).enumerate() {
             if known.len() != coarser.missing.len() {
@@ -193,6 +239,14 @@ impl<T: Element> PartlyWritten for Pyramid<T> {
 }
 
 impl<T: Element> Coarser<T> {
+    /// A box of level `n` is there, made of so many voxels below: its shard, if nothing of it is missing any more.
+    fn came(&self, n: usize, part: &Box3, below: u64) -> Option<(usize, Box3)> {
+        let shard = self.shards.of(part.lo);
+        // What other threads have put is seen by the one that finds nothing missing.
+        let before = self.missing[shard].fetch_sub(below, AcqRel);
+        (before == below).then(|| (n, self.shards.boxes[shard]))
+    }
+
     /// The bricks of level `n` that wait: of shards of which something has come and not all.
     fn half_come(&self, levels: &[LevelWriter], n: usize) -> SomeBricks<'_, T> {
         let set = self.waiting.set();

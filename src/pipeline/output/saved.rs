@@ -12,6 +12,7 @@ use std::ops::Range;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::share::Share;
 use crate::error::Result;
 use crate::exec::{SavePoint, Saved, Stage, Workers};
 use crate::grid::Box3;
@@ -36,6 +37,12 @@ pub(crate) trait PartlyWritten: Sync {
     /// # Errors
     /// When they cannot be read.
     fn go_on(&self, missing: &[Vec<u64>], saved: &Saved, first: usize) -> Result<()>;
+
+    /// Writes the coarser shards that lie over the visits of several ranks; all ranks do, when each has made its visits.
+    ///
+    /// # Errors
+    /// When a shard cannot be written or another rank is gone.
+    fn join(&self, share: &Share<'_>) -> Result<()>;
 }
 
 /// What a run knows between two batches.

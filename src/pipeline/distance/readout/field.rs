@@ -1,10 +1,10 @@
 //! What a solved distance can be read as: distances and the indices of nearest sources, both made out of the state of
 //! the method as they are read, so that no second field is stored.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
-use crate::exec::Workers;
+use crate::exec::{Workers, read_with_borrowed};
 use crate::grid::{Box3, NO_SOURCE};
 use crate::kernel::distance::state::method::DistanceState;
 use crate::kernel::distance::state::precision::Precision;
@@ -53,6 +53,8 @@ impl<P: Precision> Solved<'_, P> {
 pub(crate) struct Values<M: DistanceState> {
     pub(crate) method: M,
     pub(crate) state: BrickArray<M::State>,
+    /// Bricks of other ranks that this one reads when all is solved.
+    pub(crate) borrowed: OnceLock<BrickArray<M::State>>,
     pub(crate) farthest: f64,
     /// Kept from one read to the next: fresh memory would cost more than what is computed in it.
     pub(crate) buffers: Workers<Vec<M::State>>,
@@ -73,7 +75,7 @@ impl<M: DistanceState> Values<M> {
     fn each(&self, part: &Box3, mut f: impl FnMut(usize, M::State, [i64; 3])) -> Result<()> {
         self.buffers.with(|states| {
             states.resize(part.len().max(states.len()), M::UNKNOWN);
-            self.state.read_box(part, &mut states[..part.len()])?;
+            read_with_borrowed(&self.state, self.borrowed.get(), part, &mut states[..part.len()])?;
             let mut at = 0;
             for (y, z) in part.rows() {
                 for x in part.lo[0]..part.hi[0] {

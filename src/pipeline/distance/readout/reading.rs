@@ -4,12 +4,14 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use serde::{Deserialize, Serialize};
+
 use super::early::Early;
 use super::field::Solved;
 use super::found::DistanceFound;
 use super::images::{Buffers, Images};
 use super::visit::{Measured, ReadOut, Voxels};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::Box3;
 use crate::io::ome_zarr::StoreWriter;
@@ -20,6 +22,8 @@ use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::schedule::passing::Passed;
 use crate::pipeline::output::pyramid::{visits, visits_of};
 use crate::pipeline::output::saved::in_batches;
+use crate::pipeline::output::share::Share;
+use crate::store::checkpoint::{pack, unpack};
 
 /// Edges of the boxes that voxels are looked at in where nothing is written: as if something was.
 const LOOK_EDGES: [[i64; 3]; 2] = [[128; 3], [64; 3]];
@@ -32,6 +36,7 @@ pub(crate) struct Reading<'a, P: Precision> {
     inside: Option<Inside<'a>>,
     closest: ClosestPoints<'a>,
     visits: Vec<Vec<Box3>>,
+    share: Share<'a>,
     workers: Workers<(Voxels<P>, Buffers<P>)>,
     progress: Mutex<Progress>,
 }
@@ -59,10 +64,12 @@ impl<'a, P: Precision> Reading<'a, P> {
     pub(crate) fn new(what: ReadOut<'a, P>, engine: &'a Engine, store: Option<&'a StoreWriter>) -> Result<Self> {
         let (geometry, sets) = (what.geometry, what.sets);
         let images = store.map(|store| Images::<P>::new(engine, geometry, sets, what.wanted, store)).transpose()?;
+        let threads = all_threads(engine)?;
         let visits = match &images {
-            Some(images) => visits(images.finest(), engine.threads()),
-            None => visits_of(geometry.domain(), LOOK_EDGES.to_vec(), engine.threads()),
+            Some(images) => visits(images.finest(), threads),
+            None => visits_of(geometry.domain(), LOOK_EDGES.to_vec(), threads),
         };
+        let share = Share::new(engine.comm(), &visits);
         let done = vec![false; visits.len()];
         let progress = Progress { measured: Measured::default(), done, due: Instant::now(), reopened: false };
         Ok(Self {
@@ -71,13 +78,22 @@ impl<'a, P: Precision> Reading<'a, P> {
             inside: what.is_signed.then(|| Inside::new(geometry, &sets.mesh)),
             closest: ClosestPoints::new(geometry, sets),
             visits,
+            share,
             workers: Workers::new(|| (Voxels::default(), Buffers::default())),
             progress: Mutex::new(progress),
             what,
         })
     }
 
-    /// Reads out what was not yet.
+    /// The boxes that this rank of several reads, with those around that tell about them.
+    pub(crate) fn reads(&self) -> Vec<Box3> {
+        let domain = self.what.geometry.domain();
+        // Borders look at the voxels beside, each of which is looked at again.
+        let around = |part: &Box3| part.grow(MARGIN + 1).intersect(&domain);
+        if self.engine.comm().ranks() == 1 { Vec::new() } else { self.share.chunks().map(around).collect() }
+    }
+
+    /// Reads out what was not yet; of several ranks each its share of it.
     ///
     /// # Errors
     /// When the output cannot be written, scratch runs out or the run is interrupted.
@@ -88,7 +104,7 @@ impl<'a, P: Precision> Reading<'a, P> {
             self.begin_again();
         }
         let mut measured = std::mem::take(&mut self.progress().measured);
-        let rest: Vec<usize> = (0..self.visits.len()).filter(|&visit| !self.progress().done[visit]).collect();
+        let rest: Vec<usize> = self.share.own().filter(|&visit| !self.progress().done[visit]).collect();
         match &self.images {
             // What is kept for who asked for it is not in a checkpoint.
             Some(images) if rest.len() == self.visits.len() && self.what.kept.is_none() => {
@@ -103,9 +119,29 @@ impl<'a, P: Precision> Reading<'a, P> {
                 measured = measured.and(self.read_out(&stage, solved, &rest)?);
             }
         }
-        self.describe(measured.max)?;
+        let found =
+            self.together(Found { measured, fixed: solved.fixed_voxels, triangles: solved.triangle_distances })?;
+        self.describe(found.measured.max)?;
         stage.finish();
-        Ok(self.what.found(measured, solved))
+        Ok(self.what.found(found.measured, [found.fixed, found.triangles]))
+    }
+
+    /// What all ranks have found, once each has written its share.
+    fn together(&self, own: Found) -> Result<Found> {
+        let comm = self.engine.comm();
+        if comm.ranks() == 1 {
+            return Ok(own);
+        }
+        if let Some(images) = &self.images {
+            images.all().into_iter().try_for_each(|image| image.join(&self.share))?;
+        }
+        let told = pack(&own).map_err(|error| Error::failed(format!("what was found cannot be told: {error}")))?;
+        let all = comm.gather(told)?;
+        let heard = |bytes: &Vec<u8>| {
+            unpack::<Found>(bytes)
+                .map_err(|error| Error::failed(format!("what another rank found cannot be read: {error}")))
+        };
+        all.iter().map(heard).try_fold(Found::default(), |sum, found| Ok(sum.and(found?)))
     }
 
     /// Next to never: what was read early is read once more.
@@ -156,6 +192,28 @@ impl<'a, P: Precision> Reading<'a, P> {
         let ready: Vec<usize> = (0..self.visits.len()).filter(ready).collect();
         if ready.len() < FEWEST_VISITS * self.engine.threads() { Vec::new() } else { ready }
     }
+}
+
+/// What one rank has found.
+#[derive(Default, Serialize, Deserialize)]
+struct Found {
+    measured: Measured,
+    fixed: u64,
+    triangles: u64,
+}
+
+impl Found {
+    fn and(self, other: Self) -> Self {
+        let (fixed, triangles) = (self.fixed + other.fixed, self.triangles + other.triangles);
+        Self { measured: self.measured.and(other.measured), fixed, triangles }
+    }
+}
+
+/// The threads of all ranks: whatever each has, all cut the volume alike.
+fn all_threads(engine: &Engine) -> Result<usize> {
+    let all = engine.comm().gather((engine.threads() as u64).to_le_bytes().to_vec())?;
+    let words = all.iter().filter_map(|bytes| bytes.as_slice().try_into().ok());
+    Ok(words.map(u64::from_le_bytes).sum::<u64>() as usize)
 }
 
 impl<P: Precision> Early<P> for Reading<'_, P> {

@@ -100,7 +100,8 @@ impl<P: Precision> ReadOut<'_, P> {
         Ok(())
     }
 
-    pub(super) fn found(&self, measured: Measured, solved: &Solved<'_, P>) -> DistanceFound {
+    /// What the report tells; with the voxels that sources fixed, and the distances to triangles that took.
+    pub(super) fn found(&self, measured: Measured, [fixed_voxels, triangle_distances]: [u64; 2]) -> DistanceFound {
         let mut label_voxels = measured.label_voxels;
         if self.wanted.labels {
             for &label in self.sets.labels() {
@@ -109,9 +110,9 @@ impl<P: Precision> ReadOut<'_, P> {
         }
         DistanceFound {
             max: measured.max,
-            fixed_voxels: solved.fixed_voxels,
+            fixed_voxels,
             unlabelled_voxels: measured.unlabelled,
-            triangle_distances: (!self.sets.mesh.is_empty()).then_some(solved.triangle_distances),
+            triangle_distances: (!self.sets.mesh.is_empty()).then_some(triangle_distances),
             label_voxels,
         }
     }

@@ -9,7 +9,9 @@
 use std::marker::PhantomData;
 
 use crate::error::Result;
-use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, corner_colours};
+use crate::exec::{
+    Boundary, Exchange, HaloPlan, Reach, Relax, Stage, Until, Waves, Workers, corner_colours, read_with_borrowed,
+};
 use crate::grid::{Box3, DataSets, Geometry, NEIGHBOURS_26, Slot, SourceState};
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::distance::tracking::parents::Parents;
@@ -155,8 +157,8 @@ impl<W: Send, F: Fn(&mut W, Slot) -> (bool, bool) + Sync> Relax for Missing<'_, 
     }
 }
 
-/// A field of states, read as the indices of sources.
-pub(crate) struct SourceField(pub(crate) BrickArray<SourceState>);
+/// A field of states, read as the indices of sources; and bricks of it that other ranks own, where these are read.
+pub(crate) struct SourceField(pub(crate) BrickArray<SourceState>, pub(crate) Option<BrickArray<SourceState>>);
 
 impl BoxSource<u32> for SourceField {
     fn shape(&self) -> [i64; 3] {
@@ -166,7 +168,7 @@ impl BoxSource<u32> for SourceField {
     fn read_box(&self, part: &Box3, out: &mut [u32]) -> Result<()> {
         // Two words of 32 bits for each voxel of a small box; the states themselves are not what is handed out.
         let mut states = vec![SourceState::FAR; out.len()];
-        self.0.read_box(part, &mut states)?;
+        read_with_borrowed(&self.0, self.1.as_ref(), part, &mut states)?;
         out.iter_mut().zip(states).for_each(|(out, state)| *out = state.source());
         Ok(())
     }

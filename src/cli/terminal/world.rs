@@ -1,0 +1,73 @@
+//! The processes that an MPI launcher has started together with this one: who they are to a run, and how it ends for all of them.
+
+use std::sync::Arc;
+
+use crate::cli::args::command_line::Command;
+use crate::error::{Error, Result};
+use crate::exec::{Comm, SelfComm, launched};
+#[cfg(feature = "mpi")]
+use crate::exec::{Counted, MpiComm};
+
+/// Refuses what would be done by each of several processes alike: all would write over each other's output.
+///
+/// # Errors
+/// When a launcher has started several of this process and the command, or this build, cannot share the work out.
+pub(crate) fn check(command: &Command) -> Result<()> {
+    let Some(launched) = launched() else { return Ok(()) };
+    let (processes, variable) = (launched.processes, launched.variable);
+    let name = match command {
+        Command::Segment(_) => "segment",
+        Command::Middle(_) => "middle",
+        Command::Reconstruct(_) => "reconstruct",
+        Command::Batch(_) => "batch",
+        Command::Demo(_) => "demo",
+        Command::Convert(_) => "convert",
+        Command::Distance(_) if cfg!(feature = "mpi") => return Ok(()),
+        Command::Distance(_) => {
+            return Err(Error::usage(format!(
+                "{processes} processes were started together ({variable}), but this build knows no MPI: each would do all of the work and \
+                 write over the others; build it with --features mpi, or start it once"
+            )));
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::usage(format!(
+        "{processes} processes were started together ({variable}), but {name} runs in one: each would do all of the work and write over \
+         the others; start it once, without mpirun, or unset {variable}"
+    )))
+}
+
+/// How many of the processes share this machine.
+pub(crate) fn on_this_machine() -> usize {
+    launched().map_or(1, |launched| launched.on_this_machine)
+}
+
+#[cfg(feature = "mpi")]
+static WORLD: std::sync::OnceLock<Arc<MpiComm>> = std::sync::OnceLock::new();
+
+/// The ranks of this run: the processes of an MPI program, or this process alone.
+///
+/// # Errors
+/// When MPI cannot be begun.
+pub(crate) fn ranks() -> Result<Arc<dyn Comm>> {
+    #[cfg(feature = "mpi")]
+    if launched().is_some() {
+        let world = Arc::new(MpiComm::begin()?);
+        return Ok(Arc::new(Counted::new(WORLD.get_or_init(|| world).clone())));
+    }
+    Ok(Arc::new(SelfComm))
+}
+
+/// Leaves the other processes at the end of a run: in order where it succeeded, else all of them end with this one's exit code.
+pub(crate) fn leave(_code: u8) {
+    #[cfg(feature = "mpi")]
+    if let Some(world) = WORLD.get() {
+        if _code == 0 {
+            world.end();
+        } else {
+            world.abort(i32::from(_code));
+            // The launcher ends this process too.
+            std::thread::sleep(std::time::Duration::from_secs(10));
+        }
+    }
+}
