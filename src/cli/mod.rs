@@ -60,6 +60,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
         Ok(Err(error)) => {
             let error = terminal::signals::seen(error);
+            terminal::world::give_way();
             tell(&error);
             error.exit_code()
         }

@@ -35,7 +35,7 @@ pub fn borrow_bricks<T: Element>(
     }
     let grid = *array.set().grid();
     let ownership = Ownership::agreed(comm, array.set())?;
-    let set = Arc::new(BrickSet::from_fn(grid, |id| wanted.binary_search(&id).is_ok()));
+    let set = Arc::new(BrickSet::from_ids(grid, wanted.to_vec()));
     let borrowed = BrickArray::blank(stage.engine().scratch(), &set, blank)?;
     let others: Vec<usize> = (0..comm.ranks()).filter(|&rank| rank != comm.rank()).collect();
     // All others may ask one rank.

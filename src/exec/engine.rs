@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::cancel::Cancel;
 use super::comm::messages::{Comm, SelfComm};
@@ -18,7 +19,7 @@ use crate::store::checkpoint::Identity;
 use crate::store::{Scratch, Traffic};
 
 /// What one stage of a run cost.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageReport {
     /// What was done.
     pub name: String,
@@ -155,6 +156,19 @@ impl Engine {
     /// Takes over the reports of stages that were done on an engine beside this one.
     pub(super) fn take_reports(&self, reports: Vec<StageReport>) {
         self.reports.lock().unwrap_or_else(PoisonError::into_inner).extend(reports);
+    }
+
+    /// Counts what another rank did in the stages that are finished here, which are those of all ranks.
+    pub fn count_rank(&self, done: &[StageReport]) {
+        let mut reports = self.reports.lock().unwrap_or_else(PoisonError::into_inner);
+        for (own, other) in reports.iter_mut().zip(done) {
+            own.bricks += other.bricks;
+            own.brick_loads += other.brick_loads;
+            own.bytes_read += other.bytes_read;
+            own.bytes_written += other.bytes_written;
+            own.seconds = own.seconds.max(other.seconds);
+            own.peak_rss_bytes = own.peak_rss_bytes.max(other.peak_rss_bytes);
+        }
     }
 
     /// Number of threads.

@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::comm::messages::Comm;
 use super::halo::HaloPlan;
 use crate::error::Result;
-use crate::grid::{BrickId, BrickSet};
+use crate::grid::{BrickId, BrickSet, Slot};
 
 /// The bricks of a grid, shared out between ranks.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,7 +23,10 @@ impl Ownership {
     /// fewer bricks than ranks.
     #[must_use]
     pub fn balanced(set: &BrickSet, ranks: usize) -> Self {
-        let cut = |rank: usize| set.ids().get(set.len() * rank / ranks).copied().unwrap_or(set.grid().len());
+        let cut = |rank: usize| match set.len() * rank / ranks {
+            all if all == set.len() => set.grid().len(),
+            first => set.id(first as Slot),
+        };
         Self { ends: (1..=ranks).map(cut).collect() }
     }
 
@@ -85,7 +88,7 @@ mod tests {
                     let owners = (0..ranks).filter(|&rank| ownership.owned(rank).contains(&id));
                     assert_eq!(owners.collect::<Vec<_>>(), [ownership.owner(id)], "{id} of {ranks} ranks");
                 }
-                let share = |rank| set.ids().iter().filter(|&&id| ownership.owner(id) == rank).count();
+                let share = |rank| set.ids().filter(|&id| ownership.owner(id) == rank).count();
                 let shares: Vec<usize> = (0..ranks).map(share).collect();
                 assert!(shares.iter().max().unwrap() - shares.iter().min().unwrap() <= 1, "{shares:?}");
             }
@@ -107,7 +110,7 @@ mod tests {
                         scope.spawn(move || {
                             let own = ownership.part(set, comm.rank(), plan);
                             let agreed = Ownership::agreed(&comm, &own).unwrap();
-                            set.ids().iter().for_each(|&id| assert_eq!(agreed.owner(id), ownership.owner(id)));
+                            set.ids().for_each(|id| assert_eq!(agreed.owner(id), ownership.owner(id)));
                         });
                     }
                 });

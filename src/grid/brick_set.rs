@@ -16,16 +16,29 @@ const ABSENT: Slot = Slot::MAX;
 #[derive(Clone, Debug)]
 pub struct BrickSet {
     grid: BrickGrid,
-    ids: Vec<BrickId>,
-    slots: Vec<Slot>,
+    bricks: Bricks,
     owned: Range<Slot>,
+}
+
+/// Which bricks. A rank of many has a few of a large grid: what it keeps of them is as large as what lies between its first
+/// and its last one, not as the grid.
+#[derive(Clone, Debug)]
+enum Bricks {
+    /// All of the grid: a brick's slot is its number.
+    All,
+    /// Those of these numbers; the slot of each number from the first one to the last.
+    Some { ids: Vec<BrickId>, slots: Vec<Slot> },
 }
 
 impl BrickSet {
     /// All bricks of the grid.
+    ///
+    /// # Panics
+    /// When the grid has 2^32 bricks or more: such a grid would not fit any disk.
     #[must_use]
     pub fn dense(grid: BrickGrid) -> Self {
-        Self::from_fn(grid, |_| true)
+        assert!(grid.len() < u64::from(ABSENT), "too many bricks for 32-bit slots");
+        Self { grid, bricks: Bricks::All, owned: 0..grid.len() as Slot }
     }
 
     /// The bricks for which `keep` says yes.
@@ -34,34 +47,49 @@ impl BrickSet {
     /// When the grid has 2^32 bricks or more: such a grid would not fit any disk.
     #[must_use]
     pub fn from_fn(grid: BrickGrid, mut keep: impl FnMut(BrickId) -> bool) -> Self {
+        Self::from_ids(grid, (0..grid.len()).filter(|&id| keep(id)).collect())
+    }
+
+    /// The bricks of these numbers, which are in order, each once.
+    ///
+    /// # Panics
+    /// When the grid has 2^32 bricks or more: such a grid would not fit any disk.
+    #[must_use]
+    pub fn from_ids(grid: BrickGrid, ids: Vec<BrickId>) -> Self {
         assert!(grid.len() < u64::from(ABSENT), "too many bricks for 32-bit slots");
-        let mut ids = Vec::new();
-        let mut slots = vec![ABSENT; grid.len() as usize];
-        for id in 0..grid.len() {
-            if keep(id) {
-                slots[id as usize] = ids.len() as Slot;
-                ids.push(id);
-            }
+        debug_assert!(ids.is_sorted_by(|a, b| a < b), "numbers come in order");
+        let reach = ids.first().zip(ids.last()).map_or(0, |(first, last)| last - first + 1);
+        let mut slots = vec![ABSENT; reach as usize];
+        for (slot, id) in (0..).zip(&ids) {
+            slots[(id - ids[0]) as usize] = slot;
         }
         let owned = 0..ids.len() as Slot;
-        Self { grid, ids, slots, owned }
+        Self { grid, bricks: Bricks::Some { ids, slots }, owned }
     }
 
     /// The part of a rank that owns the bricks numbered `owned`: those of them that are in this set, and as ghosts the
     /// set's bricks that lie beside them at one of `offsets`.
     #[must_use]
     pub fn part(&self, owned: &Range<BrickId>, offsets: &[[i64; 3]]) -> Self {
-        let slots = |at: &BrickId| self.ids.partition_point(|id| id < at);
-        let mut kept = vec![false; self.ids.len()];
-        for slot in slots(&owned.start)..slots(&owned.end) {
-            kept[slot] = true;
-            let beside = offsets.iter().filter_map(|&offset| self.neighbour(slot as Slot, offset));
-            beside.for_each(|ghost| kept[ghost as usize] = true);
+        let own = self.before(owned.start)..self.before(owned.end);
+        let mut ids: Vec<BrickId> = own.clone().map(|slot| self.id(slot)).collect();
+        for slot in own {
+            let beside = offsets.iter().filter_map(|&offset| self.neighbour(slot, offset)).map(|ghost| self.id(ghost));
+            ids.extend(beside.filter(|id| !owned.contains(id)));
         }
-        let mut part = Self::from_fn(self.grid, |id| self.slot(id).is_some_and(|slot| kept[slot as usize]));
-        let first = |at: &BrickId| part.ids.partition_point(|id| id < at) as Slot;
-        part.owned = first(&owned.start)..first(&owned.end);
+        ids.sort_unstable();
+        ids.dedup();
+        let mut part = Self::from_ids(self.grid, ids);
+        part.owned = part.before(owned.start)..part.before(owned.end);
         part
+    }
+
+    /// How many bricks of the set have a number below one.
+    fn before(&self, id: BrickId) -> Slot {
+        match &self.bricks {
+            Bricks::All => id.min(self.grid.len()) as Slot,
+            Bricks::Some { ids, .. } => ids.partition_point(|&other| other < id) as Slot,
+        }
     }
 
     /// The slots of owned bricks; all of them where there is one rank.
@@ -72,7 +100,7 @@ impl BrickSet {
 
     /// The slots of ghost bricks.
     pub fn ghosts(&self) -> impl Iterator<Item = Slot> + use<> {
-        (0..self.owned.start).chain(self.owned.end..self.ids.len() as Slot)
+        (0..self.owned.start).chain(self.owned.end..self.len() as Slot)
     }
 
     /// The grid the bricks belong to.
@@ -84,31 +112,42 @@ impl BrickSet {
     /// Number of bricks in the set, ghosts too.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.ids.len()
+        match &self.bricks {
+            Bricks::All => self.grid.len() as usize,
+            Bricks::Some { ids, .. } => ids.len(),
+        }
     }
 
     /// True when no brick is in the set.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.ids.is_empty()
+        self.len() == 0
     }
 
     /// The bricks in order of their numbers; a brick's place is its slot.
-    #[must_use]
-    pub fn ids(&self) -> &[BrickId] {
-        &self.ids
+    pub fn ids(&self) -> impl ExactSizeIterator<Item = BrickId> {
+        (0..self.len()).map(|slot| self.id(slot as Slot))
     }
 
     /// The brick in a slot.
     #[must_use]
     pub fn id(&self, slot: Slot) -> BrickId {
-        self.ids[slot as usize]
+        match &self.bricks {
+            Bricks::All => BrickId::from(slot),
+            Bricks::Some { ids, .. } => ids[slot as usize],
+        }
     }
 
     /// The slot of a brick, or none when it is not in the set.
     #[must_use]
     pub fn slot(&self, id: BrickId) -> Option<Slot> {
-        Some(self.slots[id as usize]).filter(|&s| s != ABSENT)
+        match &self.bricks {
+            Bricks::All => Some(id as Slot),
+            Bricks::Some { ids, slots } => {
+                let place = id.checked_sub(*ids.first()?)?;
+                slots.get(place as usize).copied().filter(|&slot| slot != ABSENT)
+            }
+        }
     }
 
     /// The slot of the brick beside `slot`, or none where it is absent or beyond the domain.

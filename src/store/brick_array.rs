@@ -28,8 +28,15 @@ pub struct BrickArray<T: Element> {
     brick_len: usize,
     bricks: SlotFile<T>,
     faces: Option<SlotFile<T>>,
-    absent: Vec<T>,
+    absent: Absent<T>,
     blank: Option<Blank<T>>,
+}
+
+/// What bricks hold that are not stored: most often the same everywhere.
+struct Absent<T> {
+    all: T,
+    /// For each brick of the grid, where some hold another.
+    each: Vec<T>,
 }
 
 /// What bricks hold that were not written yet, and which these are.
@@ -55,7 +62,7 @@ impl<T: Element> BrickArray<T> {
     pub fn with_layers(scratch: &Scratch, set: &Arc<BrickSet>, layers: usize) -> Result<Self> {
         let brick_len = layers * set.grid().brick_len();
         let bricks = SlotFile::create(&scratch.dir, &scratch.window, brick_len, set.owned().len())?;
-        let absent = vec![T::default(); set.grid().len() as usize];
+        let absent = Absent { all: T::default(), each: Vec::new() };
         Ok(Self { set: set.clone(), brick_len, bricks, faces: None, absent, blank: None })
     }
 
@@ -90,8 +97,8 @@ impl<T: Element> BrickArray<T> {
     }
 
     fn and_blank(mut self, value: T) -> Self {
-        self.absent.fill(value);
-        let written = self.set.ids().iter().map(|_| AtomicBool::new(false)).collect();
+        self.set_all_absent(value);
+        let written = self.set.ids().map(|_| AtomicBool::new(false)).collect();
         self.blank = Some(Blank { value, written });
         self
     }
@@ -116,13 +123,24 @@ impl<T: Element> BrickArray<T> {
 
     /// Gives a brick that is not stored its constant value.
     pub fn set_absent(&mut self, id: BrickId, value: T) {
-        self.absent[id as usize] = value;
+        if self.absent.each.is_empty() {
+            if value == self.absent.all {
+                return;
+            }
+            self.absent.each = vec![self.absent.all; self.set.grid().len() as usize];
+        }
+        self.absent.each[id as usize] = value;
+    }
+
+    /// Gives all bricks that are not stored one value.
+    pub fn set_all_absent(&mut self, value: T) {
+        self.absent = Absent { all: value, each: Vec::new() };
     }
 
     /// The constant value of a brick that is not stored.
     #[must_use]
     pub fn absent(&self, id: BrickId) -> T {
-        self.absent[id as usize]
+        self.absent.each.get(id as usize).copied().unwrap_or(self.absent.all)
     }
 
     /// The place of a brick in the file of bricks.

@@ -1,9 +1,9 @@
-//! What each rank of a run did: beside the report's figures, which are those of the first.
+//! What each rank of a run did, beside the report's figures, which count all of them.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::exec::{Engine, peak_resident};
+use crate::exec::{Engine, StageReport, peak_resident};
 use crate::store::checkpoint::{pack, unpack};
 
 /// What one rank did.
@@ -26,7 +26,7 @@ pub(crate) struct RankReport {
 impl RankReport {
     fn of(engine: &Engine) -> Self {
         let (comm, reports) = (engine.comm(), engine.reports());
-        let sum = |of: fn(&crate::exec::StageReport) -> u64| reports.iter().map(of).sum();
+        let sum = |of: fn(&StageReport) -> u64| reports.iter().map(of).sum();
         let traffic = comm.traffic();
         Self {
             rank: comm.rank(),
@@ -43,15 +43,25 @@ impl RankReport {
     }
 }
 
-/// What all ranks did, in their order; nothing where there is one. All ranks ask.
+/// What all ranks did, in their order, and counts it in the engine's stages on the first; nothing where there is one rank. All
+/// ranks ask.
 ///
 /// # Errors
 /// When another rank is gone.
 pub(crate) fn gather_ranks(engine: &Engine) -> Result<Vec<RankReport>> {
-    if engine.comm().ranks() == 1 {
+    let comm = engine.comm();
+    if comm.ranks() == 1 {
         return Ok(Vec::new());
     }
     let fault = |error: std::io::Error| Error::failed(format!("what a rank did cannot be told: {error}"));
-    let told = pack(&RankReport::of(engine)).map_err(fault)?;
-    engine.comm().gather(told)?.iter().map(|bytes| unpack(bytes).map_err(fault)).collect()
+    let told = comm.gather(pack(&(RankReport::of(engine), engine.reports())).map_err(fault)?)?;
+    let mut ranks = Vec::new();
+    for (rank, bytes) in told.iter().enumerate() {
+        let (report, stages): (RankReport, Vec<StageReport>) = unpack(bytes).map_err(fault)?;
+        if rank != comm.rank() {
+            engine.count_rank(&stages);
+        }
+        ranks.push(report);
+    }
+    Ok(ranks)
 }

@@ -58,6 +58,14 @@ pub(crate) fn ranks() -> Result<Arc<dyn Comm>> {
     Ok(Arc::new(SelfComm))
 }
 
+/// What ends one rank often ends all, and the first says it for them: the others wait a moment, in which it ends them too.
+pub(crate) fn give_way() {
+    #[cfg(feature = "mpi")]
+    if WORLD.get().is_some_and(|world| world.rank() > 0) {
+        std::thread::sleep(std::time::Duration::from_secs(1));
+    }
+}
+
 /// Leaves the other processes at the end of a run: in order where it succeeded, else all of them end with this one's exit code.
 pub(crate) fn leave(_code: u8) {
     #[cfg(feature = "mpi")]

@@ -104,8 +104,6 @@ pub fn cloud_distance(
         distance.refresh_faces(slot);
         Ok(())
     })?;
-    for id in 0..set.grid().len() {
-        distance.set_absent(id, farthest);
-    }
+    distance.set_all_absent(farthest);
     Ok(distance)
 }

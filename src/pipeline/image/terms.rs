@@ -91,7 +91,7 @@ pub fn presmooth(
 fn widened(set: &BrickSet, cells: [i64; 3]) -> BrickSet {
     let grid = *set.grid();
     let mut keep = vec![false; grid.len() as usize];
-    for &id in set.ids() {
+    for id in set.ids() {
         let at = grid.coords(id);
         let around = Box3::new(
             std::array::from_fn(|a| (at[a] - cells[a]) * CELL as i64),

@@ -164,7 +164,7 @@ impl<T: Element> Pyramid<T> {
             share.owner(factors.fold(voxel, |voxel, factors| std::array::from_fn(|a| voxel[a] * factors[a])))
         };
         let below: Vec<Box3> = if n == 1 {
-            share.chunks().copied().collect()
+            share.chunks().to_vec()
         } else {
             let own = self.coarser[n - 2].shards.boxes.iter().filter(|shard| owner(n - 1, shard.lo) == share.rank());
             own.flat_map(|shard| shard.tiles(levels[n - 1].chunk_shape())).collect()
@@ -280,6 +280,11 @@ pub(crate) fn visits<'a>(levels: impl IntoIterator<Item = &'a LevelWriter>, thre
         edges.extend([level.shard_shape(), level.chunk_shape()]);
     }
     visits_of(domain, edges, threads)
+}
+
+/// The largest shard of some levels.
+pub(crate) fn largest_shard<'a>(levels: impl IntoIterator<Item = &'a LevelWriter>) -> Option<[i64; 3]> {
+    levels.into_iter().map(LevelWriter::shard_shape).max_by_key(|edge| edge.iter().product::<i64>())
 }
 
 /// Visits of the tiles of a grid of the smallest of some edges, each a multiple of the smaller ones, likewise.

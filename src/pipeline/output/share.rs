@@ -15,14 +15,15 @@ use crate::exec::Comm;
 use crate::grid::Box3;
 use crate::store::Element;
 
-/// Which rank takes which visit.
+/// Which rank takes which visits.
 pub(crate) struct Share<'a> {
     comm: &'a dyn Comm,
-    visits: usize,
-    /// Voxels of a visit along each axis, and the visit of each such box.
+    /// Voxels of a part along each axis, and which part lies in each such box.
     edge: [i64; 3],
-    numbers: HashMap<[i64; 3], usize>,
-    boxes: Vec<Vec<Box3>>,
+    parts: HashMap<[i64; 3], usize>,
+    /// The visits of this rank, and their chunks.
+    own: Range<usize>,
+    chunks: Vec<Box3>,
 }
 
 /// A box of a coarser level that a rank has put together.
@@ -35,25 +36,27 @@ pub(crate) struct Piece<T> {
 }
 
 impl<'a> Share<'a> {
-    /// Shares out visits, which all ranks list alike and of which each makes up a box.
-    pub(crate) fn new(comm: &'a dyn Comm, visits: &[Vec<Box3>]) -> Self {
-        let lo_of =
-            |visit: &[Box3]| visit.iter().map(|part| part.lo).reduce(|a, b| std::array::from_fn(|n| a[n].min(b[n])));
-        let hi_of =
-            |visit: &[Box3]| visit.iter().map(|part| part.hi).reduce(|a, b| std::array::from_fn(|n| a[n].max(b[n])));
-        // The first one begins at the lowest voxel and is no smaller than any other.
-        let edge = visits.first().and_then(|visit| hi_of(visit)).unwrap_or([1; 3]).map(|n| n.max(1));
-        let cell = |lo: [i64; 3]| std::array::from_fn(|a| lo[a] / edge[a]);
-        let numbers = visits.iter().enumerate().filter_map(|(n, visit)| Some((cell(lo_of(visit)?), n))).collect();
-        let mut share = Self { comm, visits: visits.len(), edge, numbers, boxes: Vec::new() };
-        share.boxes = visits[share.own()].to_vec();
-        share
+    /// Shares out visits, which all ranks list alike. Those of a part, a box of `edge` voxels that begins at a multiple of that,
+    /// come one after the other and stay together: it holds whole shards.
+    pub(crate) fn new(comm: &'a dyn Comm, visits: &[Vec<Box3>], edge: [i64; 3]) -> Self {
+        let (mut parts, mut begins) = (HashMap::new(), Vec::new());
+        for (n, visit) in visits.iter().enumerate() {
+            let Some(chunk) = visit.first() else { continue };
+            parts.entry(std::array::from_fn(|a| chunk.lo[a] / edge[a])).or_insert_with(|| {
+                begins.push(n);
+                begins.len() - 1
+            });
+        }
+        let begin = |part: usize| begins.get(part).copied().unwrap_or(visits.len());
+        let (rank, ranks) = (comm.rank(), comm.ranks());
+        let own = begin(begins.len() * rank / ranks)..begin(begins.len() * (rank + 1) / ranks);
+        let chunks = visits[own.clone()].iter().flatten().copied().collect();
+        Self { comm, edge, parts, own, chunks }
     }
 
     /// The visits of this rank.
     pub(crate) fn own(&self) -> Range<usize> {
-        let (rank, ranks) = (self.comm.rank(), self.comm.ranks());
-        self.visits * rank / ranks..self.visits * (rank + 1) / ranks
+        self.own.clone()
     }
 
     /// This rank.
@@ -62,17 +65,17 @@ impl<'a> Share<'a> {
     }
 
     /// The chunks of this rank's visits.
-    pub(crate) fn chunks(&self) -> impl Iterator<Item = &Box3> {
-        self.boxes.iter().flatten()
+    pub(crate) fn chunks(&self) -> &[Box3] {
+        &self.chunks
     }
 
     /// The rank that takes a voxel of the finest level.
     pub(crate) fn owner(&self, voxel: [i64; 3]) -> usize {
         let cell: [i64; 3] = std::array::from_fn(|a| voxel[a] / self.edge[a]);
-        let visit = self.numbers.get(&cell).copied().unwrap_or(0);
-        // Of all ranks the first whose visits end behind it.
+        let part = self.parts.get(&cell).copied().unwrap_or(0);
+        // Of all ranks the first whose parts end behind it.
         let ranks = self.comm.ranks();
-        (0..ranks).find(|rank| visit < self.visits * (rank + 1) / ranks).unwrap_or(ranks - 1)
+        (0..ranks).find(|rank| part < self.parts.len() * (rank + 1) / ranks).unwrap_or(ranks - 1)
     }
 
     /// Sends pieces to the ranks they are for, and returns what has come for this one.

@@ -104,7 +104,7 @@ fn digest(set: &BrickSet) -> u32 {
     let numbers =
         grid.shape().into_iter().chain([grid.edge(), i64::from(set.owned().start), i64::from(set.owned().end)]);
     let start = numbers.fold(0, |sum, number| crc32c::crc32c_append(sum, &number.to_le_bytes()));
-    set.ids().iter().fold(start, |sum, id| crc32c::crc32c_append(sum, &id.to_le_bytes()))
+    set.ids().fold(start, |sum, id| crc32c::crc32c_append(sum, &id.to_le_bytes()))
 }
 
 /// Goes through a file of bricks and checks it.

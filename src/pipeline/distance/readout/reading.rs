@@ -20,7 +20,7 @@ use crate::kernel::distance::features::inside::Inside;
 use crate::kernel::distance::repair::bends::MARGIN;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::schedule::passing::Passed;
-use crate::pipeline::output::pyramid::{visits, visits_of};
+use crate::pipeline::output::pyramid::{largest_shard, visits, visits_of};
 use crate::pipeline::output::saved::in_batches;
 use crate::pipeline::output::share::Share;
 use crate::store::checkpoint::{pack, unpack};
@@ -65,11 +65,13 @@ impl<'a, P: Precision> Reading<'a, P> {
         let (geometry, sets) = (what.geometry, what.sets);
         let images = store.map(|store| Images::<P>::new(engine, geometry, sets, what.wanted, store)).transpose()?;
         let threads = all_threads(engine)?;
-        let visits = match &images {
-            Some(images) => visits(images.finest(), threads),
+        let finest = images.as_ref().map(Images::finest);
+        let visits = match &finest {
+            Some(finest) => visits(finest.iter().copied(), threads),
             None => visits_of(geometry.domain(), LOOK_EDGES.to_vec(), threads),
         };
-        let share = Share::new(engine.comm(), &visits);
+        let part = finest.and_then(largest_shard).unwrap_or(LOOK_EDGES[0]);
+        let share = Share::new(engine.comm(), &visits, part);
         let done = vec![false; visits.len()];
         let progress = Progress { measured: Measured::default(), done, due: Instant::now(), reopened: false };
         Ok(Self {
@@ -90,7 +92,7 @@ impl<'a, P: Precision> Reading<'a, P> {
         let domain = self.what.geometry.domain();
         // Borders look at the voxels beside, each of which is looked at again.
         let around = |part: &Box3| part.grow(MARGIN + 1).intersect(&domain);
-        if self.engine.comm().ranks() == 1 { Vec::new() } else { self.share.chunks().map(around).collect() }
+        if self.engine.comm().ranks() == 1 { Vec::new() } else { self.share.chunks().iter().map(around).collect() }
     }
 
     /// Reads out what was not yet; of several ranks each its share of it.

@@ -1,0 +1,1 @@
+"""Random jobs on several ranks."""
