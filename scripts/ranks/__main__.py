@@ -77,7 +77,8 @@ def job(pick, folder):
     words += ["--brick", str(pick.choice([16, 32, 64])), "--precision", pick.choice(["f16", "f32", "f32", "f64"])]
     for flag, chance in (("--labels", 0.6), ("--closest-point", 0.4), ("--signed", 0.8 if closed else 0)):
         words += [flag] if pick.random() < chance else []
-    words += ["--max-distance", f"{pick.uniform(0.3, 2):.3g}"] if pick.random() < 0.25 else []
+    limited = "front" in words and pick.random() < 0.25
+    words += ["--max-distance", f"{pick.uniform(0.3, 2):.3g}"] if limited else []
     words += ["--ome", "0.4"] if pick.random() < 0.2 else []
     return words
 

@@ -381,6 +381,58 @@ fn the_command_writes_the_same_bytes_on_any_number_of_ranks() {
     }
 }
 
+/// Shards of all levels that lie over the parts of several ranks, more ranks than shards, both versions of OME-Zarr.
+#[test]
+fn shards_are_whole_whoever_writes_them() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(path("a.xyz"), "0 0 0\n1 0.3 0.2\n2.6 1.2 0.1\n0.4 1.4 0.3\n").expect("a file is written");
+    std::fs::write(path("b.xyz"), "2.1 0.2 0.2\n1.3 1.1 0\n").expect("a file is written");
+    for flags in [&["--ome", "0.5"][..], &["--ome", "0.4"], &["--max-distance", "0.2", "--method", "fsm"]] {
+        let write = |ranks: &str| {
+            let out = path(&format!("{ranks}.zarr"));
+            let (a, b) = (path("a.xyz"), path("b.xyz"));
+            let grid = ["--origin=0,0,0", "--shape", "290,150,34", "--spacing", "0.01", "--brick", "32"];
+            let all = ["distance", &a, &b, "-o", &out, "--labels", "--quiet", "--overwrite", "--ranks", ranks];
+            let done = strandline(&[&all[..], &grid, flags].concat());
+            assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+            let verified = strandline(&["verify", &out]);
+            assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+            files(Path::new(&out))
+        };
+        let expected = write("1");
+        for ranks in ["2", "3", "5", "8"] {
+            assert!(write(ranks) == expected, "{flags:?} on {ranks} ranks");
+        }
+    }
+}
+
+/// Processes that a launcher has started together would each do all of the work, where they cannot share it.
+#[test]
+fn a_launcher_of_several_processes_is_noticed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let cloud = folder.path().join("cloud.xyz");
+    std::fs::write(&cloud, "0 0 0\n1 2 3\n").expect("a file is written");
+    let run = |command: &str, variable: &str, processes: &str| {
+        let mut strandline = Command::new(env!("CARGO_BIN_EXE_strandline"));
+        let done = patience::run(
+            strandline.args([command, &cloud.display().to_string(), "-o", "none"]).env(variable, processes),
+        );
+        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
+    };
+    for variable in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"] {
+        let (code, said) = run("reconstruct", variable, "4");
+        assert!(code == Some(2) && said.contains("4 processes") && said.contains(variable), "{code:?} {said}");
+    }
+    #[cfg(not(feature = "mpi"))]
+    {
+        let (code, said) = run("distance", "PMI_SIZE", "2");
+        assert!(code == Some(2) && said.contains("--features mpi"), "{code:?} {said}");
+        let (_, said) = run("distance", "PMI_SIZE", "1");
+        assert!(!said.contains("processes"), "{said}");
+    }
+}
+
 #[test]
 fn numbers_of_ranks_that_make_no_sense_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
