@@ -15,8 +15,8 @@ use crate::error::{Error, Result};
 use crate::grid::{Box3, BrickId, BrickSet, Slot};
 use crate::store::{BoxSource, BrickArray, Element};
 
-/// Bytes of the bricks that a rank asks for at a time, at most, but for one brick.
-const ROUND_BYTES: usize = 32 << 20;
+/// Bytes of the bricks that a rank asks for at a time, at most, but for one brick of each other rank.
+pub const ROUND_BYTES: usize = 8 << 20;
 
 /// Copies of the bricks numbered `wanted` that others own, in order; none where no rank wants any. What was not written there is
 /// `blank`. All ranks do it at the same time, each with numbers of its own.

@@ -18,7 +18,7 @@ mod schedule;
 mod side_by_side;
 mod workers;
 
-pub use borrow::{borrow_bricks, read_with_borrowed};
+pub use borrow::{ROUND_BYTES, borrow_bricks, read_with_borrowed};
 pub use cancel::Cancel;
 pub use comm::launch::{Launched, launched};
 pub use comm::messages::{Comm, RankTraffic, SelfComm};
