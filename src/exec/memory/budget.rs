@@ -18,6 +18,13 @@ const SMALLEST_UNDER_WAY: u64 = SMALLEST_WINDOW / 2;
 const MIB: u64 = 1 << 20;
 
 impl Budget {
+    /// That of one of so many ranks that are threads of one process: the program itself is there once.
+    #[must_use]
+    pub fn share(self, ranks: usize) -> Self {
+        let beyond = self.total.saturating_sub(BASE_BYTES) / ranks.max(1) as u64;
+        Self { total: self.total.min(beyond + BASE_BYTES) }
+    }
+
     /// What is left for mapped pages when `held` bytes must be in memory at the same time.
     ///
     /// # Errors

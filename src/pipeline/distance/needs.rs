@@ -1,7 +1,7 @@
 //! What a distance will take: memory that must be held, temporary fields, time. The job reserves what is told here.
 
 use super::{DistanceSettings, Kept, Schedule, Textbook, Wanted};
-use crate::exec::{Footprint, Plan};
+use crate::exec::{Footprint, Plan, ROUND_BYTES};
 use crate::grid::{BrickGrid, DataSets, Geometry};
 use crate::kernel::distance::repair::descent::remembered_bytes;
 use crate::kernel::distance::seeding::outside::count_outside;
@@ -35,7 +35,7 @@ impl Needs {
 }
 
 /// Bytes of messages that a rank holds at a time: bricks that it lends and borrows, and as much for what waits to be sent.
-const MESSAGE_BYTES: u64 = 3 * (32 << 20);
+const MESSAGE_BYTES: u64 = 3 * ROUND_BYTES as u64;
 
 impl Needs {
     /// The same for one of so many ranks of so many threads, each of which has its part of the fields, and of some bricks of others
@@ -45,16 +45,12 @@ impl Needs {
         if ranks == 1 {
             return self;
         }
-        let footprint = self.footprint.and(Footprint::of_all(MESSAGE_BYTES));
-        let held = footprint.bytes(threads);
         // At the most half of what is read is others'.
-        Self {
-            footprint,
-            held,
-            scratch: 2 * self.scratch.div_ceil(ranks),
-            seconds: self.seconds / ranks as f64,
-            ..self
-        }
+        let scratch = 2 * self.scratch.div_ceil(ranks);
+        let footprint = self.footprint.and(Footprint::of_all(MESSAGE_BYTES.min(2 * scratch)));
+        let held = footprint.bytes(threads);
+        Self { footprint, held, scratch, seconds: self.seconds / ranks as f64, ..self }
+    }
     }
 }
 
