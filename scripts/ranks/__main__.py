@@ -96,7 +96,7 @@ def run(words, folder, name, limit):
     out = folder / name
     shutil.rmtree(out, ignore_errors=True)
     # Said last, so that it is the program's and not mpirun's.
-    line = [*words, "-o", name, "--quiet", "--memory", "1GiB"]
+    line = [*words, "-o", name, "--quiet", "--memory", "2GiB"]
     try:
         done = subprocess.run(line, cwd=folder, capture_output=True, text=True, timeout=limit, check=False)
     except subprocess.TimeoutExpired:

@@ -68,8 +68,11 @@ impl Resources {
     /// machine's, its share of the machine.
     pub(crate) fn share(self, sharing: Sharing, gave: [bool; 2]) -> Self {
         let [gave_memory, gave_threads] = gave;
-        let of = |gave: bool| sharing.process * if gave { 1 } else { sharing.machine };
-        Self { memory: self.memory / of(gave_memory) as u64, threads: (self.threads / of(gave_threads)).max(1), ..self }
+        let of = |gave: bool| if gave { 1 } else { sharing.machine };
+        let memory = self.memory / of(gave_memory) as u64;
+        let memory = Budget { total: memory }.share(sharing.process).total;
+        let threads = (self.threads / (sharing.process * of(gave_threads))).max(1);
+        Self { memory, threads, ..self }
     }
 
     /// An engine that keeps to them. Jobs take what they hold off its window.

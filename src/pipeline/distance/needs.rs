@@ -51,7 +51,6 @@ impl Needs {
         let held = footprint.bytes(threads);
         Self { footprint, held, scratch, seconds: self.seconds / ranks as f64, ..self }
     }
-    }
 }
 
 /// What of a distance goes into a store.
