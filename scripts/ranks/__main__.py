@@ -58,7 +58,7 @@ def box(rng, path):
 
 
 def job(pick, folder):
-    """The arguments of a random distance, whose inputs are made."""
+    """The arguments of a random distance or middle surface, whose inputs are made."""
     rng = np.random.default_rng(pick.getrandbits(32))
     sources = []
     for number in range(pick.randint(1, 4)):
@@ -80,7 +80,16 @@ def job(pick, folder):
     limited = "front" in words and pick.random() < 0.25
     words += ["--max-distance", f"{pick.uniform(0.3, 2):.3g}"] if limited else []
     words += ["--ome", "0.4"] if pick.random() < 0.2 else []
-    return words
+    return as_middle(pick, words) if pick.random() < 0.4 else words
+
+
+def as_middle(pick, words):
+    """The same sources and grid for the surface between them."""
+    kept = [word for word in words if word not in ("--labels", "--signed")]
+    kept[0] = "middle"
+    if sum(word.endswith((".xyz", ".obj")) for word in kept) < 2:
+        kept.insert(1, kept[1])
+    return kept + ["--labels" , pick.choice(["exact", "tracked"])]
 
 
 def files(store):

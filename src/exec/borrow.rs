@@ -36,7 +36,7 @@ pub fn borrow_bricks<T: Element>(
     let grid = *array.set().grid();
     let ownership = Ownership::agreed(comm, array.set())?;
     let set = Arc::new(BrickSet::from_ids(grid, wanted.to_vec()));
-    let borrowed = BrickArray::blank(stage.engine().scratch(), &set, blank)?;
+    let borrowed = BrickArray::blank(stage.scratch(), &set, blank)?;
     let others: Vec<usize> = (0..comm.ranks()).filter(|&rank| rank != comm.rank()).collect();
     // All others may ask one rank.
     let at_a_time = (ROUND_BYTES / others.len().max(1) / (grid.brick_len() * size_of::<T>())).max(1);

@@ -353,6 +353,12 @@ impl<'a> Stage<'a> {
         self.engine.threads()
     }
 
+    /// Where fields are stored.
+    #[must_use]
+    pub fn scratch(&self) -> &'a Scratch {
+        self.engine.scratch()
+    }
+
     /// Where the stage puts by what it solves, if it is resumable and the run does so. Asked for by what solves, at its start.
     #[must_use]
     pub fn save_point(&self) -> Option<SavePoint<'a>> {

@@ -1,7 +1,9 @@
 //! `Box3`: a half-open box of voxel indices. Knows nothing of spacing or data.
 
+use serde::{Deserialize, Serialize};
+
 /// A half-open box of voxels, `lo <= index < hi`, triples in `[x, y, z]` order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Box3 {
     /// The first voxel.
     pub lo: [i64; 3],

@@ -122,6 +122,7 @@ pub(crate) fn sources_help() -> String {
 }
 
 /// What `middle` asks for beside the distance.
+#[derive(Clone, Debug)]
 pub(crate) struct MiddleChoice {
     pub(crate) surface: SurfaceKind,
     pub(crate) labels: LabelMode,

@@ -29,7 +29,7 @@ use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, place, triple};
 use crate::cli::terminal::world;
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Comm, Engine, Plan, Progress, SelfComm, as_threads};
+use crate::exec::{Budget, Cancel, Comm, Engine, Plan, Progress, as_threads};
 use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::write::formats::Values;
 use crate::io::ome_zarr::StoreWriter;
@@ -77,14 +77,11 @@ fn begin(mut args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[Strin
         return Ok(());
     }
     settings::check_ranks(args.job.ranks)?;
-    if middle.is_some() {
-        return Job::new(args, middle, typed, Arc::new(SelfComm))?.run_precise();
-    }
     let comm = world::ranks()?;
     if args.job.ranks == 1 || comm.ranks() > 1 {
-        return Job::new(args, None, typed, comm)?.run_precise();
+        return Job::new(args, middle, typed, comm)?.run_precise();
     }
-    as_threads(args.job.ranks, |comm| Job::new(args.clone(), None, typed, comm)?.run_precise()).map(drop)
+    as_threads(args.job.ranks, |comm| Job::new(args.clone(), middle.clone(), typed, comm)?.run_precise()).map(drop)
 }
 
 impl Job {
@@ -103,10 +100,8 @@ impl Job {
         outputs.check()?;
         mesh.as_deref().map(mesh_format).transpose()?;
         let resources = settings::resources(&args.job.resources, args.job.output.store())?;
-        let resources = resources.share(
-            sharing(&args, middle.is_some()),
-            [args.job.resources.memory.is_some(), args.job.resources.threads.is_some()],
-        );
+        let resources = resources
+            .share(sharing(&args), [args.job.resources.memory.is_some(), args.job.resources.threads.is_some()]);
         // The first rank speaks for all.
         let voice = if comm.rank() == 0 { Voice::of_run(&args.job.output) } else { Voice::Quiet };
         let console = Arc::new(Console::new(voice));
@@ -157,7 +152,7 @@ impl Job {
         }
         self.console.say(&plan);
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
-        let engine = engine.with_ranks(self.ranks_inside()).as_rank(self.comm.clone());
+        let engine = engine.as_rank(self.comm.clone());
         let saving = if self.comm.ranks() == 1 {
             save_points(&self.args.job.output, &self.typed, self.console.as_ref())?
         } else {
@@ -181,14 +176,16 @@ impl Job {
 
     fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {
         let output = &self.args.job.output;
-        let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref());
+        // The first rank alone puts surfaces together.
+        let is_first = self.comm.rank() == 0;
+        let mesh = self.middle.as_ref().and_then(|choice| choice.mesh.as_deref()).filter(|_| is_first);
         let (store, telling) = begin_store_on_ranks(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
         let replace = output.overwrite;
         let thickness = Values { name: "thickness", at: None };
         let values = Some(&thickness);
         let to = mesh.map(|path| ToFile { path, scratch, is_tagged: true, is_copy, replace, values });
-        let has_surface = self.middle.is_some();
+        let has_surface = self.middle.is_some() && is_first;
         let mut drawing = Drawing::new(store.as_ref().filter(|_| has_surface), to, &self.geometry, true)?;
         let found = self.solve::<P>(engine, store.as_ref(), &mut drawing)?;
         let ranks = gather_ranks(engine)?;
@@ -235,19 +232,13 @@ impl Job {
         Some(MiddleSettings { distance: self.settings, surface, labels })
     }
 
-    /// Ranks that share stages inside of this process.
-    fn ranks_inside(&self) -> usize {
-        if self.middle.is_some() { self.args.job.ranks } else { 1 }
-    }
-
     /// What this rank takes.
     fn needs<P: Precision>(&self, threads: usize) -> Needs {
         let writes = self.args.job.output.store().is_some();
-        let shared = [threads, self.ranks_inside()];
-        if let Some(middle) = self.middle_settings() {
-            return middle.needs::<P>(&self.geometry, &self.sets, shared[0], shared[1], writes);
-        }
-        let needs = self.settings.needs::<P>(&self.geometry, &self.sets, shared, self.writes());
+        let needs = match self.middle_settings() {
+            Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, 1, writes),
+            None => self.settings.needs::<P>(&self.geometry, &self.sets, [threads, 1], self.writes()),
+        };
         needs.of_rank(self.comm.ranks() as u64, threads as u64)
     }
 
@@ -361,10 +352,10 @@ impl Job {
     }
 }
 
-/// How many ranks share this process or this machine, and what they may use.
-fn sharing(args: &DistanceJobArgs, is_middle: bool) -> Sharing {
-    let threads = if is_middle { 1 } else { args.job.ranks };
-    Sharing { machine: world::on_this_machine(), process: if world::on_this_machine() > 1 { 1 } else { threads } }
+/// How many ranks share this process or this machine.
+fn sharing(args: &DistanceJobArgs) -> Sharing {
+    let machine = world::on_this_machine();
+    Sharing { machine, process: if machine > 1 { 1 } else { args.job.ranks } }
 }
 
 /// The settings that the flags mean.

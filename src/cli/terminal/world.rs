@@ -17,13 +17,12 @@ pub(crate) fn check(command: &Command) -> Result<()> {
     let (processes, variable) = (launched.processes, launched.variable);
     let name = match command {
         Command::Segment(_) => "segment",
-        Command::Middle(_) => "middle",
         Command::Reconstruct(_) => "reconstruct",
         Command::Batch(_) => "batch",
         Command::Demo(_) => "demo",
         Command::Convert(_) => "convert",
-        Command::Distance(_) if cfg!(feature = "mpi") => return Ok(()),
-        Command::Distance(_) => {
+        Command::Distance(_) | Command::Middle(_) if cfg!(feature = "mpi") => return Ok(()),
+        Command::Distance(_) | Command::Middle(_) => {
             return Err(Error::usage(format!(
                 "{processes} processes were started together ({variable}), but this build knows no MPI: each would do all of the work and \
                  write over the others; build it with --features mpi, or start it once"

@@ -18,6 +18,7 @@ mod solving;
 use std::sync::Arc;
 
 pub use checks::{check_iterations, outside_note, without_inside};
+pub(crate) use job::solve_sets_watched;
 pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets};
 pub(crate) use needs::tree_bytes;
 pub use needs::{Needs, Writes};

@@ -92,17 +92,16 @@ impl<P: Precision> DistanceWithSource<P> for Corrected<'_, P> {
     }
 }
 
-/// A solved distance with the sources of the wrong label replaced by the nearest.
+/// A solved distance with the sources of the wrong label replaced by the nearest, in the bricks that are read.
 ///
 /// # Errors
 /// When what is remembered does not fit the memory, or the run is interrupted.
 pub(super) fn with_exact_labels<'a, P: Precision>(
     stage: &Stage<'_>,
     exact: &ExactLabels<'_>,
-    grid: &BrickGrid,
+    (grid, bricks): (&BrickGrid, Vec<BrickId>),
     solved: Solved<'a, P>,
 ) -> Result<Solved<'a, P>> {
-    let bricks: Vec<BrickId> = (0..grid.len()).collect();
     let workers = Workers::new(Vec::new);
     let changes = stage.run(&bricks, &workers, |sources, &id| {
         let part = grid.brick_box(id);

@@ -4,18 +4,21 @@
 use super::exact::with_exact_labels;
 use super::settings::{LabelMode, MiddleSettings};
 use super::surface::SurfaceKind;
-use super::surface::{Drawing, Labelled, draw};
+use super::surface::{Boxes, Drawing, Labelled, draw};
 use super::table::csv;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
-use crate::grid::{DataSets, Geometry};
+use crate::grid::{Box3, BrickGrid, BrickId, DataSets, Geometry};
 use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::distance::features::exact_labels::ExactLabels;
 use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_trees::SourceTrees;
+use crate::kernel::distance::repair::bends::MARGIN;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::surface::{Measures, Pair};
-use crate::pipeline::distance::{DistanceFound, DistanceSettings, Kept, ReadOut, Reading, Wanted, solve_sets};
+use crate::pipeline::distance::{
+    DistanceFound, DistanceSettings, Kept, ReadOut, Reading, Reads, Wanted, solve_sets_watched,
+};
 use crate::store::MeshSink;
 
 /// What a job found.
@@ -59,43 +62,62 @@ pub fn middle_kept<P: Precision>(
     mesh: &mut dyn MeshSink,
 ) -> Result<MiddleFound> {
     check_sets(sets, settings.surface)?;
+    let comm = engine.comm();
     let needs = settings.needs::<P>(geometry, sets, engine.threads(), engine.ranks(), store.is_some());
+    let needs = needs.of_rank(comm.ranks() as u64, engine.threads() as u64);
     let held = engine.reserve(needs.footprint)?;
     let lent = held.lend(needs.later);
     let Drawing { stated, .. } = Drawing::new(geometry, sets, engine.threads());
     let distance = DistanceSettings { labels: true, ..settings.distance };
     let trees = SourceTrees::new(sets);
-    solve_sets::<P, _>(engine, geometry, sets, Some(&trees), &distance, |mut solved, set| {
+    let wanted = Wanted { labels: true, borders: store.is_some(), closest_point: distance.closest_point };
+    let read_out = ReadOut { geometry, sets, is_signed: distance.signed, wanted, kept };
+    let reading = Reading::new(read_out, engine, store)?;
+    let boxes = Boxes::new(geometry, comm);
+    let grid = BrickGrid::new(geometry.shape, distance.brick);
+    let bricks = if comm.ranks() == 1 { (0..grid.len()).collect() } else { bricks_read(&grid, &reading, &boxes) };
+    // Whole bricks are made exact, of voxels each of which is looked at again.
+    let around = |id: &BrickId| grid.brick_box(*id).grow(MARGIN).intersect(&geometry.domain());
+    let reads: Vec<Box3> = if comm.ranks() == 1 { Vec::new() } else { bricks.iter().map(around).collect() };
+    let reads = Reads { early: None, boxes: &reads };
+    solve_sets_watched::<P, _>(engine, geometry, sets, Some(&trees), (&distance, reads), |mut solved, set| {
         drop(lent);
         let shapes = LabelledShapes::new(sets);
         if settings.labels == LabelMode::Exact {
             let stage = engine.stage("exact labels", 0);
             stage.voxels(geometry.domain().volume());
             let exact = ExactLabels { geometry, shapes: &shapes, trees: &trees };
-            solved = with_exact_labels(&stage, &exact, set.grid(), solved)?;
+            solved = with_exact_labels(&stage, &exact, (set.grid(), bricks), solved)?;
             stage.finish();
         }
         let stage = engine.stage("surface", 0);
         stage.voxels(geometry.domain().volume());
         let first_labels = std::array::from_fn(|n| sets.labels().get(n).copied().unwrap_or(0));
         let labelled = Labelled { geometry, shapes: &shapes, trees: &trees, sources: &*solved.sources, first_labels };
-        let (measures, pairs) = draw(&stage, &labelled, settings.surface, stated, mesh)?;
+        let (measures, pairs) = draw(&stage, &labelled, &boxes, (settings.surface, stated), mesh)?;
         stage.finish();
-        if measures.triangles == 0 {
+        if measures.triangles == 0 && comm.rank() == 0 {
             return Err(Error::vanished(
                 "no surface lies between the data sets in this grid: one of them is the nearest everywhere, or --max-distance is \
                  less than half of what lies between them; give a grid that reaches others, or a larger distance",
             ));
         }
-        let wanted = Wanted { labels: true, borders: store.is_some(), closest_point: distance.closest_point };
-        let read_out = ReadOut { geometry, sets, is_signed: distance.signed, wanted, kept };
-        let found = Reading::new(read_out, engine, store)?.finish(&solved)?;
-        if let Some(store) = store {
+        let found = reading.finish(&solved)?;
+        if let Some(store) = store.filter(|_| comm.rank() == 0) {
             let path = store.file("meshes/pairs.csv")?;
             std::fs::write(&path, csv(&pairs)).map_err(|e| Error::from_io("cannot write the table", &e).at(&path))?;
         }
         Ok(MiddleFound { distance: found, measures, pairs })
     })
+}
+
+/// The bricks whose voxels are written or drawn by this rank, or lie beside those, in order.
+fn bricks_read<P: Precision>(grid: &BrickGrid, reading: &Reading<'_, P>, boxes: &Boxes) -> Vec<BrickId> {
+    let parts = reading.reads().into_iter().chain(boxes.reads());
+    let mut bricks: Vec<BrickId> = parts.flat_map(|part| grid.bricks_in(&part)).collect();
+    bricks.sort_unstable();
+    bricks.dedup();
+    bricks
 }
 
 /// Refuses data sets between which no such surface lies.

@@ -5,6 +5,7 @@
 //! sources -> distance with tracking -> labels -> surfaces between them -> mesh, measures of each pair
 //! ```
 
+mod assembled;
 mod crowded;
 mod exact;
 mod job;

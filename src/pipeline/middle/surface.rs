@@ -1,19 +1,21 @@
 //! Draws the surfaces between labels brick by brick, welded in grid order, and measures them.
 
+use std::ops::Range;
+
+use super::assembled::{Takes, Whole, send};
 use super::crowded::Crowded;
 use crate::error::Result;
-use crate::exec::{Footprint, Stage, Workers};
+use crate::exec::{Comm, Footprint, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId, DataSets, Geometry};
 use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::image::labels;
 use crate::kernel::surface::{
-    Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Pairs, Patch, SurfaceMeasure, TaggedPatch, Welder,
-    cells_of_brick,
+    Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Patch, TaggedPatch, cells_of_brick,
 };
 use crate::pipeline::output::drawn::{Drawn, STATED, Wave};
-use crate::store::{BoxSource, MeshSink};
+use crate::store::{BoxSource, MeshSink, Spill};
 
 /// Edge of the boxes that the surface is drawn in, whatever the bricks are: so these do not tell the order of vertices.
 const EDGE: i64 = 32;
@@ -73,20 +75,61 @@ struct Worker {
     labels: Vec<u32>,
 }
 
+/// The boxes that the surface is drawn in, and which of them this rank draws: a run of them, so that in order of ranks they are in
+/// grid order.
+pub(super) struct Boxes {
+    grid: BrickGrid,
+    own: Range<BrickId>,
+}
+
+impl Boxes {
+    /// Of one of the ranks of `comm`.
+    pub(super) fn new(geometry: &Geometry, comm: &dyn Comm) -> Self {
+        let grid = BrickGrid::new(geometry.shape, EDGE);
+        let cut = |rank: usize| grid.len() * rank as u64 / comm.ranks() as u64;
+        Self { grid, own: cut(comm.rank())..cut(comm.rank() + 1) }
+    }
+
+    /// What drawing this rank's boxes reads.
+    pub(super) fn reads(&self) -> impl Iterator<Item = Box3> {
+        let domain = Box3::from_shape(self.grid.shape());
+        self.own.clone().map(move |id| self.grid.brick_box(id).grow(2).intersect(&domain))
+    }
+}
+
 /// Sends the surfaces between labels to `sink`, where so many bytes were stated for that; measures all of them, and each
-/// pair.
+/// pair. Of several ranks each draws its boxes, and the first puts the patches of all together, in their order: it alone has
+/// something to send and to tell.
 pub(super) fn draw(
     stage: &Stage<'_>,
     labelled: &Labelled<'_>,
-    kind: SurfaceKind,
-    stated: u64,
+    boxes: &Boxes,
+    (kind, stated): (SurfaceKind, u64),
     sink: &mut dyn MeshSink,
 ) -> Result<(Measures, Vec<Pair>)> {
-    let geometry = labelled.geometry;
-    let (lo, hi) = (geometry.origin, geometry.position(geometry.shape));
-    let mut measure = SurfaceMeasure::new(std::array::from_fn(|a| 0.5 * (lo[a] + hi[a])));
-    let (mut welder, mut pairs) = (Welder::new(geometry), Pairs::default());
-    let grid = BrickGrid::new(geometry.shape, EDGE);
+    let comm = stage.comm();
+    let mut whole = Whole::new(labelled.geometry, sink);
+    if comm.rank() == 0 {
+        draw_own(stage, labelled, boxes, (kind, stated), &mut whole)?;
+        for rank in 1..comm.ranks() {
+            whole.take_from(comm, rank)?;
+        }
+    } else {
+        let mut spill = Spill::new(stage.scratch().dir())?;
+        draw_own(stage, labelled, boxes, (kind, stated), &mut spill)?;
+        send(comm, spill.read_back()?)?;
+    }
+    Ok((whole.measure.measures(), whole.pairs.finish()))
+}
+
+/// Draws this rank's boxes.
+fn draw_own(
+    stage: &Stage<'_>,
+    labelled: &Labelled<'_>,
+    boxes: &Boxes,
+    (kind, stated): (SurfaceKind, u64),
+    to: &mut dyn Takes,
+) -> Result<()> {
     let make = || Worker {
         interfaces: Interfaces::default(),
         nearby: Nearby::default(),
@@ -94,34 +137,28 @@ pub(super) fn draw(
         sources: Vec::new(),
         labels: Vec::new(),
     };
-    let (workers, with_gaps) = (Workers::new(make), sink.keeps_values());
-    let bricks: Vec<BrickId> = (0..grid.len()).collect();
+    let (workers, with_gaps) = (Workers::new(make), to.wants_gaps());
+    let bricks: Vec<BrickId> = boxes.own.clone().collect();
     let (mut drawn, mut left) = (Drawn::new(stage, stated), bricks.as_slice());
     while !left.is_empty() {
         let batch;
         (batch, left) = left.split_at(drawn.next().min(left.len()));
         let patches = stage.run(batch, &workers, |worker, &id| {
-            let patch = worker.patch(labelled, &grid.brick_box(id), kind)?;
+            let patch = worker.patch(labelled, &boxes.grid.brick_box(id), kind)?;
             let gaps = if with_gaps { labelled.gaps(&patch.patch) } else { Vec::new() };
             Ok((patch, gaps))
         })?;
-        for (patch, gaps) in patches.iter().filter(|(patch, _)| !patch.patch.triangles.is_empty()) {
-            welder.add_valued(&patch.patch, gaps, sink)?;
-            for (n, (corners, positions)) in welder.triangles_of(&patch.patch).enumerate() {
-                measure.add(corners, positions);
-                let distances = patch.patch.triangles[n].map(|vertex| patch.distances[vertex as usize]);
-                pairs.add(patch.patch.pairs[n], positions, distances);
-            }
-        }
+        patches.iter().filter(|(patch, _)| !patch.patch.triangles.is_empty()).try_for_each(|patch| to.take(patch))?;
+        let (last, tables) = to.holds();
         drawn.took(&Wave {
             patches: &patches.iter().map(|(patch, gaps)| patch.bytes() + 8 * gaps.len() as u64).collect::<Vec<_>>(),
             buffers: &workers.idle(Worker::bytes),
-            last: welder.bytes_of_last(),
-            tables: &[welder.tables().as_slice(), &measure.tables()].concat(),
+            last,
+            tables: &tables,
             left: left.len(),
         })?;
     }
-    Ok((measure.measures(), pairs.finish()))
+    Ok(())
 }
 
 impl Labelled<'_> {

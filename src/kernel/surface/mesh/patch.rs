@@ -1,10 +1,12 @@
 //! `Patch`: a piece of a mesh, as one brick gives it.
 
+use serde::{Deserialize, Serialize};
+
 use super::vertex_key::VertexKey;
 use crate::grid::Box3;
 
 /// The surface inside the cells of one brick.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Patch {
     /// The cells that were walked, by their lowest corners.
     pub cells: Box3,

@@ -4,6 +4,8 @@
 //! centres, and places on the edges between these; a vertex is named by its corners, in halves of voxels, where a corner
 //! on an edge counts as the edge's middle. A cell is cut such that no two of its edges have one middle.
 
+use serde::{Deserialize, Serialize};
+
 /// How far, in halves of voxels, corners of one cell are apart at most.
 const REACH: i64 = 2;
 /// Offsets along one axis.
@@ -12,7 +14,7 @@ const OFFSETS: i64 = 2 * REACH + 1;
 const STEP_BITS: u32 = 7;
 
 /// The name of a vertex, for domains of up to 2^30 voxels along an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct VertexKey {
     /// The first corner, `[z, y, x]` in halves of voxels.
     first: [i32; 3],

@@ -6,6 +6,8 @@
 //! edge of the mesh has two facets, and three along the lines where three labels meet. Neighbouring cells cut their
 //! common face alike: no gaps, across bricks too.
 
+use serde::{Deserialize, Serialize};
+
 use std::collections::HashMap;
 
 use glam::DVec3;
@@ -23,7 +25,7 @@ use crate::kernel::surface::mesh::patch::Patch;
 use crate::kernel::surface::mesh::vertex_key::VertexKey;
 
 /// The surfaces inside the cells of one brick.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct TaggedPatch {
     /// The mesh with its pairs of labels; triangles are counter-clockwise as seen from the side of the larger label.
     pub patch: Patch,

@@ -1,0 +1,109 @@
+//! The surfaces between labels put together of patches in the order of their boxes, also of patches that other ranks have drawn:
+//! these wait on the disk until it is their rank's turn.
+
+use crate::error::{Error, Result};
+use crate::exec::Comm;
+use crate::grid::Geometry;
+use crate::kernel::surface::{Growing, Pairs, SurfaceMeasure, TaggedPatch, Welder};
+use crate::store::checkpoint::{pack, unpack};
+use crate::store::{MeshSink, Spill, Spilled};
+
+/// A patch, and how wide the gap is at each of its vertices, where somebody wants to know.
+pub(super) type MadePatch = (TaggedPatch, Vec<f64>);
+
+/// Who takes patches in their order.
+pub(super) trait Takes {
+    fn wants_gaps(&self) -> bool;
+    fn take(&mut self, patch: &MadePatch) -> Result<()>;
+    /// Bytes of what is known of the last patch, and the tables of all.
+    fn holds(&self) -> (u64, Vec<Growing>);
+}
+
+/// The whole surface.
+pub(super) struct Whole<'s> {
+    welder: Welder,
+    pub(super) measure: SurfaceMeasure,
+    pub(super) pairs: Pairs,
+    sink: &'s mut dyn MeshSink,
+}
+
+impl<'s> Whole<'s> {
+    pub(super) fn new(geometry: &Geometry, sink: &'s mut dyn MeshSink) -> Self {
+        let (lo, hi) = (geometry.origin, geometry.position(geometry.shape));
+        let measure = SurfaceMeasure::new(std::array::from_fn(|a| 0.5 * (lo[a] + hi[a])));
+        Self { welder: Welder::new(geometry), measure, pairs: Pairs::default(), sink }
+    }
+
+    /// Takes what another rank has drawn, some patches at a time.
+    pub(super) fn take_from(&mut self, comm: &dyn Comm, rank: usize) -> Result<()> {
+        loop {
+            let message = comm.exchange(&[rank], vec![Vec::new()])?.concat();
+            let patches: Vec<MadePatch> = unpack(&message).map_err(|error| told_wrongly(&error))?;
+            if patches.is_empty() {
+                return Ok(());
+            }
+            patches.iter().try_for_each(|patch| self.take(patch))?;
+        }
+    }
+}
+
+impl Takes for Whole<'_> {
+    fn wants_gaps(&self) -> bool {
+        self.sink.keeps_values()
+    }
+
+    fn take(&mut self, (patch, gaps): &MadePatch) -> Result<()> {
+        self.welder.add_valued(&patch.patch, gaps, self.sink)?;
+        for (n, (corners, positions)) in self.welder.triangles_of(&patch.patch).enumerate() {
+            self.measure.add(corners, positions);
+            let distances = patch.patch.triangles[n].map(|vertex| patch.distances[vertex as usize]);
+            self.pairs.add(patch.patch.pairs[n], positions, distances);
+        }
+        Ok(())
+    }
+
+    fn holds(&self) -> (u64, Vec<Growing>) {
+        (self.welder.bytes_of_last(), [self.welder.tables().as_slice(), &self.measure.tables()].concat())
+    }
+}
+
+/// Patches wait on the disk until it is this rank's turn.
+impl Takes for Spill {
+    /// The first rank may write them.
+    fn wants_gaps(&self) -> bool {
+        true
+    }
+
+    fn take(&mut self, patch: &MadePatch) -> Result<()> {
+        self.put(&pack(patch).map_err(|error| told_wrongly(&error))?)
+    }
+
+    fn holds(&self) -> (u64, Vec<Growing>) {
+        (0, Vec::new())
+    }
+}
+
+/// Bytes of patches that travel at a time, at most, but for one patch.
+const MESSAGE: usize = 4 << 20;
+
+/// Sends patches to the first rank, some at a time, and at last none.
+pub(super) fn send(comm: &dyn Comm, mut spilled: Spilled) -> Result<()> {
+    let mut next = spilled.take()?;
+    loop {
+        // A list of records is packed as its length and they.
+        let (mut records, mut bytes) = (Vec::new(), 0);
+        while let Some(record) = next.take_if(|record| records.is_empty() || bytes + record.len() <= MESSAGE) {
+            bytes += record.len();
+            records.push(unpack::<MadePatch>(&record).map_err(|error| told_wrongly(&error))?);
+            next = spilled.take()?;
+        }
+        comm.exchange(&[0], vec![pack(&records).map_err(|error| told_wrongly(&error))?])?;
+        if records.is_empty() {
+            return Ok(());
+        }
+    }
+}
+
+fn told_wrongly(error: &std::io::Error) -> Error {
+    Error::failed(format!("what a rank has drawn cannot be told: {error}"))
+}
