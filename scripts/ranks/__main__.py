@@ -85,7 +85,7 @@ def job(pick, folder):
 
 def as_middle(pick, words):
     """The same sources and grid for the surface between them."""
-    kept = [word for word in words if word not in ("--labels", "--signed")]
+    kept = [word for word in words if word not in ("--labels", "--signed", "--closest-point")]
     kept[0] = "middle"
     if sum(word.endswith((".xyz", ".obj")) for word in kept) < 2:
         kept.insert(1, kept[1])
