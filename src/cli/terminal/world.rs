@@ -61,7 +61,7 @@ pub(crate) fn ranks() -> Result<Arc<dyn Comm>> {
 pub(crate) fn give_way() {
     #[cfg(feature = "mpi")]
     if WORLD.get().is_some_and(|world| world.rank() > 0) {
-        std::thread::sleep(std::time::Duration::from_secs(1));
+        std::thread::sleep(std::time::Duration::from_secs(4));
     }
 }
 
