@@ -316,6 +316,39 @@ fn exact_labels_have_no_error() {
     assert!(changed > 0, "no label was wrong");
 }
 
+/// Beyond the farthest distance no voxel has a label, however these are told, and within it each has the one that it has
+/// without a limit.
+#[test]
+fn exact_labels_end_at_the_farthest_distance() {
+    let geometry = Geometry { shape: [33, 40, 25], spacing: [0.05, 0.04, 0.06], origin: [-0.1; 3], unit: None };
+    let mut sets = DataSets::default();
+    for n in 0..3 {
+        sets.add_cloud(&random_cloud(&geometry, 8, 40 + n));
+    }
+    sets.add_mesh(&meshes::cuboid([0.303, 0.507, 0.211], [0.491, 0.603, 0.397]));
+    let limit = 0.23;
+    let with = |labels, farthest| {
+        let settings = settings(Method::VDT, SurfaceKind::Exact, labels, 16);
+        let distance = DistanceSettings { farthest, ..settings.distance };
+        fields_of(&geometry, &sets, &MiddleSettings { distance, ..settings })
+    };
+    let [distances, all, _] = with(LabelMode::Exact, None);
+    let [limited, exact, border] = with(LabelMode::Exact, Some(limit));
+    let [_, tracked, _] = with(LabelMode::Tracked, Some(limit));
+    let mut beyond = 0;
+    for n in 0..all.len() {
+        // Where rounding decides whether a voxel lies within it may.
+        if (distances[n] - limit).abs() > 1e-6 {
+            assert_eq!(exact[n], if distances[n] < limit { all[n] } else { 0.0 }, "{} off", distances[n]);
+            assert_eq!(exact[n] == 0.0, tracked[n] == 0.0, "{} off", distances[n]);
+            assert!((limited[n] - distances[n].min(limit)).abs() < 1e-6);
+            beyond += usize::from(exact[n] == 0.0);
+        }
+    }
+    assert!(beyond > all.len() / 10 && beyond < all.len() * 9 / 10, "{beyond} of {}", all.len());
+    check_border(&geometry, &exact, &border);
+}
+
 /// Dense points, whose cells are thin needles where labels meet (a corner of Experiment 5): the front's labels are looked
 /// up closer and have none wrong, the textbook's sweeps have some.
 #[test]

@@ -103,6 +103,8 @@ pub(super) fn with_exact_labels<'a, P: Precision>(
     solved: Solved<'a, P>,
 ) -> Result<Solved<'a, P>> {
     let workers = Workers::new(Vec::new);
+    // As of tracked sources: what is at the limit is beyond it.
+    let limit = P::from_f64(exact.farthest);
     let changes = stage.run(&bricks, &workers, |sources, &id| {
         let part = grid.brick_box(id);
         sources.resize(part.len(), 0);
@@ -111,7 +113,8 @@ pub(super) fn with_exact_labels<'a, P: Precision>(
             let distance = exact.shapes.distance(exact.geometry.position(voxel), source);
             Change { voxel, source, distance }
         };
-        Ok(exact.corrections(&part, sources).into_iter().map(change).collect::<Vec<_>>())
+        let counts = |change: &Change| P::from_f64(change.distance) < limit;
+        Ok(exact.corrections(&part, sources).into_iter().map(change).filter(counts).collect::<Vec<_>>())
     })?;
     let bytes = changes.iter().map(|changes| (changes.capacity() * size_of::<Change>()) as u64).sum();
     let held = stage.hold(bytes)?;

@@ -86,7 +86,8 @@ pub fn middle_kept<P: Precision>(
         if settings.labels == LabelMode::Exact {
             let stage = engine.stage("exact labels", 0);
             stage.voxels(geometry.domain().volume());
-            let exact = ExactLabels { geometry, shapes: &shapes, trees: &trees };
+            let farthest = distance.farthest.unwrap_or(f64::INFINITY);
+            let exact = ExactLabels { geometry, shapes: &shapes, trees: &trees, farthest };
             solved = with_exact_labels(&stage, &exact, (set.grid(), bricks), solved)?;
             stage.finish();
         }

@@ -44,6 +44,13 @@ impl Around {
         Self { half: std::array::from_fn(larger), ..within }
     }
 
+    /// How near to some place in the box a source can be when the one nearest to the middle is at that squared distance.
+    #[must_use]
+    pub fn least(&self, nearest_squared: f64) -> f64 {
+        let reach = self.half.iter().map(|h| h * h).sum::<f64>().sqrt();
+        nearest_squared.sqrt() * (1.0 - ROUNDING) - reach
+    }
+
     /// How far from the middle a source can be that is nearest to some place in the box, squared, when the one nearest to
     /// the middle is at that squared distance.
     #[must_use]
@@ -66,14 +73,15 @@ impl Culling {
         (self.closest.capacity() * size_of::<([f64; 3], f64)>()) as u64
     }
 
-    /// Appends those of the candidates from `first` on that can be the nearest of them to a place in a box.
+    /// Appends those of the candidates from `first` on that can be the nearest of them to a place in a box. Returns how far the
+    /// nearest is from the box's middle, squared; infinite where there is none.
     pub fn keep(
         &mut self,
         shapes: &LabelledShapes<'_>,
         around: &Around,
         candidates: &mut Vec<Candidate>,
         first: usize,
-    ) {
+    ) -> f64 {
         let Around { middle, half } = *around;
         let squared = |point: [f64; 3]| (0..3).map(|a| (middle[a] - point[a]).powi(2)).sum::<f64>();
         self.closest.clear();
@@ -81,7 +89,9 @@ impl Culling {
             let point = shapes.closest(middle, source);
             (point, squared(point))
         }));
-        let Some(&(nearest, least)) = self.closest.iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return };
+        let Some(&(nearest, least)) = self.closest.iter().min_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return f64::INFINITY;
+        };
         let reach_squared = half.iter().map(|h| h * h).sum::<f64>();
         for (n, (point, squared)) in self.closest.iter().enumerate() {
             let candidate = candidates[first + n];
@@ -91,6 +101,7 @@ impl Culling {
                 candidates.push(candidate);
             }
         }
+        least
     }
 }
 
@@ -122,7 +133,7 @@ mod tests {
             let all: Vec<Candidate> = (0..10).map(|source| (source, shapes.label(source))).collect();
             let mut candidates = all.clone();
             let around = Around { middle, half };
-            Culling::default().keep(&shapes, &around, &mut candidates, 0);
+            let least = around.least(Culling::default().keep(&shapes, &around, &mut candidates, 0));
             let squared = |here, source| shapes.distance_squared(here, source);
             let nearest = |here: [f64; 3]| (0..10).min_by(|a, b| squared(here, *a).total_cmp(&squared(here, *b))).unwrap();
             let limit = around.limit(squared(middle, nearest(middle)));
@@ -130,6 +141,8 @@ mod tests {
                 let source = nearest(std::array::from_fn(|a| middle[a] + part[a] * half[a]));
                 prop_assert!(candidates[10..].contains(&all[source as usize]), "{source} is missing");
                 prop_assert!(squared(middle, source) <= limit);
+                let here: [f64; 3] = std::array::from_fn(|a| middle[a] + part[a] * half[a]);
+                prop_assert!(least <= squared(here, source).sqrt());
             }
         }
     }

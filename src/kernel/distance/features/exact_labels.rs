@@ -18,6 +18,8 @@ pub struct ExactLabels<'a> {
     pub shapes: &'a LabelledShapes<'a>,
     /// The same, sorted.
     pub trees: &'a SourceTrees,
+    /// Voxels that are farther from all of them have no label. Physical.
+    pub farthest: f64,
 }
 
 /// Work buffers.
@@ -29,7 +31,8 @@ struct Work {
 
 impl ExactLabels<'_> {
     /// The voxels of a box whose sources, dense over it, have a label that is not the nearest; each with its nearest
-    /// source. Of equal distances the lower label wins, then the lower source.
+    /// source. Of equal distances the lower label wins, then the lower source. Where all of a part of the box is farther away
+    /// than counts, nothing is looked for; of other parts some voxels beyond may be among them.
     #[must_use]
     pub fn corrections(&self, part: &Box3, sources: &[u32]) -> Vec<([i64; 3], u32)> {
         let mut found = Vec::new();
@@ -58,7 +61,11 @@ impl ExactLabels<'_> {
             let nearest = self.nearest(part.lo, &work.candidates[first..]);
             return nearest.into_iter().for_each(|nearest| report(part, &[nearest]));
         }
-        work.culling.keep(self.shapes, &Around::centres(self.geometry, part), &mut work.candidates, first);
+        let around = Around::centres(self.geometry, part);
+        let nearest = work.culling.keep(self.shapes, &around, &mut work.candidates, first);
+        if around.least(nearest) > self.farthest {
+            return work.candidates.truncate(left);
+        }
         let kept = &work.candidates[left..];
         if kept.iter().all(|(_, label)| *label == kept[0].1) {
             report(part, kept);
