@@ -3,6 +3,8 @@
 
 mod cancel;
 mod comm;
+#[cfg(test)]
+pub(crate) mod ending;
 mod engine;
 mod exchange;
 mod fixed_point;
@@ -20,7 +22,7 @@ mod workers;
 
 pub use cancel::Cancel;
 pub use comm::{Comm, SelfComm};
-pub use engine::{Engine, Stage, StageReport};
+pub use engine::{Engine, Stage};
 pub use exchange::{Exchange, Note};
 pub use fixed_point::{FixedPoint, relax_to_fixed_point};
 pub use halo::{Boundary, HaloPlan, Reach};
@@ -29,7 +31,8 @@ pub use memory::footprint::{Footprint, Hold, Lent};
 pub use ownership::Ownership;
 pub use progress::heard::{Progress, Silent};
 pub use progress::outlook::{Outlook, Plan};
-pub use relax::{Relax, Until, Waves};
+pub use progress::report::StageReport;
+pub use relax::{Place, Relax, Until, Waves};
 pub use save_points::{SavePoint, SavePoints, Saved};
 pub use schedule::{checkerboard, corner_colours, one_wave, sweep_waves};
 pub use thread_comm::ThreadComm;

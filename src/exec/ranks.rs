@@ -3,7 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::comm::Comm;
-use super::engine::{Engine, Stage, StageReport};
+use super::engine::{Engine, Stage};
+use super::progress::report::StageReport;
 use super::thread_comm::ThreadComm;
 use crate::error::{Error, Result};
 
