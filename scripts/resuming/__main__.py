@@ -46,10 +46,12 @@ def commands(root, place, large):
     pair = [f"{place}/few.xyz", f"{place}/shifted.xyz"]
     data = root / "data"
     output = ["-o", "out.zarr"]
+    sweep = ["--method", "fsm", "--schedule", "sweep"]
     return {
         "segment": ["segment", f"{data}/arabidopsis-embryo.tif", "--points", f"{data}/arabidopsis-marks.csv", *output],
         "distance": ["distance", f"{place}/ball.xyz", f"{place}/shifted.xyz", *grid, "--labels", *output],
         "fmm": ["distance", f"{place}/ball.xyz", *grid, "--method", "fmm", *output],
+        "sweep": ["distance", f"{place}/ball.xyz", f"{place}/shifted.xyz", *grid, "--labels", *sweep, *output],
         "reconstruct": ["reconstruct", f"{place}/few.xyz", "--mesh", "mesh.ply", *output],
         "middle": ["middle", *pair, "--spacing", "0.02", "--mesh", "mesh.ply", *output],
     }

@@ -20,6 +20,8 @@ pub struct Cancel {
 #[derive(Debug, Default)]
 struct Saving {
     stages: AtomicUsize,
+    /// Those of them that have to go on to where they can.
+    going: AtomicUsize,
     /// Since when the end is asked for.
     since: OnceLock<Instant>,
 }
@@ -37,7 +39,8 @@ impl Cancel {
     /// # Errors
     /// [`crate::error::ErrorKind::Interrupted`] once the flag is set.
     pub fn check(&self) -> Result<()> {
-        if self.is_asked() && !self.is_saving() { self.end() } else { Ok(()) }
+        let goes_on = || self.is_saving() && self.saving.going.load(Relaxed) > 0;
+        if self.is_asked() && !goes_on() { self.end() } else { Ok(()) }
     }
 
     /// Goes on only if the end was not asked for.
@@ -55,18 +58,31 @@ impl Cancel {
     /// Whether the end was asked for and a stage has yet time to put by what it has solved.
     #[must_use]
     pub fn is_saving(&self) -> bool {
+        // The time counts from when the signal is seen first, by whatever stage.
         self.flag.load(Relaxed) == libc::SIGTERM as usize
-            && self.saving.stages.load(Relaxed) > 0
             && self.saving.since.get_or_init(Instant::now).elapsed() < GRACE
+            && self.saving.stages.load(Relaxed) > 0
     }
 
     /// A stage begins that can put by what it has solved.
     pub(super) fn begin_saving(&self) {
         self.saving.stages.fetch_add(1, Relaxed);
+        self.go_on();
     }
 
     /// It is over.
     pub(super) fn end_saving(&self) {
+        self.go_no_farther();
         self.saving.stages.fetch_sub(1, Relaxed);
+    }
+
+    /// A stage that can put by what it has solved goes on to where it can, if the end is asked for.
+    pub(super) fn go_on(&self) {
+        self.saving.going.fetch_add(1, Relaxed);
+    }
+
+    /// It can put by what it has, wherever it is.
+    pub(super) fn go_no_farther(&self) {
+        self.saving.going.fetch_sub(1, Relaxed);
     }
 }

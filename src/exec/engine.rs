@@ -1,10 +1,9 @@
-//! The engine: the one loop over bricks, run on all cores, and the record of what each stage cost.
+//! The engine: the one loop over bricks, run on all cores, and its stages.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::cancel::Cancel;
 use super::comm::messages::{Comm, SelfComm};
@@ -12,36 +11,12 @@ use super::memory::budget::{Budget, machine_memory, peak_resident};
 use super::memory::footprint::{Account, Footprint, Hold};
 use super::progress::heard::{OfRank, Progress};
 use super::progress::outlook::{Outlook, Running};
+use super::progress::report::StageReport;
 use super::save_points::{SavePoint, SavePoints};
 use super::workers::Workers;
 use crate::error::{Error, ErrorKind, Result};
 use crate::store::checkpoint::Identity;
 use crate::store::{Scratch, Traffic};
-
-/// What one stage of a run cost.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct StageReport {
-    /// What was done.
-    pub name: String,
-    /// Wall time.
-    pub seconds: f64,
-    /// Bricks that were not resident when they were used.
-    pub brick_loads: u64,
-    /// Bricks computed, each time counted.
-    pub bricks: u64,
-    /// Voxels the stage worked on.
-    pub voxels: u64,
-    /// Bytes read out of bricks and faces.
-    pub bytes_read: u64,
-    /// Bytes written into bricks and faces.
-    pub bytes_written: u64,
-    /// Passes, sweeps or solver iterations, whatever the stage repeats.
-    pub iterations: u64,
-    /// What was left when the stage stopped; 0 where nothing is iterated.
-    pub residual: f64,
-    /// The most memory the process has had resident when the stage ended.
-    pub peak_rss_bytes: u64,
-}
 
 /// Runs kernels over bricks: threads, cancellation, progress, scratch and the account of all that.
 pub struct Engine {
@@ -246,7 +221,7 @@ impl Engine {
             planned: self.outlook.begin(name, total),
             started: Instant::now(),
             before: self.scratch.traffic(),
-            is_resumable: false,
+            saves: Saves::Nothing,
             report: Mutex::new(StageReport { name: name.into(), ..StageReport::default() }),
         }
     }
@@ -255,7 +230,21 @@ impl Engine {
     /// every run with the same inputs and settings.
     #[must_use]
     pub fn resumable_stage(&self, name: &str, total: u64) -> Stage<'_> {
-        Stage { is_resumable: true, ..self.stage(name, total) }
+        Stage { saves: Saves::Counted, ..self.stage(name, total) }
+    }
+
+    /// Begins a stage that can be gone on with as a part of what has a save point; there is one such part.
+    #[must_use]
+    pub fn stage_within(&self, save_point: Option<&SavePoint<'_>>, part: &str, name: &str, total: u64) -> Stage<'_> {
+        let saves = save_point.map_or(Saves::Nothing, |within| Saves::Within(within.part(part)));
+        Stage { saves, ..self.stage(name, total) }
+    }
+
+    /// Where what has several stages puts by how far it is, if the run does so. The name is as that of a stage that can be gone on
+    /// with.
+    #[must_use]
+    pub fn save_point(&self, name: &str) -> Option<SavePoint<'_>> {
+        Some(self.saving.as_ref()?.begin(name, &self.cancel, self.progress.as_ref()))
     }
 
     /// What the finished stages cost, in the order they ended.
@@ -273,13 +262,23 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
         .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")).caused_by(e))
 }
 
+/// Whether a stage can be gone on with.
+enum Saves {
+    /// No.
+    Nothing,
+    /// As one of so many of its name.
+    Counted,
+    /// As what has that name alone.
+    Within(String),
+}
+
 /// A stage under way.
 pub struct Stage<'a> {
     engine: &'a Engine,
     planned: Option<Arc<Running>>,
     started: Instant,
     before: Traffic,
-    is_resumable: bool,
+    saves: Saves,
     report: Mutex<StageReport>,
 }
 
@@ -362,9 +361,15 @@ impl<'a> Stage<'a> {
     /// Where the stage puts by what it solves, if it is resumable and the run does so. Asked for by what solves, at its start.
     #[must_use]
     pub fn save_point(&self) -> Option<SavePoint<'a>> {
-        let saving = self.engine.saving.as_ref().filter(|_| self.is_resumable)?;
-        let report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(saving.begin(&report.name, &self.engine.cancel, self.engine.progress.as_ref()))
+        let (engine, saving) = (self.engine, self.engine.saving.as_ref()?);
+        match &self.saves {
+            Saves::Nothing => None,
+            Saves::Counted => {
+                let name = &self.report.lock().unwrap_or_else(PoisonError::into_inner).name;
+                Some(saving.begin(name, &engine.cancel, engine.progress.as_ref()))
+            }
+            Saves::Within(key) => Some(saving.begin_part(key, &engine.cancel, engine.progress.as_ref())),
+        }
     }
 
     /// Tells what else the stage holds: see [`Engine::hold`].

@@ -4,6 +4,8 @@
 mod borrow;
 mod cancel;
 mod comm;
+#[cfg(test)]
+pub(crate) mod ending;
 mod engine;
 mod exchange;
 mod fixed_point;
@@ -26,7 +28,7 @@ pub use comm::messages::{Comm, RankTraffic, SelfComm};
 pub use comm::mpi::MpiComm;
 pub use comm::threads::ThreadComm;
 pub use comm::traffic::Counted;
-pub use engine::{Engine, Stage, StageReport};
+pub use engine::{Engine, Stage};
 pub use exchange::{Exchange, Note};
 pub use fixed_point::{FixedPoint, relax_to_fixed_point};
 pub use halo::{Boundary, HaloPlan, Reach};
@@ -35,8 +37,9 @@ pub use memory::footprint::{Footprint, Hold, Lent};
 pub use ownership::Ownership;
 pub use progress::heard::{Progress, Silent};
 pub use progress::outlook::{Outlook, Plan};
+pub use progress::report::StageReport;
 pub use ranks::as_threads;
-pub use relax::{Relax, Until, Waves};
+pub use relax::{Place, Relax, Until, Waves};
 pub use save_points::{SavePoint, SavePoints, Saved};
 pub use schedule::{checkerboard, corner_colours, one_wave, sweep_waves};
 pub use workers::Workers;

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::comm::messages::Comm;
 use super::comm::threads::ThreadComm;
 use super::comm::traffic::Counted;
-use super::engine::{Engine, Stage, StageReport};
+use super::engine::{Engine, Stage};
+use super::progress::report::StageReport;
 use crate::error::{Error, Result};
 
 impl Stage<'_> {

@@ -4,7 +4,10 @@
 //! A round takes the waves of a colouring one after the other; bricks of one wave do not read each other. Of a wave those
 //! are visited that are due. What a visit changed is told to the bricks beside it: on this rank by [`Relax::receive`], on
 //! others by the faces of the brick and a note, which travel while the bricks that nobody else reads are visited. What is
-//! visited follows from values alone, so results depend neither on threads nor on ranks.
+//! visited follows from values alone, so results depend neither on threads nor on ranks. A job that can be put by visits its
+//! waves some bricks at a time: as those of a wave do not read each other, that is the same for its values.
+
+use serde::{Deserialize, Serialize};
 
 use super::engine::Stage;
 use super::exchange::{Exchange, Note};
@@ -53,12 +56,43 @@ pub trait Relax: Sync {
         Ok(())
     }
 
+    /// Where a job can be put by within a wave: so many bricks of it each thread visits between two such places, at least. What
+    /// these leave and tell is taken at once, which must concern no brick of the same wave.
+    fn pauses_after(&self) -> Option<usize> {
+        None
+    }
+
+    /// Such a place: some bricks of a wave are visited and told, those that are yet to come are still due.
+    ///
+    /// # Errors
+    /// When the run is to end.
+    fn paused(&mut self, _at: Place) -> Result<()> {
+        Ok(())
+    }
+
     /// All of a wave, on this rank and beside it, was visited and told.
     ///
     /// # Errors
-    /// When another rank is gone.
+    /// When another rank is gone, or the run is to end.
     fn after_wave(&mut self) -> Result<()> {
         Ok(())
+    }
+}
+
+/// A place within a round.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// The wave that is under way, by its number in the round.
+    pub wave: usize,
+    /// The priority up to which the round takes bricks.
+    pub limit: f64,
+}
+
+impl Place {
+    /// Before the first wave of a round that takes bricks up to a priority.
+    #[must_use]
+    pub fn before(limit: f64) -> Self {
+        Self { wave: 0, limit }
     }
 }
 
@@ -97,7 +131,7 @@ impl<W: Send> Waves<'_, '_, W> {
         let mut rounds = 0;
         while let Some(nearest) = self.nearest(job)?.filter(|nearest| *nearest <= until.farthest) {
             job.before_round(nearest)?;
-            self.round(job, nearest + until.width)?;
+            self.round(job, Place::before(nearest + until.width))?;
             rounds += 1;
         }
         Ok(rounds)
@@ -112,24 +146,49 @@ impl<W: Send> Waves<'_, '_, W> {
         Ok(Some(self.stage.comm().least(own)?).filter(|least| least.is_finite()))
     }
 
-    /// Visits each brick that is due, up to a finite limit, once at its wave. Returns whether any of this rank's changed.
+    /// Visits each brick that is due, up to a finite limit, once at its wave, from a place in the round on. Returns whether any
+    /// of this rank's changed.
     ///
     /// # Errors
     /// When a visit fails, the run is interrupted or another rank is gone.
-    pub fn round<R: Relax<Work = W>>(&self, job: &mut R, limit: f64) -> Result<bool> {
+    pub fn round<R: Relax<Work = W>>(&self, job: &mut R, from: Place) -> Result<bool> {
         let mut changed = false;
-        for (number, wave) in self.waves.iter().enumerate() {
-            let due = wave.iter().copied().filter(|&slot| job.priority(slot) <= limit);
+        for (number, wave) in self.waves.iter().enumerate().skip(from.wave) {
+            let due = wave.iter().copied().filter(|&slot| job.priority(slot) <= from.limit);
             let (read, others): (Vec<Slot>, Vec<Slot>) = due.partition(|&slot| self.exchange.is_read(slot));
             let mut notes = self.visit(job, &read, number)?;
             self.exchange.post(job.field(), &notes)?;
-            notes.extend(self.visit(job, &others, number)?);
+            if let Some(bricks) = job.pauses_after() {
+                changed |= self.visit_in_pieces(job, &others, bricks, Place { wave: number, ..from })?;
+            } else {
+                notes.extend(self.visit(job, &others, number)?);
+            }
             changed |= !notes.is_empty();
             notes.extend(self.exchange.collect(job.field())?);
             for (slot, note) in &notes {
                 job.receive(*slot, note);
             }
             job.after_wave()?;
+        }
+        Ok(changed)
+    }
+
+    /// Visits bricks of a wave that no other rank reads, some at a time. Returns whether any changed.
+    fn visit_in_pieces<R: Relax<Work = W>>(
+        &self,
+        job: &mut R,
+        wave: &[Slot],
+        bricks: usize,
+        at: Place,
+    ) -> Result<bool> {
+        let mut changed = false;
+        for piece in wave.chunks((bricks * self.stage.threads()).max(1)) {
+            let notes = self.visit(job, piece, at.wave)?;
+            changed |= !notes.is_empty();
+            for (slot, note) in &notes {
+                job.receive(*slot, note);
+            }
+            job.paused(at)?;
         }
         Ok(changed)
     }

@@ -17,7 +17,7 @@ use serde::de::DeserializeOwned;
 
 use super::cancel::Cancel;
 use super::progress::heard::Progress;
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::grid::digits::bytes;
 use crate::store::checkpoint::{Checkpoints, Identity, Kept, Linked, SavedField, Taken, pack, restore, unpack};
 use crate::store::{BrickArray, Element};
@@ -45,7 +45,7 @@ pub struct SavePoints {
     /// Time and bytes of all checkpoints so far.
     spent: Mutex<(Duration, u64)>,
     /// Why the last one could not be taken, where it was told.
-    failure: Mutex<String>,
+    failure: Mutex<Option<io::ErrorKind>>,
 }
 
 impl SavePoints {
@@ -80,9 +80,24 @@ impl SavePoints {
         let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
         let count = stages.entry(name.to_owned()).or_default();
         *count += 1;
-        let key = format!("{name} #{count}");
+        self.begin_as(format!("{name} #{count}"), false, cancel, progress)
+    }
+
+    /// That of a stage which is a part of what has one: it goes by the name that [`SavePoint::part`] gives it.
+    pub(super) fn begin_part<'a>(&'a self, key: &str, cancel: &'a Cancel, progress: &'a dyn Progress) -> SavePoint<'a> {
+        self.begin_as(key.to_owned(), true, cancel, progress)
+    }
+
+    fn begin_as<'a>(
+        &'a self,
+        key: String,
+        is_part: bool,
+        cancel: &'a Cancel,
+        progress: &'a dyn Progress,
+    ) -> SavePoint<'a> {
         cancel.begin_saving();
-        SavePoint { points: self, cancel, progress, key, last: Instant::now(), wishes: self.wishes.load(Relaxed) }
+        let (wishes, stands) = (self.wishes.load(Relaxed), self.checkpoints.entry(&key).is_some());
+        SavePoint { points: self, cancel, progress, key, is_part, stands, last: Instant::now(), wishes }
     }
 
     /// How often a checkpoint was asked for.
@@ -99,9 +114,9 @@ impl SavePoints {
     }
 
     /// Whether why a checkpoint could not be taken is another reason than the last time.
-    fn is_new(&self, failure: &str) -> bool {
+    fn is_new(&self, failure: io::ErrorKind) -> bool {
         let mut last = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
-        std::mem::replace(&mut *last, failure.to_owned()) != failure
+        last.replace(failure) != Some(failure)
     }
 
     fn spend(&self, time: Duration, written: u64) {
@@ -116,15 +131,71 @@ pub struct SavePoint<'a> {
     cancel: &'a Cancel,
     progress: &'a dyn Progress,
     key: String,
+    /// It belongs to another one, which puts by what it ends with.
+    is_part: bool,
+    /// A checkpoint holds what was there when this was reached last.
+    stands: bool,
     last: Instant,
     wishes: usize,
 }
 
 impl SavePoint<'_> {
+    /// What the save point of a part of this is called.
+    pub(super) fn part(&self, what: &str) -> String {
+        format!("{}, {what}", self.key)
+    }
+
+    /// A part is over, and what it had put by not needed any more.
+    pub fn forget_part(&self, what: &str) {
+        self.points.checkpoints.forget(&self.part(what));
+    }
+
+    /// What this knows from now on, without any field: it stands in the next checkpoint, whoever takes it.
+    ///
+    /// # Errors
+    /// When it has no form in which it can be put by.
+    pub fn know<F: Serialize>(&mut self, facts: &F) -> Result<()> {
+        self.stands = false;
+        let facts = pack(facts).map_err(|error| Error::from_io("a checkpoint cannot be made", &error))?;
+        self.points.checkpoints.know(&self.key, facts);
+        Ok(())
+    }
+
+    /// A step that is made again by a run that goes on, from `facts` and `fields`, which it leaves as they are and which are those
+    /// with which this was reached last: where this run is to end the step ends at once, and a checkpoint of these is taken.
+    ///
+    /// # Errors
+    /// Of the step, and when the run is to end.
+    pub fn step<R, F: Serialize>(
+        &mut self,
+        facts: impl FnOnce() -> F,
+        fields: &[&dyn SavedField],
+        work: impl FnOnce() -> Result<R>,
+    ) -> Result<R> {
+        self.cancel.go_no_farther();
+        let done = work();
+        self.cancel.go_on();
+        let is_ended = |error: &Error| matches!(error.kind(), ErrorKind::Interrupted { .. });
+        if self.cancel.is_saving() && done.as_ref().is_err_and(is_ended) {
+            if self.stands {
+                self.progress.note("the last checkpoint holds what this stage began with; --resume goes on from it");
+            } else {
+                self.reached(false, facts, fields)?;
+            }
+        }
+        done
+    }
+
     /// What the stage had put by in the run that this one goes on with.
     #[must_use]
     pub fn saved(&self) -> Option<Saved> {
         self.points.checkpoints.entry(&self.key).map(Saved)
+    }
+
+    /// Whether the run is to end with the next checkpoint.
+    #[must_use]
+    pub fn is_last(&self) -> bool {
+        self.cancel.is_asked()
     }
 
     /// What the stage had put by is of no use to it: it begins anew, and says why.
@@ -165,6 +236,7 @@ impl SavePoint<'_> {
         let (is_last, wishes) = (self.cancel.is_asked(), self.points.wishes());
         let is_wished = wishes != self.wishes;
         if !is_last && !is_wished && !self.is_due(ended, fields) {
+            self.stands = false;
             return Ok(());
         }
         self.cancel.check()?;
@@ -176,7 +248,7 @@ impl SavePoint<'_> {
         let Taken { bytes: written, linking } = *saved.as_ref().unwrap_or(&Taken::default());
         // What is flushed of the output is no cost of checkpoints: it has to reach the disk.
         self.points.spend(started.elapsed().saturating_sub(linking), written);
-        (self.last, self.wishes) = (Instant::now(), wishes);
+        (self.last, self.wishes, self.stands) = (Instant::now(), wishes, saved.is_ok());
         match saved {
             Ok(_) if is_last || is_wished => {
                 self.progress.note(&format!("a checkpoint of {} was taken; --resume goes on from it", bytes(written)));
@@ -184,10 +256,9 @@ impl SavePoint<'_> {
             Ok(_) => {}
             Err(error) => {
                 let what = if is_last { "before the end" } else { "the run goes on without" };
-                let failure = format!("no checkpoint could be taken, {what}: {error}");
                 // One that was asked for is answered each time.
-                if self.points.is_new(&failure) || is_wished {
-                    self.progress.note(&failure);
+                if self.points.is_new(error.kind()) || is_wished || is_last {
+                    self.progress.note(&format!("no checkpoint could be taken, {what}: {error}"));
                 }
             }
         }
@@ -196,6 +267,7 @@ impl SavePoint<'_> {
 
     fn is_due(&self, ended: bool, fields: &[&dyn SavedField]) -> bool {
         let since = self.points.begun.elapsed();
+        let ended = ended && !self.is_part;
         if let Some(every) = self.points.every {
             return self.last.elapsed() >= every || (ended && since >= every);
         }

@@ -6,7 +6,8 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::engine::{Engine, StageReport};
+use super::engine::Engine;
+use super::progress::report::StageReport;
 use crate::error::Result;
 
 /// What became of an item, and what its stages cost.

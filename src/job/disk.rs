@@ -117,14 +117,19 @@ impl<'a> Disk<'a> {
         self.with_waiting(near_voxels.saturating_mul(WAITING_BYTES))
     }
 
-    /// Refuses a run that cannot fit, and says so of one that may not.
+    /// Refuses a run that cannot fit, and says so of one that may not. Returns the bytes that temporary fields and output take at
+    /// most.
     ///
     /// # Errors
     /// `Failed`, with what is needed, what is free, and what to do.
-    pub(crate) fn check(&self, note: impl FnMut(&str)) -> Result<()> {
+    pub(crate) fn check(&self, note: impl FnMut(&str)) -> Result<u64> {
         let output = if self.output == self.scratch { self.scratch } else { folder_of(self.output) };
-        let (Some(room), Some(room_for_output)) = (free_space(self.scratch), free_space(output)) else { return Ok(()) };
-        self.check_room(output, same_disk(self.scratch, output), [room, room_for_output], note)
+        let most = self.needed.saturating_add(self.written);
+        let (Some(room), Some(room_for_output)) = (free_space(self.scratch), free_space(output)) else {
+            return Ok(most);
+        };
+        self.check_room(output, same_disk(self.scratch, output), [room, room_for_output], note)?;
+        Ok(most)
     }
 
     fn check_room(

@@ -31,6 +31,17 @@ pub(crate) struct Resources {
     pub(crate) scratch: PathBuf,
 }
 
+/// Refuses a number of threads that no run can have.
+///
+/// # Errors
+/// `Usage`.
+pub(crate) fn check_threads(threads: usize) -> Result<()> {
+    if (1..=MOST_THREADS).contains(&threads) {
+        return Ok(());
+    }
+    Err(Error::usage(format!("--threads is {threads}; give 1 to {MOST_THREADS}")))
+}
+
 impl Resources {
     /// What was asked for; half of the machine's memory and all of its cores where nothing was. `output` is what lies nearest
     /// to large free disks when no folder is named, neither here nor as TMPDIR.
@@ -41,9 +52,7 @@ impl Resources {
         output: Option<&Path>,
     ) -> Result<Self> {
         let threads = threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
-        if !(1..=MOST_THREADS).contains(&threads) {
-            return Err(Error::usage(format!("--threads is {threads}; give 1 to {MOST_THREADS}")));
-        }
+        check_threads(threads)?;
         let there = machine_memory();
         let memory = memory.unwrap_or(there / 2);
         if memory > there {

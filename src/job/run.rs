@@ -63,7 +63,7 @@ impl Run {
 
     /// Refuses a run that the disks cannot hold, and notes one that they may not.
     pub(super) fn check_disk(&self, disk: &Disk<'_>, notes: &mut Vec<String>) -> Result<()> {
-        disk.check(|text| self.note(notes, text))
+        disk.check(|text| self.note(notes, text)).map(drop)
     }
 
     /// Begins the store, where one was asked for.

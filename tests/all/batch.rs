@@ -78,6 +78,7 @@ sources = \"in/a.csv\"
 [[items]]
 command = \"middle\"
 sources = [[\"in/a.csv\", \"in/b.csv\"], [\"in/c.csv\"]]
+threads = 0
 
 [thing]
 a = 1
@@ -96,13 +97,14 @@ a = 1
         "jobs.toml:19: two items are called a",
         "jobs.toml:23: `paint` is no command of items",
         "jobs.toml:28: in/c.csv is not there",
-        "jobs.toml:30: unknown key `thing`",
+        "jobs.toml:29: --threads is 0; give 1 to 1024",
+        "jobs.toml:31: unknown key `thing`",
         "nothing was run",
     ] {
         let lines = said.lines().filter(|line| line.contains(wanted)).count();
         assert_eq!(lines, 1, "{wanted}: {said}");
     }
-    assert_eq!(said.lines().count(), 11, "{said}");
+    assert_eq!(said.lines().count(), 12, "{said}");
     assert!(!bench.path("results").exists());
     bench.write("jobs.toml", "[[items]\nimages = 3\n[defaults\n");
     let said = String::from_utf8(bench.run("batch jobs.toml -o results").stderr).unwrap();

@@ -156,6 +156,55 @@ fn a_damaged_shard_is_told_and_all_of_its_field_is_written_again() {
     assert_eq!(checksums(&whole), checksums(&resumed));
 }
 
+/// Each command with a stage that looks for something or solves it, before the surface moves or anything is written.
+const SOLVING: [(&str, &str); 5] = [
+    ("reconstruct a.xyz --tol 1e-30 --max-steps 3", "enclosure"),
+    ("reconstruct a.xyz --beta 0.2 --tol 1e-30 --max-steps 3", "enclosure"),
+    ("segment image.tif --points marks.csv --start flood --tol 1e-30 --max-steps 3", "enclosure 1"),
+    ("distance a.xyz b.xyz --spacing 0.03 --padding 1 --labels --brick 16 --method fsm --schedule sweep", "distance"),
+    ("distance a.xyz b.xyz --spacing 0.03 --padding 1 --labels --brick 16 --method vdt --schedule sweep", "distance"),
+];
+
+#[test]
+fn runs_that_are_terminated_while_they_search_or_sweep_go_on_there() {
+    let bench = bench();
+    for (run, stage) in SOLVING {
+        bench.succeed(&format!("{run} -o out/whole.zarr --checkpoint off"));
+        terminated_writing(&bench, run, stage);
+        assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr.checkpoint"], "{run}");
+        let output = bench.run(&format!("{run} -o out/x.zarr --resume --threads 3"));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && said.contains("goes on from the checkpoint"), "{run}: {said}");
+        assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr"], "{run}");
+        let [whole, resumed] = ["out/whole.zarr", "out/x.zarr"].map(|store| bench.path(store));
+        same(&contents(&whole), &contents(&resumed), run);
+        [whole, resumed].iter().for_each(|store| fs::remove_dir_all(store).unwrap());
+    }
+}
+
+#[test]
+fn a_run_goes_on_where_no_checkpoint_can_be_taken_and_says_so_once() {
+    let bench = bench();
+    let run = RUNS[0];
+    bench.succeed(&format!("{run} -o out/whole.zarr --checkpoint off"));
+    let told = bench.fail(&format!("{run} -o out/x.zarr --checkpoint /proc/strandline/c"), 1);
+    assert!(told.contains("/proc/strandline/c: no checkpoint can be put there; name another folder"), "{told}");
+    assert_eq!(bench.entries("out"), ["whole.zarr"]);
+    let mut held =
+        Held::start(bench.command(&format!("{run} -o out/x.zarr -v --checkpoint out/mine --checkpoint-every 1ms")));
+    held.hear("speed 1  done");
+    held.go_on_until("a checkpoint", |_| bench.path("out/mine/000001.checkpoint").exists());
+    // As when a disk goes; what comes to lie there is somebody's own.
+    fs::rename(bench.path("out/mine"), bench.path("gone")).unwrap();
+    bench.write("out/mine", "my own");
+    let Ended { status, said, .. } = held.finish();
+    assert!(status.success(), "{said}");
+    let told = "no checkpoint could be taken, the run goes on without: out/mine: cannot be made: ";
+    assert_eq!(said.matches(told).count(), 1, "{said}");
+    assert_eq!(fs::read(bench.path("out/mine")).unwrap(), b"my own");
+    same(&contents(&bench.path("out/whole.zarr")), &contents(&bench.path("out/x.zarr")), run);
+}
+
 #[test]
 fn other_runs_are_refused_with_the_difference() {
     let bench = bench();

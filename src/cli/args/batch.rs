@@ -63,18 +63,18 @@ impl Shard {
     }
 }
 
+/// More parts than any scheduler has jobs in an array.
+const MOST_SHARDS: usize = 1_000_000;
+
 impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let what = || "give a part and how many there are, such as 1/8".to_string();
-        let (number, of) = text.split_once('/').ok_or_else(what)?;
-        let (number, of) = (number.parse().map_err(|_| what())?, of.parse().map_err(|_| what())?);
-        if (1..=of).contains(&number) {
-            Ok(Self { number, of })
-        } else {
-            Err(format!("{}; parts count from 1", what()))
-        }
+        let what = "give a part and how many there are, such as 1/8: the part from 1 to their number, and no more than 1000000 of them";
+        let number = |text: &str| text.parse().ok().filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()));
+        let (text, of) = text.split_once('/').ok_or(what)?;
+        let (number, of): (usize, usize) = (number(text).ok_or(what)?, number(of).ok_or(what)?);
+        if (1..=of).contains(&number) && of <= MOST_SHARDS { Ok(Self { number, of }) } else { Err(what.into()) }
     }
 }
 
@@ -88,7 +88,12 @@ mod tests {
             let shards: Vec<Shard> = (1..=of).map(|number| format!("{number}/{of}").parse().unwrap()).collect();
             assert!((0..20).all(|place| shards.iter().filter(|shard| shard.has(place)).count() == 1));
         }
-        for text in ["", "1", "0/2", "3/2", "1/0", "a/2", "1/2/3", "-1/2"] {
+        assert_eq!("1000000/1000000".parse(), Ok(Shard { number: 1_000_000, of: 1_000_000 }));
+        let absurd = ["1/1000001", "1/99999999999", "1/99999999999999999999999", "99999999999/8"];
+        for text in ["", "1", "0/2", "3/2", "1/0", "a/2", "1/2/3", "-1/2", "+1/2", " 1/2", "1 / 2", "1.0/2"]
+            .iter()
+            .chain(&absurd)
+        {
             assert!(text.parse::<Shard>().is_err(), "{text}");
         }
     }

@@ -15,7 +15,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, save_points};
+use crate::cli::outputs::survival::{finished_before, save_points, told_of_room};
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
@@ -146,7 +146,7 @@ impl Job {
             let written = if self.args.job.output.store().is_some() { self.written() } else { 0 };
             log::plan(Budget::least(needs.held), needs.scratch, written, needs.seconds);
         }
-        self.fits(&needs)?;
+        let most = self.fits(&needs)?;
         if self.args.job.output.dry_run {
             return Ok(());
         }
@@ -163,7 +163,7 @@ impl Job {
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();
         engine.settle_save_points(&result);
-        let found = result?;
+        let found = told_of_room(result, most, &self.args.job.output)?;
         if !self.args.job.output.quiet && self.comm.rank() == 0 {
             let output = &self.args.job.output;
             let [labels_in, pairs_in] = ["", "meshes/pairs.csv"]
@@ -260,7 +260,7 @@ impl Job {
     }
 
     /// Refuses a run that cannot fit memory or disk.
-    fn fits(&self, needs: &Needs) -> Result<()> {
+    fn fits(&self, needs: &Needs) -> Result<u64> {
         Budget { total: self.resources.memory }.window(needs.held).map_err(|error| {
             let name = self.settings.method.name();
             let textbook = if self.settings.heap_bytes::<f32>(&self.geometry) == 0 {

@@ -14,7 +14,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile, distance_to_marks};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
-use crate::cli::outputs::survival::{finished_before, save_points};
+use crate::cli::outputs::survival::{finished_before, save_points, told_of_room};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -72,12 +72,12 @@ pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
         let output = if job.writes_fields() { estimate.output } else { 0 };
         log::plan(Budget::least(estimate.held), estimate.scratch, output, estimate.seconds);
     }
-    job.fits(&estimate)?;
+    let most = job.fits(&estimate)?;
     if args.output.dry_run {
         return Ok(());
     }
     job.console.say(&plan);
-    job.run(estimate.seconds)
+    job.run(estimate.seconds, most)
 }
 
 /// Leaves out points that stand alone, if that was asked for, and says how many.
@@ -171,7 +171,7 @@ impl Job {
     }
 
     /// Refuses a run that cannot fit memory or disk.
-    fn fits(&self, estimate: &Estimate) -> Result<()> {
+    fn fits(&self, estimate: &Estimate) -> Result<u64> {
         let disk = Disk::of_cloud(&self.resources, self.args.output.store(), estimate)?;
         let disk = if self.args.mesh.is_some() { disk.with_mesh_near(estimate.near_voxels) } else { disk };
         disk.check(|text| self.console.note(text))
@@ -195,7 +195,7 @@ impl Job {
         )
     }
 
-    fn run(&self, seconds: f64) -> Result<()> {
+    fn run(&self, seconds: f64, most: u64) -> Result<()> {
         let saving = save_points(&self.args.output, &self.typed, self.console.as_ref())?;
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
         let engine = engine.with_save_points(saving);
@@ -203,7 +203,7 @@ impl Job {
         let result = self.solve_and_write(&engine);
         self.console.clear();
         engine.settle_save_points(&result);
-        let found = result?;
+        let found = told_of_room(result, most, &self.args.output)?;
         if !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)))?;
         }

@@ -18,7 +18,7 @@ use crate::cli::outputs::checks::{Outputs, numbered};
 use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::begin_store;
-use crate::cli::outputs::survival::{finished_before, save_points, save_points_of};
+use crate::cli::outputs::survival::{finished_before, save_points, save_points_of, told_of_room};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     let estimate = job.estimate();
     if args.output.dry_run {
         job.print_plan(&estimate)?;
-        return job.fits(&estimate);
+        return job.fits(&estimate).map(drop);
     }
     job.run(&estimate).map(|_| ())
 }
@@ -206,7 +206,7 @@ impl Job {
 
     /// Runs the segmentation and writes all that was asked for; returns what was found.
     pub(crate) fn run(&self, estimate: &Estimate) -> Result<Outcome> {
-        self.fits(estimate)?;
+        let most = self.fits(estimate)?;
         let tell = |line: &str| {
             if self.prints {
                 self.console.say(line);
@@ -240,7 +240,7 @@ impl Job {
         let result = self.solve_and_write(&engine);
         self.console.clear();
         engine.settle_save_points(&result);
-        let outcome = result?;
+        let outcome = told_of_room(result, most, &self.args.output)?;
         if self.prints && !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())))?;
         }

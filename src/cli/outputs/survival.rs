@@ -1,6 +1,7 @@
 //! How a run survives its end: where its checkpoints go, and what `--resume` finds.
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,7 +10,8 @@ use crate::cli::args::survive::Checkpoint;
 use crate::cli::inputs::identity::identity;
 use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals::wish;
-use crate::error::{Error, Result};
+use crate::cli::terminal::text::bytes;
+use crate::error::{Error, Result, one_line};
 use crate::exec::{Progress, SavePoints};
 use crate::io::ome_zarr::{LiveState, is_store, live};
 use crate::store::checkpoint::{Checkpoints, Identity, difference};
@@ -156,6 +158,40 @@ pub(crate) fn checkpoints(
         });
         checkpoints
     } else {
+        if output.survive.checkpoint.is_some() {
+            check_can_be_made(&folder)?;
+        }
         Checkpoints::begin(&folder, identity, output.overwrite)?
     }))
+}
+
+/// What became of a run, which needs so many bytes of disk at most: where a full one ended it, with what it needs, and how it is gone
+/// on with.
+pub(crate) fn told_of_room<R>(result: Result<R>, most: u64, output: &OutputArgs) -> Result<R> {
+    result.map_err(|error| {
+        let system = std::error::Error::source(&error).and_then(|source| source.downcast_ref::<std::io::Error>());
+        let is_full =
+            |error: &std::io::Error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
+        if most == 0 || !system.is_some_and(is_full) {
+            return error;
+        }
+        let kept = folder(output).filter(|folder| Checkpoints::lie_in(folder)).map_or(String::new(), |folder| {
+            let folder = one_line(folder.display().to_string());
+            format!("; when there is room --resume goes on from the checkpoint in {folder}")
+        });
+        error.reworded(|words| {
+            format!("{words}; temporary fields and output of this run take up to {} of disk{kept}", bytes(most))
+        })
+    })
+}
+
+/// Refuses a folder that was named and that nothing could be put into, before the run has solved anything.
+fn check_can_be_made(folder: &Path) -> Result<()> {
+    let full = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
+    let Some(there) = full.ancestors().find(|path| path.symlink_metadata().is_ok()) else { return Ok(()) };
+    // A file without a name leaves nothing behind.
+    tempfile::tempfile_in(there).map(drop).map_err(|error| {
+        let what = "no checkpoint can be put there; name another folder with --checkpoint, or give --checkpoint off";
+        Error::from_io(what, &error).at(folder)
+    })
 }

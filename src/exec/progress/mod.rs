@@ -2,3 +2,4 @@
 
 pub(super) mod heard;
 pub(super) mod outlook;
+pub(super) mod report;

@@ -115,6 +115,11 @@ pub(super) fn dijkstra_pythagoras<'a, P: Precision>(
     }
 }
 
+/// Nothing is made of the distance beside it.
+fn nothing() -> Result<()> {
+    Ok(())
+}
+
 impl<'a, P: Precision> Solving<'_, 'a, P> {
     /// A method's start: its state with the voxels that sources fix.
     fn start<M: DistanceState>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
@@ -147,9 +152,9 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
                 let tracks = M::trial(0).is_some();
                 let solved = looked_over(solved, self.sources, self.options, (tracks, Schedule::Front));
                 let reading = Reading { early, solved };
-                advance_front(self.stage, method, state, &seeded.bricks, bounds, Some(&reading))?;
+                advance_front(self.stage, method, state, &seeded.bricks, bounds, Some(&reading), nothing)?;
             }
-            None => advance_front(self.stage, method, state, &seeded.bricks, bounds, None)?,
+            None => advance_front(self.stage, method, state, &seeded.bricks, bounds, None, nothing)?,
         }
         search_outside(self.stage, self.sources, method, state, self.options.farthest)?;
         self.borrow_for(&values)?;
@@ -158,7 +163,7 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
 
     fn sweeps<M: OrderedSweeps + 'a>(&self, method: M, iterations: u32) -> Result<Solved<'a, P>> {
         let (state, seeded) = self.start::<M>(Start::Fixed)?;
-        sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations)?;
+        sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations, nothing)?;
         search_outside(self.stage, self.sources, &method, &state, self.options.farthest)?;
         self.solved(method, state, &seeded)
     }
@@ -171,12 +176,12 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
         let (state, sources, seeded) = self.start_apart::<FastSweeping<P, f64>>()?;
         if self.labelled().is_some() {
             // An update that lowers nothing is none, so sweeps do not see that another label is as near.
-            sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations)?;
-            self.trace::<UpwindSum>(&state, &sources, &seeded)?;
+            let trace = || self.trace::<UpwindSum>(&state, &sources, &seeded);
+            sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations, trace)?;
             return Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? });
         }
         let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &seeded.bricks)?;
-        sweep_all(self.stage, &method, &state, &mut tracked, &seeded.bricks, iterations)?;
+        sweep_all(self.stage, &method, &state, &mut tracked, &seeded.bricks, iterations, nothing)?;
         drop(tracked);
         Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
     }
@@ -189,8 +194,8 @@ impl<'a, P: Precision> Solving<'_, 'a, P> {
         let (state, sources, seeded) = self.start_apart::<M>()?;
         let geometry = self.sources.geometry;
         let bounds = (geometry.spacing, self.options.farthest);
-        advance_front(self.stage, &method, &state, &seeded.bricks, bounds, None)?;
-        self.trace::<R>(&state, &sources, &seeded)?;
+        let trace = || self.trace::<R>(&state, &sources, &seeded);
+        advance_front(self.stage, &method, &state, &seeded.bricks, bounds, None, trace)?;
         Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
     }
 

@@ -4,6 +4,7 @@ pub(crate) mod far_regions;
 pub(crate) mod needs;
 pub(crate) mod pockets;
 pub mod region;
+mod resumed;
 pub mod search;
 pub(crate) mod sheets;
 pub mod tagging;

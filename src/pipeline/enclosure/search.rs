@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::needs::box_bytes;
 use super::pockets::pockets;
 use super::region::{RegionOfInterest, voxel_bounds};
+use super::resumed::Progress;
 use super::sheets::{Company, hold_sheets};
 use super::tagging::{Basin, tag};
 use super::watershed::{Sides, watershed};
@@ -16,6 +17,7 @@ use crate::kernel::level_set::initial::persistence::PERSISTENCE;
 use crate::pipeline::distance::{Method, Sources, cloud_distance};
 use crate::pipeline::level_set::band::{Band, Reaches, make_band};
 use crate::store::BrickArray;
+use crate::store::checkpoint::SavedField;
 
 /// The start surface lies a little beyond the largest saddle, and at least so many smallest spacings from the cloud.
 const ABOVE_SADDLE: f64 = 1.05;
@@ -172,22 +174,28 @@ pub fn enclose(engine: &Engine, search: &Search<'_>) -> Result<Found> {
 fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     let grid = search.grid;
     let half_width = BAND_VOXELS * libm::cbrt(grid.voxel_volume());
-    let mut farthest = search.first_reach.max(half_width + 3.0 * grid.max_spacing());
+    let mut progress = Progress::begin(engine, search.suffix)?;
+    let mut farthest = progress.farthest_or(search.first_reach.max(half_width + 3.0 * grid.max_spacing()));
     let enough = |sides: &Sides| sides.lost.len() as f64 <= MOST_LOST * search.cloud.len() as f64;
     loop {
-        let around = Around::new(engine, search, farthest)?;
-        let mut sides = around.sides(engine, search, None)?;
+        let around = Around::new(engine, search, farthest, &mut progress)?;
+        let mut sides = around.sides_found(engine, search, &mut progress)?;
         // No ball fits the box around the cloud that is larger.
         let all = 2.0 * farthest > search.extents().into_iter().fold(f64::INFINITY, f64::min) + grid.max_spacing();
-        if sides.basins.is_empty() && all {
-            return Ok(Found::Nothing(around.deepest(engine, search)?));
+        // Where balls were tried before, they were to be.
+        let tried = progress.balls();
+        if sides.basins.is_empty() && all && tried == 0 {
+            return Ok(Found::Nothing(around.deepest(engine, search, &mut progress)?));
         }
-        if !sides.basins.is_empty() && all && !enough(&sides) {
-            for part in POCKET_RADII {
-                let closed = around.sides(engine, search, Some((part * farthest, &sides.inside)))?;
+        if tried > 0 || (!sides.basins.is_empty() && all && !enough(&sides)) {
+            for (balls, part) in (1..).zip(POCKET_RADII).skip(tried) {
+                let ball = (part * farthest, &sides.inside);
+                let fields: [&dyn SavedField; 2] = [&around.distance, &sides.inside];
+                let closed = progress.step(&fields, || around.sides(engine, search, Some(ball)))?;
                 if closed.lost.len() < sides.lost.len() {
                     sides = closed;
                 }
+                progress.told(&around.distance, &sides, balls)?;
             }
         }
         if !sides.basins.is_empty() && (all || enough(&sides)) {
@@ -205,14 +213,16 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
 fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     let grid = search.grid;
     let mean = libm::cbrt(grid.voxel_volume());
-    let mut farthest = search.first_reach;
+    let mut progress = Progress::begin(engine, search.suffix)?;
+    let mut farthest = progress.farthest_or(search.first_reach);
     loop {
-        let around = Around::new(engine, search, farthest)?;
+        let around = Around::new(engine, search, farthest, &mut progress)?;
         let stage = around.tagging(engine, search);
         // Whoever names a beta knows how deep the inside is.
         let ratio = if search.beta.is_some() { 1.0 } else { PERSISTENCE };
         let wanted = |basin: &Basin| search.beta.is_none_or(|beta| search.holds(basin, beta));
-        let mut tagging = tag(&stage, engine, &around.sources(search), &around.distance, ratio, wanted)?;
+        let flood = || tag(&stage, engine, &around.sources(search), &around.distance, ratio, wanted);
+        let mut tagging = progress.step(&[&around.distance], flood)?;
         let beta = search.beta.or_else(|| automatic_beta(&tagging.basins, grid));
         let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|basin| search.holds(basin, beta))) else {
             stage.finish();
@@ -237,7 +247,7 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         }
         let deepest = Deepest::of(&tagging.basins, &around.region.geometry);
         tagging.basins.retain(|basin| search.holds(basin, beta));
-        let inside = tagging.inside(&stage, engine, beta as f32)?;
+        let inside = progress.step(&[&around.distance], || tagging.inside(&stage, engine, beta as f32))?;
         stage.finish();
         let reaches = Reaches { inner: half_width as f32, outer: outer as f32 };
         let enclosure = around.enclosed(beta, reaches, inside, tagging.basins, Vec::new());
@@ -258,7 +268,8 @@ struct Around {
 }
 
 impl Around {
-    fn new(engine: &Engine, search: &Search<'_>, farthest: f64) -> Result<Self> {
+    fn new<'a>(engine: &'a Engine, search: &Search<'_>, farthest: f64, progress: &mut Progress<'a>) -> Result<Self> {
+        progress.reach(farthest)?;
         // The box grows with the reach: what it takes is held again, the tables of its grid before they are made.
         let (points, cells) =
             (search.cloud.len() as u64, RegionOfInterest::grid_cells(search.grid, search.cloud, farthest));
@@ -268,11 +279,28 @@ impl Around {
         let held = engine.hold(region.held(search.cloud))?;
         let set = Arc::new(region.cells.clone());
         let sources = Sources::cloud(&region.geometry, search.cloud, &region.bins);
-        let stage = engine.stage(&format!("distance{}", search.suffix), 11 * set.len() as u64);
+        let stage = progress.stage(engine, &format!("distance{}", search.suffix), 11 * set.len() as u64);
         stage.voxels((set.len() * set.grid().brick_len()) as u64);
-        let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
+        let distance = if let Some(mut distance) = progress.distance(engine, &set)? {
+            (0..set.grid().len()).for_each(|id| distance.set_absent(id, farthest as f32));
+            distance
+        } else {
+            let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
+            progress.solved(&distance)?;
+            distance
+        };
         stage.finish();
         Ok(Self { region, distance, held })
+    }
+
+    /// The sides of the cloud as an earlier run told them, else as they are without balls.
+    fn sides_found(&self, engine: &Engine, search: &Search<'_>, progress: &mut Progress<'_>) -> Result<Sides> {
+        if let Some(sides) = progress.sides(engine, self.distance.set())? {
+            return Ok(sides);
+        }
+        let sides = progress.step(&[&self.distance], || self.sides(engine, search, None))?;
+        progress.told(&self.distance, &sides, 0)?;
+        Ok(sides)
     }
 
     fn sources<'a>(&'a self, search: &Search<'a>) -> Sources<'a> {
@@ -291,9 +319,10 @@ impl Around {
     }
 
     /// The deepest space of a cloud that encloses nothing: what a given beta could start from.
-    fn deepest(&self, engine: &Engine, search: &Search<'_>) -> Result<Option<Deepest>> {
+    fn deepest(&self, engine: &Engine, search: &Search<'_>, progress: &mut Progress<'_>) -> Result<Option<Deepest>> {
         let stage = self.tagging(engine, search);
-        let tagging = tag(&stage, engine, &self.sources(search), &self.distance, 1.0, |_| false)?;
+        let flood = || tag(&stage, engine, &self.sources(search), &self.distance, 1.0, |_| false);
+        let tagging = progress.step(&[&self.distance], flood)?;
         stage.finish();
         Ok(Deepest::of(&tagging.basins, &self.region.geometry))
     }
@@ -345,6 +374,17 @@ impl Enclosure {
     #[must_use]
     pub fn sheet(&self) -> &[u32] {
         &self.sheet
+    }
+
+    /// Distance and sides of all voxels of the box.
+    #[cfg(test)]
+    pub(super) fn fields(&self) -> Result<(Vec<f32>, Vec<u8>)> {
+        use crate::store::BoxSource;
+        let part = self.geometry.domain();
+        let (mut distance, mut inside) = (vec![0.0; part.len()], vec![0; part.len()]);
+        self.distance.read_box(&part, &mut distance)?;
+        self.inside.read_box(&part, &mut inside)?;
+        Ok((distance, inside))
     }
 
     /// Makes the band; the fields of the search go. What the box takes of the memory is held until the guard goes.

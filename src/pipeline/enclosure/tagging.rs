@@ -3,6 +3,8 @@
 //! One flood gives the answer for every threshold at once. Bricks far from the cloud are not stored: all their
 //! voxels lie at the same (largest) distance, so a connected region of them has one flood value.
 
+use serde::{Deserialize, Serialize};
+
 use super::far_regions::FarRegions;
 use crate::error::Result;
 use crate::exec::{Boundary, Engine, FixedPoint, HaloPlan, Reach, Stage, Workers, one_wave, relax_to_fixed_point};
@@ -16,7 +18,7 @@ use crate::store::BrickArray;
 use crate::tile::HaloTile;
 
 /// A space that the cloud encloses.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Basin {
     /// Number of its voxels; of the flood's basins those deeper than the saddle.
     pub voxels: u64,

@@ -4,7 +4,9 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Waves, Workers, checkerboard, one_wave};
+use crate::exec::{
+    Boundary, Engine, Exchange, HaloPlan, Place, Reach, Relax, Stage, Waves, Workers, checkerboard, one_wave,
+};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::image::filter::heat;
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
@@ -71,7 +73,7 @@ fn relax_heat(
     let voxels = stage.comm().sum(&[(set.owned().len() * CELL_LEN) as f64])?;
     let mut heat = Heat { smoothed, initial, solved, spacing, sigma, plan, squares: vec![0.0; set.len()] };
     for _ in 0..HEAT_ROUNDS {
-        waves.round(&mut heat, 0.0)?;
+        waves.round(&mut heat, Place::before(0.0))?;
         let owned = set.owned();
         let squares = stage.comm().sum(&heat.squares[owned.start as usize..owned.end as usize])?;
         let residual = (squares / voxels).sqrt();

@@ -9,7 +9,8 @@ use super::band::{Band, read_mask};
 use super::growing::Growing;
 use super::time_loop::{Evolution, Stop, Taken, TimeLoop};
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Reach, Relax, Stage, Waves, Workers, checkerboard, one_wave};
+use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Place, Reach, Relax, Stage, Waves, Workers};
+use crate::exec::{checkerboard, one_wave};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN, GROWN_LEN};
 use crate::kernel::level_set::scheme::border::Border;
@@ -248,7 +249,7 @@ impl Solver<'_> {
     /// All cells are taken up once; then again those that were left unsolved or whose neighbours were stirred since.
     fn step(mut self, waves: &Waves<'_, '_, Worker>) -> Result<(Step, u64)> {
         while self.round < MAX_VISITS && waves.nearest(&self)?.is_some() {
-            waves.round(&mut self, 0.0)?;
+            waves.round(&mut self, Place::before(0.0))?;
             self.round += 1;
         }
         let volume: f64 = self.spacing.iter().product();

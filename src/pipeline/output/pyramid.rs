@@ -348,7 +348,11 @@ pub fn write_levels<T: Element>(
             pyramid.put(chunk, values, buffer)
         })
     };
-    in_batches(stage, &[&pyramid], &visits, &mut (), |batch, ()| stage.run(&visits[batch], &workers, write).map(drop))
+    in_batches(stage, &[&pyramid], &visits, &mut (), |batch, door, ()| {
+        let visit =
+            |worker: &mut _, &visit: &usize| if door.opens(visit) { write(worker, &visits[visit]) } else { Ok(()) };
+        stage.run(batch, &workers, visit).map(drop)
+    })
 }
 
 #[cfg(test)]

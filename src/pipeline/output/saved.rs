@@ -7,7 +7,7 @@
 //! are linked, not copied, and checked by their sums when a run goes on with them; parts, unlike visits, are the same for any number
 //! of threads.
 
-use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -48,8 +48,8 @@ pub(crate) trait PartlyWritten: Sync {
 /// What a run knows between two batches.
 #[derive(Serialize, Deserialize)]
 struct Known<F> {
-    /// Parts that are done.
-    parts: usize,
+    /// Which parts are done.
+    done: Vec<bool>,
     images: Vec<KnownImage>,
     found: F,
 }
@@ -61,8 +61,9 @@ struct KnownImage {
     shards: Vec<(String, FileSum)>,
 }
 
-/// Makes visits, with `take`, which adds to what was `found`; where the run takes checkpoints, in batches, without those that the
-/// run which it goes on with has made. Of a live store, which stays as it is when the run ends, there are no checkpoints.
+/// Makes visits, with `take`, which gets some of them by number and adds to what was `found` by those that it is let `into`; where
+/// the run takes checkpoints, in batches, without those that the run which it goes on with has made. Of a live store, which stays as
+/// it is when the run ends, there are no checkpoints.
 ///
 /// # Errors
 /// Of `take`, when a checkpoint cannot be read, or the run is interrupted.
@@ -71,33 +72,64 @@ pub(crate) fn in_batches<F: Serialize + DeserializeOwned>(
     images: &[&dyn PartlyWritten],
     visits: &[Vec<Box3>],
     found: &mut F,
-    mut take: impl FnMut(Range<usize>, &mut F) -> Result<()>,
+    mut take: impl FnMut(&[usize], &Door<'_>, &mut F) -> Result<()>,
 ) -> Result<()> {
     let is_live = images.iter().any(|image| image.image().is_live());
+    let all: Vec<usize> = (0..visits.len()).collect();
     let Some(mut save_point) = (!is_live).then(|| stage.save_point()).flatten() else {
         stage.expect(visits.len() as u64);
-        return take(0..visits.len(), found);
+        return take(&all, &Door(None), found);
     };
     let begins = parts(visits, images);
-    let (mut done, parts, mut steps) = (0, begins.len() - 1, 0);
-    if let Some(known) = go_on(stage, &save_point, images, parts)? {
-        (done, *found) = (known.parts, known.found);
+    let (mut done, mut steps) = (vec![false; begins.len() - 1], 0);
+    if let Some(known) = go_on(stage, &save_point, images, done.len())? {
+        (done, *found) = (known.done, known.found);
         steps = known.images.iter().map(|image| image.shards.len()).sum();
     }
-    stage.expect((steps + visits.len() - begins[done]) as u64);
-    while done < parts {
-        let end = batch(&begins, done, VISITS_PER_THREAD * stage.threads());
-        take(begins[done]..begins[end], found)?;
-        done = end;
+    let rest: Vec<usize> = (0..done.len()).filter(|&part| !done[part]).collect();
+    let visits_of = |part: &usize| &all[begins[*part]..begins[*part + 1]];
+    stage.expect((steps + rest.iter().map(|part| visits_of(part).len()).sum::<usize>()) as u64);
+    let mut rest = rest.as_slice();
+    while !rest.is_empty() {
+        let next;
+        (next, rest) = rest.split_at(batch(&begins, rest, VISITS_PER_THREAD * stage.threads()));
+        let visits: Vec<usize> = next.iter().flat_map(visits_of).copied().collect();
+        let begun = Mutex::new(vec![false; done.len()]);
+        take(&visits, &Door(Some(Guard { save_point: &save_point, begins: &begins, begun: &begun })), found)?;
+        let begun = begun.into_inner().unwrap_or_else(PoisonError::into_inner);
+        done.iter_mut().zip(begun).for_each(|(done, begun)| *done |= begun);
         let waiting: Vec<_> = images.iter().flat_map(|image| image.waiting()).collect();
         let fields: Vec<&dyn SavedField> = waiting.iter().map(AsRef::as_ref).collect();
-        save_point.reached_writing(done == parts, || known(images, done, &*found), &fields)?;
+        save_point.reached_writing(rest.is_empty(), || known(images, &done, &*found), &fields)?;
     }
     Ok(())
 }
 
+/// Who lets visits begin.
+pub(crate) struct Door<'a>(Option<Guard<'a>>);
+
+struct Guard<'a> {
+    save_point: &'a SavePoint<'a>,
+    /// The visits with which parts begin.
+    begins: &'a [usize],
+    /// Which parts are begun, and will be done.
+    begun: &'a Mutex<Vec<bool>>,
+}
+
+impl Door<'_> {
+    /// Whether a visit is to be made: none of a part that is not begun when the run is to end.
+    pub(crate) fn opens(&self, visit: usize) -> bool {
+        let Some(Guard { save_point, begins, begun }) = &self.0 else { return true };
+        let part = begins.partition_point(|&begin| begin <= visit) - 1;
+        // All visits of a part get the same answer.
+        let mut begun = begun.lock().unwrap_or_else(PoisonError::into_inner);
+        begun[part] |= !save_point.is_last();
+        begun[part]
+    }
+}
+
 /// What a checkpoint holds, and the files that it links.
-fn known<F>(images: &[&dyn PartlyWritten], parts: usize, found: F) -> (Known<F>, Vec<Linked>) {
+fn known<F>(images: &[&dyn PartlyWritten], done: &[bool], found: F) -> (Known<F>, Vec<Linked>) {
     let image = |image: &&dyn PartlyWritten| KnownImage {
         form: image.image().form(),
         missing: image.missing(),
@@ -108,7 +140,7 @@ fn known<F>(images: &[&dyn PartlyWritten], parts: usize, found: F) -> (Known<F>,
         known.shards.iter().map(|(path, _)| Linked { path: image.image().file(path), name: path.clone() })
     });
     let linked = linked.collect();
-    (Known { parts, images: known, found }, linked)
+    (Known { done: done.to_vec(), images: known, found }, linked)
 }
 
 /// Goes on where an earlier run was ended: what it knew, with its shards in place. None where there is no such run, or what it has
@@ -122,7 +154,7 @@ fn go_on<F: DeserializeOwned>(
     let Some(saved) = save_point.saved() else { return Ok(None) };
     let known: Known<F> = saved.facts()?;
     let is_same = known.images.iter().map(|known| known.form).eq(images.iter().map(|image| image.image().form()));
-    let fault = if is_same && known.parts <= parts {
+    let fault = if is_same && known.done.len() == parts {
         take_over(stage, &saved, images, &known.images)?
     } else {
         Some("it is packed in another way than this run packs it".to_owned())
@@ -137,7 +169,8 @@ fn go_on<F: DeserializeOwned>(
         image.go_on(&known.missing, &saved, field)?;
         field += known.missing.len();
     }
-    save_point.note(&format!("goes on where {} of {parts} parts are written", known.parts));
+    let done = known.done.iter().filter(|&&done| done).count();
+    save_point.note(&format!("goes on where {done} of {parts} parts are written"));
     Ok(Some(known))
 }
 
@@ -175,236 +208,14 @@ fn parts(visits: &[Vec<Box3>], images: &[&dyn PartlyWritten]) -> Vec<usize> {
     (0..visits.len()).filter(is_new).chain([visits.len()]).collect()
 }
 
-/// Where the batch ends that begins with a part: after as many as have no more than so many visits, and one at least.
-fn batch(begins: &[usize], from: usize, most: usize) -> usize {
-    let fit = begins[from + 1..].iter().take_while(|&&end| end - begins[from] <= most).count();
-    from + fit.max(1)
+/// How many of the parts that are left make a batch: as many as have no more than so many visits, and one at least.
+fn batch(begins: &[usize], left: &[usize], most: usize) -> usize {
+    let visits = left.iter().scan(0, |sum, &part| {
+        *sum += begins[part + 1] - begins[part];
+        Some(*sum)
+    });
+    visits.take_while(|&visits| visits <= most).count().max(1)
 }
 
 #[cfg(test)]
-mod tests {
-    use std::fs;
-    use std::path::Path;
-    use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-    use std::sync::{Arc, Mutex};
-    use std::time::Duration;
-
-    use super::*;
-    use crate::error::Error;
-    use crate::exec::{Budget, Cancel, Engine, Progress, SavePoints};
-    use crate::grid::Geometry;
-    use crate::io::ome_zarr::{Compression, Content, ImageSpec, StoreWriter};
-    use crate::pipeline::output::pyramid::{Reduce, write_levels};
-    use crate::store::checkpoint::Checkpoints;
-    use crate::store::{BoxSource, ElementType, Scratch};
-
-    /// A row of 50 shards of two chunks each, and coarser levels.
-    const SHAPE: [i64; 3] = [6400, 20, 10];
-    const CHUNKS: usize = 100;
-
-    /// A field that is zero at one end; it can be read so many times.
-    struct Field {
-        times: usize,
-        read: AtomicUsize,
-    }
-
-    impl BoxSource<f32> for Field {
-        fn shape(&self) -> [i64; 3] {
-            SHAPE
-        }
-
-        fn read_box(&self, part: &Box3, out: &mut [f32]) -> Result<()> {
-            if self.read.fetch_add(1, Relaxed) >= self.times {
-                return Err(Error::failed("no more"));
-            }
-            for (y, z) in part.rows() {
-                for x in part.lo[0]..part.hi[0] {
-                    out[part.offset_of([x, y, z])] = if x < 150 { 0.0 } else { (x * 3 + y * 5 + z * z) as f32 };
-                }
-            }
-            Ok(())
-        }
-    }
-
-    /// Keeps what is told.
-    #[derive(Default)]
-    struct Notes(Mutex<Vec<String>>);
-
-    impl Progress for Notes {
-        fn begin(&self, _name: &str, _total: u64) {}
-        fn advance(&self, _steps: u64) {}
-        fn note(&self, line: &str) {
-            self.0.lock().unwrap().push(line.to_owned());
-        }
-        fn end(&self) {}
-    }
-
-    /// One run in a folder.
-    struct Run<'a> {
-        folder: &'a Path,
-        threads: usize,
-        /// Boxes that can be read.
-        times: usize,
-        compression: Compression,
-        is_live: bool,
-    }
-
-    impl Run<'_> {
-        /// Writes `out.zarr`; tells how many boxes were read, and what was said.
-        fn write(&self, checkpoints: Checkpoints, every: Duration) -> (Result<()>, usize, String) {
-            let (scratch, budget) = (Scratch::new(self.folder, 1 << 30), Budget { total: 1 << 30 });
-            let (notes, field) = (Arc::new(Notes::default()), Field { times: self.times, read: AtomicUsize::new(0) });
-            let engine = Engine::new(self.threads, scratch, budget, Cancel::default(), notes.clone()).unwrap();
-            let engine =
-                engine.with_save_points(Some(Arc::new(SavePoints::new(checkpoints, Some(every), Arc::default()))));
-            let written = self.write_with(&engine, &field);
-            engine.settle_save_points(&written);
-            let said = notes.0.lock().unwrap().join("; ");
-            (written, field.read.into_inner(), said)
-        }
-
-        fn write_with(&self, engine: &Engine, field: &Field) -> Result<()> {
-            let create = if self.is_live { StoreWriter::create_live } else { StoreWriter::create };
-            let store = create(&self.folder.join("out.zarr"), true)?.packed(self.compression);
-            let geometry = Geometry::new(SHAPE, [1.0; 3], [0.0; 3]);
-            let spec = ImageSpec {
-                name: "field",
-                geometry: &geometry,
-                element: ElementType::F32,
-                content: Content::Field,
-                window: None,
-                extremes: None,
-            };
-            let stage = engine.resumable_stage("write field", 0);
-            write_levels::<f32>(&stage, engine, store.image("field", &spec)?, field, Reduce::Mean)?;
-            stage.finish();
-            store.finish()
-        }
-
-        /// One that reads so often in so many threads.
-        fn new(folder: &'_ Path, threads: usize, times: usize) -> Run<'_> {
-            Run { folder, threads, times, compression: Compression::Fast, is_live: false }
-        }
-
-        fn begun(&self) -> Checkpoints {
-            Checkpoints::begin(&self.folder.join("c.checkpoint"), Vec::new(), false).unwrap()
-        }
-
-        fn resumed(&self) -> Checkpoints {
-            let (checkpoints, found) = Checkpoints::resume(&self.folder.join("c.checkpoint"), Vec::new()).unwrap();
-            assert_eq!((found.stages, found.torn.len()), (1, 0));
-            checkpoints
-        }
-    }
-
-    /// All files of `out.zarr`.
-    fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
-        fn walk(folder: &Path, found: &mut Vec<(String, Vec<u8>)>, name: &str) {
-            for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap()) {
-                let name = format!("{name}/{}", entry.file_name().to_string_lossy());
-                if entry.path().is_dir() {
-                    walk(&entry.path(), found, &name);
-                } else {
-                    found.push((name, fs::read(entry.path()).unwrap()));
-                }
-            }
-        }
-        let mut found = Vec::new();
-        walk(&folder.join("out.zarr"), &mut found, "");
-        found.sort();
-        found
-    }
-
-    fn whole(compression: Compression) -> Vec<(String, Vec<u8>)> {
-        let folder = tempfile::tempdir().unwrap();
-        let run = Run { compression, ..Run::new(folder.path(), 2, usize::MAX) };
-        let (written, read, _) = run.write(run.begun(), Duration::MAX);
-        written.unwrap();
-        assert_eq!(read, CHUNKS);
-        files(folder.path())
-    }
-
-    fn shards(folder: &Path) -> Vec<std::path::PathBuf> {
-        let entries = fs::read_dir(folder.join("c.checkpoint")).unwrap().map(|entry| entry.unwrap().path());
-        let mut shards: Vec<_> = entries.filter(|path| path.extension().is_some_and(|end| end == "shard")).collect();
-        shards.sort();
-        shards
-    }
-
-    #[test]
-    fn a_run_that_fails_is_gone_on_with_by_any_number_of_threads() {
-        let wanted = whole(Compression::Fast);
-        // Batches are of 32 shards in two threads, and of 16 in one: each run gets one farther than the one before.
-        for [(first, before), (second, then)] in [[(1, 40), (2, 66)], [(2, 70), (1, 33)]] {
-            let folder = tempfile::tempdir().unwrap();
-            let run = Run::new(folder.path(), first, before);
-            let (failed, _, said) = run.write(run.begun(), Duration::ZERO);
-            assert_eq!((failed.unwrap_err().to_string().as_str(), said.as_str()), ("no more", ""));
-            assert!(!folder.path().join("out.zarr").exists());
-            let run = Run { threads: second, times: then, ..run };
-            let (failed, _, said) = run.write(run.resumed(), Duration::ZERO);
-            assert!(failed.is_err() && said.contains("write field: goes on where "), "{said}");
-            let run = Run { times: usize::MAX, ..run };
-            let (written, read, said) = run.write(run.resumed(), Duration::ZERO);
-            written.unwrap();
-            assert_eq!((read, said.as_str()), (4, "write field: goes on where 48 of 50 parts are written"));
-            assert!(files(folder.path()) == wanted, "{first} and {second} threads");
-            assert!(!folder.path().join("c.checkpoint").exists());
-        }
-    }
-
-    #[test]
-    fn what_is_damaged_or_packed_otherwise_is_written_again() {
-        let damage: fn(&Path) = |path| {
-            let mut bytes = fs::read(path).unwrap();
-            let middle = bytes.len() / 2;
-            bytes[middle] ^= 1;
-            fs::write(path, bytes).unwrap();
-        };
-        let remove: fn(&Path) = |path| fs::remove_file(path).unwrap();
-        let leave: fn(&Path) = |_| ();
-        let faults = [
-            (damage, Compression::Fast, ".shard: is damaged"),
-            (remove, Compression::Fast, ".shard: No such file"),
-            (leave, Compression::Small, "it is packed in another way"),
-        ];
-        for (fault, compression, told) in faults {
-            let folder = tempfile::tempdir().unwrap();
-            let run = Run::new(folder.path(), 2, 70);
-            assert!(run.write(run.begun(), Duration::ZERO).0.is_err());
-            fault(&shards(folder.path())[2]);
-            // Ended once more: what was of no use is not named again.
-            let run = Run { compression, ..run };
-            let (failed, _, said) = run.write(run.resumed(), Duration::ZERO);
-            assert!(failed.is_err() && said.contains(told) && said.contains("all of it is written again"), "{said}");
-            let run = Run { times: usize::MAX, ..run };
-            let (written, read, said) = run.write(run.resumed(), Duration::ZERO);
-            written.unwrap();
-            assert!(read < CHUNKS && said.contains("goes on where"), "{read}: {said}");
-            assert!(files(folder.path()) == whole(compression), "{told}");
-        }
-    }
-
-    #[test]
-    fn of_a_live_store_nothing_is_put_by() {
-        let folder = tempfile::tempdir().unwrap();
-        let run = Run { is_live: true, ..Run::new(folder.path(), 2, 70) };
-        assert!(run.write(run.begun(), Duration::ZERO).0.is_err());
-        assert!(folder.path().join("out.zarr").exists() && !folder.path().join("c.checkpoint").exists());
-    }
-
-    #[test]
-    fn batches_are_whole_parts_and_no_longer_than_that_where_they_can() {
-        let begins = [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60];
-        let ends = |most: usize| {
-            let mut ends = vec![0];
-            while ends[ends.len() - 1] < begins.len() - 1 {
-                ends.push(batch(&begins, ends[ends.len() - 1], most));
-            }
-            ends
-        };
-        assert_eq!(ends(16), [0, 2, 4, 7, 10]);
-        assert_eq!(ends(1), (0..=10).collect::<Vec<_>>());
-        assert_eq!(ends(1000), [0, 10]);
-    }
-}
+mod tests;

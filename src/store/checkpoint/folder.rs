@@ -15,9 +15,10 @@ use super::lock::{LOCK, lock, worker};
 use super::names::{field_name, manifest_name, names, numbers};
 use super::payload::{self, SavedField};
 use super::record;
-use crate::error::{Error, Result};
-use crate::store::HiddenFile;
+use crate::error::{Error, Result, one_line};
+use crate::grid::digits::bytes;
 use crate::store::hidden::remove_abandoned;
+use crate::store::{HiddenFile, free_space};
 
 /// So many manifests are kept, with what they name.
 const KEPT: usize = 2;
@@ -203,6 +204,12 @@ impl Checkpoints {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).entries.remove(key);
     }
 
+    /// What a stage knows now, without files: the next checkpoint tells it.
+    pub fn know(&self, key: &str, facts: Vec<u8>) {
+        let entry = Entry { facts, files: Vec::new(), links: Vec::new() };
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).entries.insert(key.to_owned(), entry);
+    }
+
     /// Puts by what a stage knows, in place of what it did before. `goes_on` is asked between bricks, and between files that are
     /// linked.
     ///
@@ -217,6 +224,25 @@ impl Checkpoints {
     ) -> io::Result<Taken> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         self.open(&mut state)?;
+        let needed = fields.iter().map(|field| field.saved_bytes()).sum();
+        self.make_room(&mut state, needed)?;
+        let taken = self.take(&mut state, key, facts, (fields, linked), goes_on);
+        if taken.is_err() {
+            // What there is of one that is not whole takes room that the run may need.
+            self.drop_older(&mut state);
+        }
+        taken.map_err(|error| self.explained(error, needed))
+    }
+
+    /// Writes a checkpoint.
+    fn take(
+        &self,
+        state: &mut State,
+        key: &str,
+        facts: Vec<u8>,
+        (fields, linked): (&[&dyn SavedField], &[Linked]),
+        goes_on: &dyn Fn() -> io::Result<()>,
+    ) -> io::Result<Taken> {
         let number = state.number + 1;
         // What a number that was not finished has left must not stand in the way of the next.
         state.number = number;
@@ -239,21 +265,58 @@ impl Checkpoints {
         File::open(&self.folder).and_then(|folder| folder.sync_all())?;
         state.kept.insert(number, manifest.needed());
         state.entries = manifest.entries;
-        self.drop_older(&mut state);
+        self.drop_older(state);
         Ok(Taken { bytes, linking })
     }
 
-    /// Makes the folder where this run has not taken a checkpoint yet, and locks it.
+    /// Sees to it that a checkpoint may fit: of those before the last one alone stays, where there is too little room for both. The
+    /// disk may be that of the output, which is not to fail because of a checkpoint.
+    fn make_room(&self, state: &mut State, needed: u64) -> io::Result<()> {
+        let has_room = || free_space(&self.folder).is_none_or(|free| free > needed);
+        if !has_room() && state.kept.len() > 1 {
+            while state.kept.len() > 1 {
+                state.kept.pop_first();
+            }
+            self.drop_older(state);
+        }
+        if has_room() { Ok(()) } else { Err(self.explained(io::ErrorKind::StorageFull.into(), needed)) }
+    }
+
+    /// What the user has to know of a failure: where it was, and of a full disk how much is needed.
+    fn explained(&self, error: io::Error, needed: u64) -> io::Error {
+        let folder = one_line(self.folder.display().to_string());
+        if !matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) {
+            // What did not come from the system tells all there is to tell.
+            let is_told = error.raw_os_error().is_none();
+            return if is_told { error } else { io::Error::new(error.kind(), format!("{folder}: {error}")) };
+        }
+        let free = free_space(&self.folder).map_or(String::new(), |free| format!(", and has {}", bytes(free)));
+        let what = format!("{folder}: the disk is full: a checkpoint needs {}{free}; make room there", bytes(needed));
+        io::Error::new(io::ErrorKind::StorageFull, what)
+    }
+
+    /// Makes the folder where this run has not taken a checkpoint yet, or somebody has removed it, and locks it.
     fn open(&self, state: &mut State) -> io::Result<()> {
+        if state.lock.is_some() && !self.folder.is_dir() {
+            (state.lock, state.kept) = (None, BTreeMap::new());
+        }
         if state.lock.is_none() {
             state.is_made = !self.folder.is_dir();
-            fs::create_dir_all(&self.folder)?;
+            let failed = |error: io::Error| {
+                io::Error::new(error.kind(), format!("{}: cannot be made: {error}", self.folder.display()))
+            };
+            fs::create_dir_all(&self.folder).map_err(failed)?;
             state.lock = lock(&self.folder).map_err(io::Error::other)?;
             if !numbers(&self.folder).is_empty() {
                 state.lock = None;
                 return Err(io::Error::other("another run has put checkpoints into the same folder meanwhile"));
             }
         }
+        // What somebody has removed is not named again.
+        let is_there = |name: &str| self.folder.join(name).exists();
+        state.entries.retain(|_, entry| {
+            entry.files.iter().all(|file| is_there(&file.name)) && entry.links.iter().all(|link| is_there(&link.name))
+        });
         Ok(())
     }
 

@@ -1,9 +1,9 @@
 //! The bricks of a field in a file: a head, then of each stored brick that was written its slot, the CRC-32C of slot and values, and
-//! its values, little-endian, as they lie in it.
+//! its values, little-endian, as they lie in it. Of a field that has faces alone it is these.
 
 use std::io::{self, Read, Write};
 
-use crate::grid::{BrickSet, Slot};
+use crate::grid::{BrickSet, FACES, Slot};
 use crate::store::{BrickArray, Element};
 
 /// What the files begin with.
@@ -54,7 +54,17 @@ impl<T: Element> SavedField for SomeBricks<'_, T> {
 }
 
 fn bytes_of<T: Element>(field: &BrickArray<T>, bricks: usize) -> u64 {
-    (HEAD + bricks * (BRICK_HEAD + field.values_of_brick() * size_of::<T>())) as u64
+    (HEAD + bricks * (BRICK_HEAD + values_of(field) * size_of::<T>())) as u64
+}
+
+/// Values that are kept of a brick.
+fn values_of<T: Element>(field: &BrickArray<T>) -> usize {
+    let area = field.set().grid().edge().pow(2) as usize;
+    if is_faces_alone(field) { FACES.len() * area } else { field.values_of_brick() }
+}
+
+fn is_faces_alone<T: Element>(field: &BrickArray<T>) -> bool {
+    field.values_of_brick() == 0 && field.has_faces()
 }
 
 fn save<T: Element>(
@@ -64,11 +74,17 @@ fn save<T: Element>(
     goes_on: &dyn Fn() -> io::Result<()>,
 ) -> io::Result<()> {
     out.write_all(&head(field, slots.len() as u64))?;
-    let mut bytes = Vec::with_capacity(field.values_of_brick() * size_of::<T>());
+    let mut bytes = Vec::with_capacity(values_of(field) * size_of::<T>());
     for &slot in slots {
         goes_on()?;
         bytes.clear();
-        field.read(slot, |values| T::append_bytes(values, &mut bytes));
+        if is_faces_alone(field) {
+            for face in FACES {
+                field.read_face(slot, face, |values| T::append_bytes(values, &mut bytes));
+            }
+        } else {
+            field.read(slot, |values| T::append_bytes(values, &mut bytes));
+        }
         out.write_all(&slot.to_le_bytes())?;
         out.write_all(&checksum(slot, &bytes).to_le_bytes())?;
         out.write_all(&bytes)?;
@@ -92,7 +108,7 @@ fn head<T: Element>(field: &BrickArray<T>, count: u64) -> Vec<u8> {
     let mut head = MAGIC.to_vec();
     head.extend(digest(field.set()).to_le_bytes());
     head.extend(name);
-    head.extend((field.values_of_brick() as u64).to_le_bytes());
+    head.extend((values_of(field) as u64).to_le_bytes());
     head.extend(count.to_le_bytes());
     head.extend(crc32c::crc32c(&head).to_le_bytes());
     head
@@ -153,12 +169,16 @@ pub fn restore<T: Element>(field: &BrickArray<T>, from: &mut dyn Read) -> io::Re
     if there[..] != head(field, count)[..] {
         return Err(damaged("is of another field than that of this run"));
     }
-    let mut record = vec![0; BRICK_HEAD + field.values_of_brick() * size_of::<T>()];
+    let mut record = vec![0; BRICK_HEAD + values_of(field) * size_of::<T>()];
     for _ in 0..count {
         from.read_exact(&mut record)?;
         let (slot, bytes) = take(&record)?;
         if !field.set().owned().contains(&slot) {
             return Err(damaged("names a brick that the field has not"));
+        }
+        if is_faces_alone(field) {
+            field.write_faces(slot, |values| T::fill_from_bytes(values, bytes));
+            continue;
         }
         field.write(slot, |values| T::fill_from_bytes(values, bytes));
         if field.has_faces() {
@@ -227,6 +247,26 @@ mod tests {
             let is_back = [1, 3].contains(&slot);
             assert_eq!(after.unwritten(slot).is_none(), is_back, "{slot}");
             after.read(slot, |brick| assert!(!is_back || brick.iter().all(|&value| value == slot as f32)));
+        }
+    }
+
+    #[test]
+    fn faces_come_back_where_there_is_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new(dir.path(), 1 << 30);
+        let faces = || BrickArray::blank_faces(&scratch, field(&scratch).set(), 9.0_f32).unwrap();
+        let (before, after) = (faces(), faces());
+        before.write_faces(2, |faces| (0..).zip(faces).for_each(|(n, value)| *value = n as f32));
+        let mut file = Vec::new();
+        before.save(&mut file, &|| Ok(())).unwrap();
+        assert_eq!(file.len() as u64, before.saved_bytes());
+        check(&mut file.as_slice(), file.len() as u64).unwrap();
+        restore(&after, &mut file.as_slice()).unwrap();
+        assert_eq!((after.unwritten(2), after.unwritten(1)), (None, Some(9.0)));
+        for (n, face) in FACES.into_iter().enumerate() {
+            after.read_face(2, face, |values| {
+                assert_eq!((values[0], values[255]), ((n * 256) as f32, (n * 256 + 255) as f32))
+            });
         }
     }
 

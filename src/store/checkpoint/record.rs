@@ -14,7 +14,7 @@ use serde::de::DeserializeOwned;
 /// What manifests begin with.
 const MAGIC: [u8; 8] = *b"slchkpt\n";
 /// The version of their form.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Magic, version, length, checksum.
 const HEAD: usize = 8 + 4 + 8 + 4;
 /// No record is larger: what claims to be is damaged.

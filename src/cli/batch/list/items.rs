@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::flags::{Flags, Kind};
 use super::manifest::{Entry, Given, Key, Manifest};
 use super::problems::Problems;
+use crate::job::resources::check_threads;
 
 /// Keys that are no flags.
 const NO_FLAGS: [&str; 4] = ["command", "name", "images", "sources"];
@@ -284,6 +285,11 @@ impl Maker<'_> {
         let files = read.files.iter().map(|path| (as_written(path), path.clone())).collect();
         let (resources, writes) = (read.resources, read.writes);
         let (memory, threads, scratch) = (resources.memory, resources.threads, resources.scratch);
+        if let Some(Err(error)) = threads.map(check_threads) {
+            let line = entry.keys.iter().find(|key| key.name == "threads").map(|key| key.line);
+            problems.add(line.unwrap_or(entry.line), error.to_string());
+            return None;
+        }
         Some(Item { name, kind, words, inputs, files, writes, settings, memory, threads, scratch })
     }
 }

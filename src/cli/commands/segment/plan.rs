@@ -19,8 +19,8 @@ impl Job {
         estimate(self.stack.as_ref(), &self.crop, &guides, &self.settings, threads, self.needs_store())
     }
 
-    /// Refuses a run that cannot fit memory or disk.
-    pub(crate) fn fits(&self, estimate: &Estimate) -> Result<()> {
+    /// Refuses a run that cannot fit memory or disk. Returns what it takes of the disk at most.
+    pub(crate) fn fits(&self, estimate: &Estimate) -> Result<u64> {
         let coarser =
             "a part of the image with --crop; a spacing of the image that is wrong is put right with --image-spacing";
         let disk = Disk::of_image(&self.resources, self.args.output.store(), estimate, coarser)?;

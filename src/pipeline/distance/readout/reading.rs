@@ -110,15 +110,15 @@ impl<'a, P: Precision> Reading<'a, P> {
         match &self.images {
             // What is kept for who asked for it is not in a checkpoint.
             Some(images) if rest.len() == self.visits.len() && self.what.kept.is_none() => {
-                in_batches(&stage, &images.all(), &self.visits, &mut measured, |batch, measured| {
-                    let more = self.read_out(&stage, solved, &rest[batch])?;
+                in_batches(&stage, &images.all(), &self.visits, &mut measured, |batch, door, measured| {
+                    let more = self.read_out(&stage, solved, batch, |visit| door.opens(visit))?;
                     *measured = std::mem::take(measured).and(more);
                     Ok(())
                 })?;
             }
             _ => {
                 stage.expect(rest.len() as u64);
-                measured = measured.and(self.read_out(&stage, solved, &rest)?);
+                measured = measured.and(self.read_out(&stage, solved, &rest, |_| true)?);
             }
         }
         let found =
@@ -160,9 +160,18 @@ impl<'a, P: Precision> Reading<'a, P> {
         self.images.as_ref().map_or(Ok(()), |images| images.describe([low, max]))
     }
 
-    /// Takes some visits; returns what they measured.
-    fn read_out(&self, stage: &Stage<'_>, solved: &Solved<'_, P>, visits: &[usize]) -> Result<Measured> {
+    /// Takes those of some visits that are `wanted`; returns what they measured.
+    fn read_out(
+        &self,
+        stage: &Stage<'_>,
+        solved: &Solved<'_, P>,
+        visits: &[usize],
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Result<Measured> {
         let measured = stage.run(visits, &self.workers, |(voxels, buffers), &visit| {
+            if !wanted(visit) {
+                return Ok(Measured::default());
+            }
             self.visits[visit].iter().try_fold(Measured::default(), |before, part| {
                 let measured = self.what.measure(part, solved, self.inside.as_ref(), voxels)?;
                 if let Some(kept) = self.what.kept {
@@ -226,7 +235,7 @@ impl<P: Precision> Early<P> for Reading<'_, P> {
         }
         let quiet = self.engine.beside();
         let stage = quiet.stage("read out early", 0);
-        let more = self.read_out(&stage, solved, &ready)?;
+        let more = self.read_out(&stage, solved, &ready, |_| true)?;
         let mut progress = self.progress();
         progress.measured = std::mem::take(&mut progress.measured).and(more);
         for visit in ready {

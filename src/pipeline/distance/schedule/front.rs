@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use super::passing::{Passing, Watch};
 use crate::error::Result;
-use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Relax, SavePoint, Stage, Until, Waves, Workers};
+use crate::exec::{Boundary, Exchange, HaloPlan, Place, Reach, Relax, SavePoint, Stage, Until, Waves, Workers};
 use crate::exec::{checkerboard, corner_colours};
-use crate::grid::{Box3, FACES, NEIGHBOURS_26, Slot};
+use crate::grid::{Box3, BrickSet, FACES, NEIGHBOURS_26, Slot};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::tile_order::arrival::{outgoing, outgoing_anywhere};
@@ -24,8 +24,17 @@ use crate::tile::HaloTile;
 /// How far beyond the smallest entering value a round reaches, in brick edges.
 const ROUND_WIDTH: f64 = 0.5;
 
+/// Voxels that a thread takes on between two places within a wave where a run can be put by: a second's work, or less; so many that
+/// threads wait little for the last of them. Fields of tests are small.
+const VOXELS_BETWEEN_PAUSES: usize = if cfg!(test) { 1 << 12 } else { 1 << 23 };
+
+/// The same in bricks.
+pub(super) fn bricks_between_pauses(set: &BrickSet) -> usize {
+    (VOXELS_BETWEEN_PAUSES / set.grid().brick_len()).max(1)
+}
+
 /// Carries distance from this rank's bricks in `start`, which hold fixed voxels, as far as `farthest`; `watch` hears what the
-/// front has passed.
+/// front has passed. `then` is made of the distance and leaves it as it is.
 pub(crate) fn advance_front<M: DistanceMethod>(
     stage: &Stage<'_>,
     method: &M,
@@ -33,6 +42,7 @@ pub(crate) fn advance_front<M: DistanceMethod>(
     start: &[Slot],
     (spacing, farthest): ([f64; 3], f64),
     watch: Option<&dyn Watch>,
+    then: impl FnOnce() -> Result<()>,
 ) -> Result<()> {
     let set = array.set();
     let edge = set.grid().edge() as usize;
@@ -57,12 +67,20 @@ pub(crate) fn advance_front<M: DistanceMethod>(
     for &slot in start {
         (front.arrival[slot as usize], front.unsent[slot as usize]) = (0.0, true);
     }
-    front.resume()?;
+    let within = front.resume()?;
     let workers = &Workers::new(move || (HaloTile::new(edge), M::work(edge)));
     let width = ROUND_WIDTH * edge as f64 * spacing.iter().copied().fold(f64::INFINITY, f64::min);
-    Waves { stage, exchange, workers, waves: &waves }.relax(&mut front, Until { width, farthest })?;
+    let waves = Waves { stage, exchange, workers, waves: &waves };
+    if let Some(within) = within {
+        waves.round(&mut front, within)?;
+    }
+    waves.relax(&mut front, Until { width, farthest })?;
     stage.iterated(front.rounds, 0.0);
-    front.put_by(true)
+    front.put_by(true, None)?;
+    match front.save_point.take() {
+        Some(mut save_point) => save_point.step(|| front.known(None), &[array], then),
+        None => then(),
+    }
 }
 
 struct Front<'a, M: DistanceMethod> {
@@ -81,10 +99,12 @@ struct Front<'a, M: DistanceMethod> {
     save_point: Option<SavePoint<'a>>,
 }
 
-/// What the front knows between two rounds, beside its field.
+/// What the front knows beside its field.
 #[derive(Serialize, Deserialize)]
 struct Known {
     rounds: u64,
+    /// The round that is under way; between two there is none.
+    within: Option<Place>,
     arrival: Vec<f64>,
     unsent: Vec<bool>,
 }
@@ -93,21 +113,25 @@ struct Known {
 type Outgoing = [f64; NEIGHBOURS_26.len()];
 
 impl<M: DistanceMethod> Front<'_, M> {
-    /// Goes on where an earlier run was ended between two rounds: the field, and what is due, are all that those to come depend
-    /// on. Bricks that had come to rest before that run ended are not shown as passed again; they are read out at the end.
-    fn resume(&mut self) -> Result<()> {
-        let Some(saved) = self.save_point.as_ref().and_then(SavePoint::saved) else { return Ok(()) };
+    /// Goes on where an earlier run was ended, and returns where in a round that was: the field, and what is due, are all that what
+    /// comes depends on. Bricks that had come to rest before that run ended are not shown as passed again; they are read out at
+    /// the end.
+    fn resume(&mut self) -> Result<Option<Place>> {
+        let Some(saved) = self.save_point.as_ref().and_then(SavePoint::saved) else { return Ok(None) };
         let known: Known = saved.facts()?;
         saved.restore(0, self.array)?;
         (self.rounds, self.arrival, self.unsent, self.passing) = (known.rounds, known.arrival, known.unsent, None);
-        Ok(())
+        Ok(known.within)
     }
 
-    /// Between two rounds.
-    fn put_by(&mut self, ended: bool) -> Result<()> {
+    fn known(&self, within: Option<Place>) -> Known {
+        Known { rounds: self.rounds, within, arrival: self.arrival.clone(), unsent: self.unsent.clone() }
+    }
+
+    /// Between two rounds, or within one.
+    fn put_by(&mut self, ended: bool, within: Option<Place>) -> Result<()> {
         let Some(mut save_point) = self.save_point.take() else { return Ok(()) };
-        let known = || Known { rounds: self.rounds, arrival: self.arrival.clone(), unsent: self.unsent.clone() };
-        save_point.reached(ended, known, &[self.array])?;
+        save_point.reached(ended, || self.known(within), &[self.array])?;
         self.save_point = Some(save_point);
         Ok(())
     }
@@ -160,7 +184,7 @@ impl<M: DistanceMethod> Relax for Front<'_, M> {
     }
 
     fn before_round(&mut self, nearest: f64) -> Result<()> {
-        self.put_by(false)?;
+        self.put_by(false, None)?;
         self.rounds += 1;
         self.passing.as_mut().map_or(Ok(()), |passing| passing.reach(self.array.set(), nearest))
     }
@@ -170,6 +194,15 @@ impl<M: DistanceMethod> Relax for Front<'_, M> {
             passing.visited(slot, self.arrival[slot as usize], visit.is_some());
         }
         (self.arrival[slot as usize], self.unsent[slot as usize]) = (f64::INFINITY, false);
+    }
+
+    /// A brick that was visited is not due any more, so what is due tells which of a wave are still to come.
+    fn pauses_after(&self) -> Option<usize> {
+        self.save_point.as_ref().map(|_| bricks_between_pauses(self.array.set()))
+    }
+
+    fn paused(&mut self, at: Place) -> Result<()> {
+        self.put_by(false, Some(at))
     }
 
     fn receive(&mut self, slot: Slot, outgoing: &Outgoing) {

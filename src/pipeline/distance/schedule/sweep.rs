@@ -1,16 +1,21 @@
 //! The `sweep` schedule: ordered passes over all bricks, bit for bit the textbook's triple loops for any brick size and
 //! number of threads and ranks (docs/algorithms.md, "The sweep schedule").
 
+use serde::{Deserialize, Serialize};
+
+use super::front::bricks_between_pauses;
 use crate::error::Result;
-use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Relax, Stage, Waves, Workers, sweep_waves};
+use crate::exec::sweep_waves;
+use crate::exec::{Boundary, Exchange, HaloPlan, Place, Reach, Relax, SavePoint, Saved, Stage, Waves, Workers};
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::distance::state::method::OrderedSweeps;
 use crate::kernel::distance::state::neighbours::SWEEPS;
 use crate::store::BrickArray;
+use crate::store::checkpoint::SavedField;
 use crate::tile::HaloTile;
 
 /// What a visit of a brick left.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Visit {
     /// Whether any voxel fell.
     pub(crate) changed: bool,
@@ -31,6 +36,20 @@ pub(crate) trait Companion<M: OrderedSweeps>: Sync {
 
     /// Bricks of this rank changed in a wave.
     fn after_wave(&mut self, _changed: &[(Slot, Visit)]) -> Result<()> {
+        Ok(())
+    }
+
+    /// What it knows for a checkpoint within a sweep: the fields of it, which follow that of the method, and what each brick was left
+    /// with.
+    fn known(&self) -> (Vec<&dyn SavedField>, Vec<Visit>) {
+        (Vec::new(), Vec::new())
+    }
+
+    /// Takes up what another run knew; its fields are those of a checkpoint from the `first` one on.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    fn resume(&mut self, _saved: &Saved, _first: usize, _visits: Vec<Visit>) -> Result<()> {
         Ok(())
     }
 
@@ -65,7 +84,7 @@ impl<M: OrderedSweeps> Companion<M> for NoCompanion<'_> {
 /// Sweeps up to `iterations` times in all eight directions, or until an iteration changes nothing.
 ///
 /// `start` are this rank's bricks that hold fixed voxels. A brick in which a sweep changed nothing is passed over until
-/// one beside it changes: no sweep of any direction could change it.
+/// one beside it changes: no sweep of any direction could change it. `then` is made of the distance and leaves it as it is.
 pub(crate) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
     stage: &Stage<'_>,
     method: &M,
@@ -73,6 +92,7 @@ pub(crate) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
     companion: &mut C,
     start: &[Slot],
     iterations: u32,
+    then: impl FnOnce() -> Result<()>,
 ) -> Result<()> {
     let set = array.set();
     let edge = set.grid().edge() as usize;
@@ -80,26 +100,53 @@ pub(crate) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
     let exchange = &Exchange::new(stage.comm(), set, &plan)?;
     let workers = &Workers::new(move || (HaloTile::new(edge), M::work(edge), C::work(edge)));
     let begun_elsewhere = exchange.faces(array, start)?;
-    let (quiet, changed) = (vec![true; set.len()], Vec::new());
-    let mut sweeps = Sweeps { method, array, companion, plan, upward: SWEEPS[0], quiet, changed };
+    let known = Known { quiet: vec![true; set.len()], ..Known::default() };
+    let save_point = stage.save_point();
+    let mut sweeps = Sweeps { method, array, companion, plan, known, changed: Vec::new(), save_point };
     for &slot in start.iter().chain(&begun_elsewhere) {
-        sweeps.quiet[slot as usize] = false;
+        sweeps.known.quiet[slot as usize] = false;
         sweeps.receive(slot, &[]);
     }
-    for _ in 0..iterations {
-        let mut resting = true;
-        for upward in SWEEPS {
-            sweeps.upward = upward;
+    sweeps.resume()?;
+    stage.iterated(sweeps.known.iterations.into(), 0.0);
+    while !sweeps.known.ended && sweeps.known.iterations < iterations {
+        while sweeps.known.sweep < SWEEPS.len() {
+            let upward = sweeps.upward();
+            let from = std::mem::take(&mut sweeps.known.within).unwrap_or(Place::before(0.0));
             let waves = &sweep_waves(set, upward);
-            resting &= !Waves { stage, exchange, workers, waves }.round(&mut sweeps, 0.0)?;
+            Waves { stage, exchange, workers, waves }.round(&mut sweeps, from)?;
             sweeps.companion.after_sweep(stage, upward)?;
+            sweeps.known.sweep += 1;
+            sweeps.put_by(None)?;
         }
         stage.iterated(1, 0.0);
-        if !stage.comm().any(!resting)? {
-            break;
-        }
+        let known = &mut sweeps.known;
+        known.ended = !stage.comm().any(known.changed)?;
+        (known.iterations, known.sweep, known.changed) = (known.iterations + 1, 0, false);
     }
-    Ok(())
+    sweeps.known.ended = true;
+    sweeps.put_by(None)?;
+    match sweeps.save_point.take() {
+        Some(mut save_point) => sweeps.with_all(None, |known, fields| save_point.step(known, fields, then)),
+        None => then(),
+    }
+}
+
+/// What sweeps know beside their fields.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Known {
+    /// Iterations that are done, and sweeps of the one that is under way.
+    iterations: u32,
+    sweep: usize,
+    /// Whether this one has changed anything.
+    changed: bool,
+    /// The sweep that is under way; between two there is none.
+    within: Option<Place>,
+    /// Bricks that no sweep of any direction could change.
+    quiet: Vec<bool>,
+    /// Bricks of the wave under way that were visited; before one begins there are none.
+    visited: Vec<Slot>,
+    ended: bool,
 }
 
 struct Sweeps<'a, M: OrderedSweeps, C> {
@@ -107,11 +154,52 @@ struct Sweeps<'a, M: OrderedSweeps, C> {
     array: &'a BrickArray<M::State>,
     companion: &'a mut C,
     plan: HaloPlan,
-    upward: [bool; 3],
-    /// Bricks that no sweep of any direction could change.
-    quiet: Vec<bool>,
+    known: Known,
     /// Those of this rank that changed in the wave.
     changed: Vec<(Slot, Visit)>,
+    save_point: Option<SavePoint<'a>>,
+}
+
+impl<M: OrderedSweeps, C: Companion<M>> Sweeps<'_, M, C> {
+    fn upward(&self) -> [bool; 3] {
+        SWEEPS[self.known.sweep]
+    }
+
+    /// Goes on where an earlier run was ended.
+    fn resume(&mut self) -> Result<()> {
+        let Some(saved) = self.save_point.as_ref().and_then(SavePoint::saved) else { return Ok(()) };
+        let (known, visits) = saved.facts()?;
+        saved.restore(0, self.array)?;
+        self.companion.resume(&saved, 1, visits)?;
+        self.known = known;
+        Ok(())
+    }
+
+    /// Tells what changed since it was told last.
+    fn tell_companion(&mut self) -> Result<()> {
+        let changed = std::mem::take(&mut self.changed);
+        self.companion.after_wave(&changed)
+    }
+
+    /// Between two sweeps, or within one.
+    fn put_by(&mut self, within: Option<Place>) -> Result<()> {
+        let Some(mut save_point) = self.save_point.take() else { return Ok(()) };
+        let ended = self.known.ended;
+        self.with_all(within, |known, fields| save_point.reached(ended, known, fields))?;
+        self.save_point = Some(save_point);
+        Ok(())
+    }
+
+    /// Hands on what a checkpoint holds.
+    fn with_all<R>(
+        &self,
+        within: Option<Place>,
+        take: impl FnOnce(&dyn Fn() -> (Known, Vec<Visit>), &[&dyn SavedField]) -> R,
+    ) -> R {
+        let (of_companion, visits) = self.companion.known();
+        let fields: Vec<&dyn SavedField> = std::iter::once(self.array as &dyn SavedField).chain(of_companion).collect();
+        take(&|| (Known { within, ..self.known.clone() }, visits.clone()), &fields)
+    }
 }
 
 impl<M: OrderedSweeps, C: Companion<M>> Relax for Sweeps<'_, M, C> {
@@ -125,12 +213,13 @@ impl<M: OrderedSweeps, C: Companion<M>> Relax for Sweeps<'_, M, C> {
     }
 
     fn priority(&self, slot: Slot) -> f64 {
-        if self.quiet[slot as usize] { f64::INFINITY } else { 0.0 }
+        let is_due = !self.known.quiet[slot as usize] && !self.known.visited.contains(&slot);
+        if is_due { 0.0 } else { f64::INFINITY }
     }
 
     fn visit(&self, (tile, work, along): &mut Self::Work, slot: Slot, _wave: usize) -> Result<Visit> {
         self.plan.gather(self.array, slot, Boundary::Constant(M::UNKNOWN), tile);
-        let visit = self.companion.sweep(Swept { method: self.method, tile, work, along }, slot, self.upward);
+        let visit = self.companion.sweep(Swept { method: self.method, tile, work, along }, slot, self.upward());
         if visit.changed {
             self.plan.scatter(tile, self.array, slot);
         }
@@ -142,7 +231,11 @@ impl<M: OrderedSweeps, C: Companion<M>> Relax for Sweeps<'_, M, C> {
     }
 
     fn visited(&mut self, slot: Slot, visit: Visit) {
-        self.quiet[slot as usize] = !visit.changed;
+        self.known.quiet[slot as usize] = !visit.changed;
+        self.known.changed |= visit.changed;
+        if self.save_point.is_some() {
+            self.known.visited.push(slot);
+        }
         if visit.changed {
             self.changed.push((slot, visit));
         }
@@ -151,11 +244,20 @@ impl<M: OrderedSweeps, C: Companion<M>> Relax for Sweeps<'_, M, C> {
     fn receive(&mut self, slot: Slot, _note: &[f64; 0]) {
         let set = self.array.set();
         let beside = FACES.iter().filter_map(|face| set.neighbour(slot, face.offset()));
-        beside.for_each(|n| self.quiet[n as usize] = false);
+        beside.for_each(|n| self.known.quiet[n as usize] = false);
+    }
+
+    fn pauses_after(&self) -> Option<usize> {
+        self.save_point.as_ref().map(|_| bricks_between_pauses(self.array.set()))
+    }
+
+    fn paused(&mut self, at: Place) -> Result<()> {
+        self.tell_companion()?;
+        self.put_by(Some(at))
     }
 
     fn after_wave(&mut self) -> Result<()> {
-        let changed = std::mem::take(&mut self.changed);
-        self.companion.after_wave(&changed)
+        self.known.visited.clear();
+        self.tell_companion()
     }
 }

@@ -7,12 +7,13 @@
 use super::sweep::{Companion, Swept, Visit};
 use super::trace::Missing;
 use crate::error::Result;
-use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Stage, Until, Waves, Workers, corner_colours};
+use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Saved, Stage, Until, Waves, Workers, corner_colours};
 use crate::grid::{FACES, Slot, SourceState};
 use crate::kernel::distance::methods::fast_sweeping::FastSweeping;
 use crate::kernel::distance::methods::sweep_sources::{Fell, Ghosts, SweepSources};
 use crate::kernel::distance::state::neighbours::SWEEPS;
 use crate::kernel::distance::state::precision::Precision;
+use crate::store::checkpoint::SavedField;
 use crate::store::{BrickArray, Scratch};
 
 /// The sources of a field that is being swept.
@@ -133,6 +134,17 @@ impl<P: Precision> Companion<FastSweeping<P, f64>> for TrackedSweeps<'_> {
         for slot in self.exchange.faces(self.states, &changed)? {
             self.visits[slot as usize].changed = true;
         }
+        Ok(())
+    }
+
+    fn known(&self) -> (Vec<&dyn SavedField>, Vec<Visit>) {
+        (vec![self.states, &self.before], self.visits.clone())
+    }
+
+    fn resume(&mut self, saved: &Saved, first: usize, visits: Vec<Visit>) -> Result<()> {
+        saved.restore(first, self.states)?;
+        saved.restore(first + 1, &self.before)?;
+        self.visits = visits;
         Ok(())
     }
 

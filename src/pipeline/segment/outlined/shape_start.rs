@@ -148,7 +148,7 @@ fn distance_to(
 ) -> Result<BrickArray<f32>> {
     let bins = PointBins::new(BrickGrid::new(geometry.shape, CELL as i64), geometry, cloud);
     let sources = Sources::cloud(geometry, cloud, &bins);
-    let stage = engine.stage(&name("distance", marks), 11 * set.len() as u64);
+    let stage = engine.resumable_stage(&name("distance", marks), 11 * set.len() as u64);
     stage.voxels((set.len() * set.grid().brick_len()) as u64);
     let farthest = geometry.length(geometry.shape);
     let distance = cloud_distance(&stage, engine, &sources, set, settings.method, farthest as f32)?;

@@ -154,3 +154,73 @@ fn runs_that_began_in_one_folder_leave_each_others_checkpoints() {
     second.clear();
     assert_eq!(numbers(&folder), [1]);
 }
+
+/// A field that claims to be larger than any disk.
+struct Endless;
+
+impl SavedField for Endless {
+    fn saved_bytes(&self) -> u64 {
+        1 << 60
+    }
+
+    fn save(&self, _: &mut dyn Write, _: &dyn Fn() -> io::Result<()>) -> io::Result<()> {
+        panic!("what does not fit is not begun with")
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_told_with_what_it_needs_and_the_last_one_stays() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("c.checkpoint");
+    let scratch = Scratch::new(dir.path(), 1 << 30);
+    let run = Checkpoints::begin(&folder, identity("2"), false).unwrap();
+    for step in 1..=2_u8 {
+        run.save("moving", vec![step], (&[&field(&scratch, f32::from(step))], &[]), &|| Ok(())).unwrap();
+    }
+    assert_eq!(numbers(&folder), [1, 2]);
+    let full = run.save("moving", vec![3], (&[&Endless], &[]), &|| Ok(())).unwrap_err();
+    let said = full.to_string();
+    assert_eq!(full.kind(), io::ErrorKind::StorageFull);
+    assert!(said.contains("c.checkpoint: the disk is full: a checkpoint needs 1.0 EiB, and has "), "{said}");
+    // The room of the one before may be what the run needs.
+    assert_eq!((numbers(&folder), names(&folder).len()), (vec![2], 2));
+    // Of one that fails half way nothing stays.
+    let small = field(&scratch, 4.0);
+    let count = std::cell::Cell::new(0);
+    let goes_on = || {
+        count.set(count.get() + 1);
+        if count.get() < 7 { Ok(()) } else { Err(io::Error::other("enough")) }
+    };
+    assert!(run.save("moving", vec![4], (&[&small, &small], &[]), &goes_on).is_err());
+    assert_eq!((numbers(&folder), names(&folder).len()), (vec![2], 2));
+    drop(run);
+    let (run, found) = Checkpoints::resume(&folder, identity("2")).unwrap();
+    assert_eq!((found.torn.len(), run.entry("moving").unwrap().facts), (0, vec![2]));
+}
+
+#[test]
+fn what_somebody_removes_is_not_named_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("c.checkpoint");
+    let scratch = Scratch::new(dir.path(), 1 << 30);
+    let run = Checkpoints::begin(&folder, identity("2"), false).unwrap();
+    let save = |stage: &str| run.save(stage, vec![1], (&[&field(&scratch, 1.0)], &[]), &|| Ok(()));
+    save("first").unwrap();
+    save("second").unwrap();
+    fs::remove_file(folder.join("000001-0.bricks")).unwrap();
+    save("third").unwrap();
+    let known = || ["first", "second", "third"].map(|stage| run.entry(stage).is_some());
+    assert_eq!(known(), [false, true, true]);
+    // All of it, and something else comes in its place: told each time, and good again when that goes.
+    fs::remove_dir_all(&folder).unwrap();
+    fs::write(&folder, "mine").unwrap();
+    let refused = save("first").unwrap_err().to_string();
+    assert!(refused.contains("c.checkpoint: cannot be made: "), "{refused}");
+    fs::remove_file(&folder).unwrap();
+    save("first").unwrap();
+    assert_eq!((known(), numbers(&folder).len()), ([true, false, false], 1));
+    let busy = Checkpoints::resume(&folder, identity("2")).err().unwrap().to_string();
+    assert!(busy.contains("belongs to a run that goes on"), "{busy}");
+    run.clear();
+    assert!(!folder.exists());
+}

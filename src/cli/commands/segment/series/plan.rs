@@ -27,7 +27,9 @@ impl Series<'_> {
         job.fits(&estimate)?;
         let all = Estimate { output, ..estimate };
         let fewer = "fewer times with --time A:B, or a part of the image with --crop";
-        Disk::of_image(&job.resources, self.args.output.store(), &all, fewer)?.check(|text| self.console.note(text))
+        Disk::of_image(&job.resources, self.args.output.store(), &all, fewer)?
+            .check(|text| self.console.note(text))
+            .map(drop)
     }
 
     /// Prints the plan of all times.

@@ -1,0 +1,52 @@
+//! Distances that are ended anywhere while they are solved.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::exec::Engine;
+use crate::exec::ending::check_ended_anywhere;
+use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, NO_SOURCE, PointBins};
+use crate::kernel::distance::state::neighbours::Neighbours;
+use crate::pipeline::distance::{Method, Options, Schedule, Sources, solve};
+
+const SHAPE: [i64; 3] = [90, 70, 85];
+
+/// Values and sources of all voxels, as bits.
+fn solved(engine: &Engine, method: Method, schedule: Schedule, options: Options) -> Result<(Vec<u32>, Vec<u32>)> {
+    let geometry = Geometry::new(SHAPE, [1.0, 1.1, 0.9], [0.0; 3]);
+    let cloud: Vec<[f64; 3]> = (0..40)
+        .map(|n: i32| [f64::from(n * 37 % 90), f64::from(n * 53 % 70), f64::from(n * 29 % 70)].map(|v| 0.3 + 0.9 * v))
+        .collect();
+    let set = Arc::new(BrickSet::dense(BrickGrid::new(SHAPE, 16)));
+    let bins = PointBins::new(*set.grid(), &geometry, &cloud);
+    let stage = engine.resumable_stage("distance", 0);
+    let sources = Sources::cloud(&geometry, &cloud, &bins);
+    let solved = solve::<f32>(&stage, &sources, &set, method, schedule, options)?;
+    let part = Box3::from_shape(SHAPE);
+    let (mut values, mut nearest) = (vec![0.0; part.len()], vec![NO_SOURCE; part.len()]);
+    solved.values.read_box(&part, &mut values)?;
+    solved.sources.read_box(&part, &mut nearest)?;
+    stage.finish();
+    Ok((values.into_iter().map(f32::to_bits).collect(), nearest))
+}
+
+#[test]
+fn a_distance_that_is_ended_anywhere_goes_on_with_the_same_bits() {
+    let sweep = Schedule::Sweep { iterations: 3 };
+    let all = (Method::VDT, Schedule::Front, Neighbours::All, true);
+    let faces = |method, schedule, sources| (method, schedule, Neighbours::Faces, sources);
+    let runs = [
+        all,
+        faces(Method::VDT, Schedule::Front, true),
+        faces(Method::FSM, Schedule::Front, false),
+        faces(Method::FSM, Schedule::Front, true),
+        faces(Method::FSM, sweep, false),
+        faces(Method::FSM, sweep, true),
+        faces(Method::VDT, sweep, true),
+    ];
+    for run in runs {
+        let (method, schedule, neighbours, sources) = run;
+        let options = Options { neighbours, sources, ..Options::up_to(f64::INFINITY) };
+        check_ended_anywhere(&format!("{run:?}"), 30, 1.0, &|engine| solved(engine, method, schedule, options));
+    }
+}
