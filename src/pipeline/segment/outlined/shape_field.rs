@@ -18,9 +18,9 @@ const NODES: f64 = 60_000.0;
 /// How many smallest spacings they are apart at least.
 const APART: f64 = 2.0;
 
-/// What a cell takes to be told near the surface or not, about, and what it takes to be filled.
+/// What a cell takes to be told near the surface or not, in the mean, and what it takes to be filled.
 const TELLING: u64 = 1;
-const FILLING: u64 = 3;
+const FILLING: u64 = 5;
 
 /// A fitted shape on the grid of its box.
 pub(crate) struct ShapeField<'a> {
