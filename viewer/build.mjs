@@ -17,15 +17,21 @@ const library = join(here, "node_modules", "neuroglancer");
 // What no store of ours needs, and which would be a third of the page.
 const LEFT_OUT = new Set(["jxl_decoder.wasm"]);
 
-// A shard that was not there may be there when it is asked for again: a store that lives fills while it is looked at. What is
-// found missing is therefore not remembered.
-const SHARDS = "codec/sharding_indexed/decode.js";
-const MISSING = "if (shardIndex === void 0) {";
-const forget = (path, source) => {
-  if (!path.endsWith(SHARDS)) return source;
-  if (source.split(MISSING).length !== 2) throw new Error(`${SHARDS} has changed: look again at what it remembers`);
-  const { chunks, key } = { chunks: "this.indexCache.chunks", key: "this.indexCache.encodeKeyFunction(key.base)" };
-  return source.replace(MISSING, `${MISSING} ${chunks}.get(${key})?.freeSystemMemory();`);
+// What is another here than in neuroglancer: files, the words in them, and what takes their place.
+const CHANGES = [
+  // A shard that was not there may be there when it is asked for again: a store that lives fills while it is looked at. What is found
+  // missing is therefore not remembered.
+  ["codec/sharding_indexed/decode.js", "if (shardIndex === void 0) {", (words) => `${words} this.indexCache.chunks.get(this.indexCache.encodeKeyFunction(key.base))?.freeSystemMemory();`],
+  // The page's title tells whose page it is.
+  ["ui/title.js", "${value} - neuroglancer", () => "${value} - strandline"],
+  ["ui/title.js", 'document.title = "neuroglancer"', () => 'document.title = "strandline"'],
+];
+const changed = (path, source) => {
+  const own = CHANGES.filter(([file]) => path.endsWith(file));
+  return own.reduce((text, [file, words, other]) => {
+    if (text.split(words).length !== 2) throw new Error(`${file} has changed: look again at ${JSON.stringify(words)}`);
+    return text.replace(words, () => other(words));
+  }, source);
 };
 
 // Files beside a module are named relative to it; in the bundle all lie in one folder.
@@ -33,7 +39,7 @@ const flat = {
   name: "flat",
   setup(bundling) {
     bundling.onLoad({ filter: /neuroglancer\/lib\/.*\.js$/ }, ({ path }) => {
-      const source = forget(path, readFileSync(path, "utf8"));
+      const source = changed(path, readFileSync(path, "utf8"));
       const contents = source.replace(/new URL\(\s*"([^"]+)",\s*import\.meta\.url/g, (_, file) => {
         if (file.endsWith(".wasm") && !LEFT_OUT.has(basename(file))) copyFileSync(join(dirname(path), file), join(out, basename(file)));
         return `new URL("./${basename(file)}", import.meta.url`;
@@ -81,7 +87,7 @@ const licences = [...packages].sort().map((name) => {
   const folder = join(here, "node_modules", name);
   const { version, license } = JSON.parse(readFileSync(join(folder, "package.json"), "utf8"));
   const file = ["LICENSE", "LICENSE.md", "LICENSE.txt"].map((file) => join(folder, file)).find(existsSync);
-  const changed = name === "neuroglancer" ? "Changed here: shards that are not there are asked for again, modules lie in one folder.\n\n" : "";
+  const changed = name === "neuroglancer" ? "Changed here: shards that are not there are asked for again, modules lie in one folder, titles end in strandline.\n\n" : "";
   return `${name} ${version}, ${license}\n\n${changed}${readFileSync(file, "utf8").trim()}\n`;
 });
 writeFileSync(join(out, "LICENSES"), licences.join(`\n${"-".repeat(80)}\n\n`));

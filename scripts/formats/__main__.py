@@ -2,8 +2,9 @@
 
 Volumes of every type go through `convert` into every format, and are read by tifffile, pynrrd, vtk, zarr-python and tensorstore: the same
 numbers of the same type, spacing, origin and unit. A segmentation with `--ome 0.4` and `--ome 0.5` must pass ome-zarr-models and yaozarrs,
-be read by ome-zarr-py, and be shown by the reader of napari-ome-zarr as an image with its window and labels with their colours. A mesh goes
-through VTP, which vtk reads. With --large a volume of more than 4 GiB goes from NRRD to OME-Zarr 0.4, OME-TIFF and VTI within --memory.
+be read by ome-zarr-py, and be shown by the reader of napari-ome-zarr as an image with its window and labels with their colours; so must one
+of several times, its arrays t, z, y, x with the same numbers for zarr-python and tensorstore. A mesh goes through VTP, which vtk reads.
+With --large a volume of more than 4 GiB goes from NRRD to OME-Zarr 0.4, OME-TIFF and VTI within --memory.
 Exit code 1 where anything is not as it must be.
 """
 
@@ -21,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from check_volume import Failure, check, require
+from formats.series import check_series
 from interrupting.runs import ball_marks, stack
 
 SPACING, ORIGIN = [0.25, 0.3, 1.5], [10.5, -20.25, 7.0]
@@ -194,6 +196,7 @@ def main():
             check_volumes(place)
             check_stores(place)
             check_mesh(place)
+            check_series(place, run)
             if settings.large:
                 check_large(place, settings.memory)
         except Failure as failure:

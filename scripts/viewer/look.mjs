@@ -4,10 +4,13 @@
 //
 // WHAT of a store that is still written: what is to be seen now, a slash, and what is to be seen on the same page when it is complete.
 // WHAT: image (grey values that vary), labels (a coloured tint over a section), surface (colour in the view of space), marks (points of
-// their own yellow). Pictures go to KEEP. Ends with 1 where something is missing, a request failed or the page had an error.
+// their own yellow). Pictures go to KEEP. Ends with 1 where something is missing, a request failed or the page had an error, where the page
+// of a store that is still written does not stay where it was moved to, or where one of another does not say that the store was taken away,
+// that it is there again, or that the server has ended.
 
 import { spawn } from "node:child_process";
-import { join } from "node:path";
+import { renameSync } from "node:fs";
+import { basename, join } from "node:path";
 import { createInterface } from "node:readline";
 import { PNG } from "pngjs";
 import puppeteer from "puppeteer-core";
@@ -73,6 +76,75 @@ const completed = async (page) => {
   await page.waitForFunction(() => window.viewer.isReady(), { timeout: 1000 * PATIENCE, polling: 500 });
 };
 
+// Moves a page as somebody would who looks at it, to other slices with marks.
+const moveAbout = () => (window.viewer.position.value = window.viewer.position.value.map((at) => at + 10));
+// What of a page has to stay while layers come and go.
+const whereabouts = () => {
+  const { viewer } = window;
+  const [first] = viewer.layerManager.managedLayers;
+  return JSON.stringify({
+    axes: viewer.coordinateSpace.value.names,
+    position: [...viewer.position.value],
+    layout: viewer.state.toJSON().layout,
+    first: [first.name, first.visible],
+  });
+};
+
+// Opens a page that is told of the first layer alone, as that of a run which has just begun, then of another alone, as where a document is
+// written just then, then of nothing, and then of all, the first one with another window; what of the page does not stay as it was.
+const arriving = async (browser, url) => {
+  const page = await browser.newPage();
+  await page.evaluateOnNewDocument(() => {
+    const ask = window.fetch;
+    window.step = 0;
+    window.fetch = async (name, how) => {
+      const answer = await ask(name, how);
+      if (name !== "state.json" && name !== "live.json") return answer;
+      const told = await answer.json();
+      const [image, labels] = told.layers ?? [];
+      if (name === "live.json") Object.assign(told, { running: true, shown: String(window.step) });
+      else told.layers = [[{ ...image, shaderControls: {} }], [labels], [], told.layers][window.step];
+      return new Response(JSON.stringify(told));
+    };
+  });
+  await page.goto(url);
+  const has = (names) => window.viewer?.layerManager.managedLayers.map((layer) => layer.name).join() === names && window.viewer.isReady();
+  const wait = (names) => page.waitForFunction(has, { timeout: 1000 * PATIENCE, polling: 500 }, names.join());
+  const { layers } = await (await fetch(`${url}state.json`)).json();
+  const names = layers.map((layer) => layer.name);
+  await wait(names.slice(0, 1));
+  // The page has asked once how far the run is.
+  await new Promise((after) => setTimeout(after, 3000));
+  await page.evaluate(moveAbout);
+  const before = await page.evaluate(whereabouts);
+  const step = (n) => page.evaluate((n) => (window.step = n), n);
+  await step(1);
+  await wait(names.slice(1, 2));
+  await step(2);
+  await new Promise((after) => setTimeout(after, 3000));
+  await step(3);
+  await wait(names);
+  const after = await page.evaluate(whereabouts);
+  await page.close();
+  return after === before ? [] : [`while layers came the page went from ${before} to ${after}`];
+};
+
+// Takes the store away and brings it back, and ends the server; what the page does not say of that.
+const vanishing = async (page, store, server) => {
+  const silent = [];
+  const expect = async (text) => {
+    const says = (text) => document.getElementById("status").textContent === text;
+    await page.waitForFunction(says, { timeout: 20000 }, text).catch(() => silent.push(`the page does not say ${JSON.stringify(text)}`));
+  };
+  renameSync(store, `${store}.away`);
+  await expect(`${basename(store)} is gone`);
+  renameSync(`${store}.away`, store);
+  await expect("");
+  server.kill("SIGINT");
+  await expect("the server has ended");
+  return silent;
+};
+
 const look = async (browser, store, wanted) => {
   const { server, url } = await serve(store);
   const faults = [];
@@ -99,8 +171,16 @@ const look = async (browser, store, wanted) => {
       timeout: 1000 * PATIENCE,
       polling: 500,
     });
+    let stayed;
     for (const [n, whats] of wanted.split("/").entries()) {
-      if (n > 0) await completed(page);
+      if (n > 0) {
+        await page.evaluate(moveAbout);
+        stayed = await page.evaluate(whereabouts);
+        await completed(page);
+        const now = await page.evaluate(whereabouts);
+        console.log(`${store}: the page is at ${now}`);
+        if (now !== stayed) faults.push(`the page was at ${stayed} and is at ${now}`);
+      }
       await new Promise((after) => setTimeout(after, 1500));
       const picture = await page.screenshot({ path: join(process.env.KEEP, `${store.replace(/\W/g, "-")}${n > 0 ? "-complete" : ""}.png`) });
       const pixels = pixelsOf(picture);
@@ -111,6 +191,10 @@ const look = async (browser, store, wanted) => {
       }
     }
     console.log(`${store}: ${(bytes / 1e6).toFixed(2)} MB loaded`);
+    const about = await page.evaluate(() => [document.title, document.getElementById("name").textContent, document.querySelector("#reports a")?.href]);
+    const report = `${url}data/${encodeURIComponent(basename(store)).replaceAll(".", "%2E")}/report.html`;
+    if (about.join() !== [`${basename(store)} - strandline`, basename(store), report].join()) faults.push(`the page calls itself ${about}`);
+    if (stayed === undefined) faults.push(...(await arriving(browser, url)), ...(await vanishing(page, store, server)));
     await page.close();
   } finally {
     server.kill("SIGINT");

@@ -1,8 +1,8 @@
-// Opens the report of stores in Chromium, with every request blocked and counted, and looks at how it lies on the page.
+// Opens the reports of stores in Chromium, with every request blocked and counted, and looks at how they lie on the page.
 //
 //     KEEP=FOLDER node read.mjs STORE PICTURES,PLOTS [STORE PICTURES,PLOTS]...
 //
-// Each report is opened 1280 and 390 pixels wide, light and dark. Pictures of the pages go to KEEP. Ends with 1 where a request would
+// STORE may be a page itself, such as the summary of a batch. Each is opened 1280 and 390 pixels wide, light and dark. Pictures of the pages go to KEEP. Ends with 1 where a request would
 // have left, the page said anything to the console, a picture is missing, or something is wider than the page.
 
 import { basename, join } from "node:path";
@@ -20,7 +20,7 @@ const measure = () => {
   });
   const pictures = [...document.images];
   const plots = [...document.querySelectorAll("svg")];
-  const hidden = [...pictures, ...plots].filter((node) => node.getBoundingClientRect().width < 100 || node.getBoundingClientRect().height < 60);
+  const hidden = [...pictures, ...plots].filter((node) => node.getBoundingClientRect().width < 90 || node.getBoundingClientRect().height < 60);
   return {
     scroll: document.documentElement.scrollWidth,
     outside: outside.map((node) => `${node.tagName} ${node.textContent.slice(0, 40)}`),
@@ -33,7 +33,7 @@ const measure = () => {
 
 const read = async (browser, store, expected, width, scheme) => {
   const faults = [];
-  const url = pathToFileURL(join(store, "report.html")).href;
+  const url = pathToFileURL(store.endsWith(".html") ? store : join(store, "report.html")).href;
   const page = await browser.newPage();
   await page.setViewport({ width, height: 900 });
   await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);

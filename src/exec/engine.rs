@@ -1,5 +1,7 @@
 //! The engine: the one loop over bricks, run on all cores, and its stages.
 
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -222,6 +224,7 @@ impl Engine {
             started: Instant::now(),
             before: self.scratch.traffic(),
             saves: Saves::Nothing,
+            weight: AtomicU64::new(1),
             report: Mutex::new(StageReport { name: name.into(), ..StageReport::default() }),
         }
     }
@@ -279,6 +282,8 @@ pub struct Stage<'a> {
     started: Instant,
     before: Traffic,
     saves: Saves,
+    /// Steps that an item counts for in the plan.
+    weight: AtomicU64,
     report: Mutex<StageReport>,
 }
 
@@ -329,7 +334,7 @@ impl<'a> Stage<'a> {
     /// Work for each item of a wave by its number, in parallel. What the threads do to share it out is compiled once here,
     /// not for every kind of work: it was a tenth of the program.
     fn for_each(&self, count: usize, work: &(dyn Fn(usize) -> Result<()> + Sync)) -> Result<()> {
-        let engine = self.engine;
+        let (engine, weight) = (self.engine, self.weight.load(Relaxed));
         if count == 0 {
             return engine.cancel.check();
         }
@@ -338,7 +343,7 @@ impl<'a> Stage<'a> {
                 engine.cancel.check()?;
                 let done = work(n);
                 engine.progress.advance(1);
-                self.planned.iter().for_each(|planned| planned.advance(1));
+                self.planned.iter().for_each(|planned| planned.advance(weight));
                 done
             })
         })?;
@@ -402,6 +407,11 @@ impl<'a> Stage<'a> {
     /// Says how many steps the stage has, where that is known only later than its beginning.
     pub fn expect(&self, total: u64) {
         self.planned.iter().for_each(|planned| planned.expect(total));
+    }
+
+    /// From now on each item counts for so many of the steps that are expected, as its time is to that of others.
+    pub fn weigh(&self, steps: u64) {
+        self.weight.store(steps, Relaxed);
     }
 
     /// Says how many voxels the stage works on.

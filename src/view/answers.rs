@@ -3,7 +3,7 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{Read, Seek, SeekFrom};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 use axum::Router;
@@ -15,14 +15,15 @@ use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use flate2::read::GzDecoder;
-use serde_json::json;
+use serde_json::{Map, Value, json};
 use tokio::io::AsyncReadExt;
 use tokio_util::io::ReaderStream;
 
 use super::folder::Opened;
+use super::present::Present;
 use super::ranges::{Asked, Part, part};
 use super::shown::{Drawn, MeshFile, Shown};
-use super::{mesh, page, state};
+use super::{mesh, page, state, told};
 use crate::io::geometry::write::precomputed;
 use crate::io::ome_zarr::{Live, LiveState};
 
@@ -44,18 +45,23 @@ struct Now {
     state: String,
     /// Whether it was live when it was looked at.
     is_live: bool,
-    /// Whether a store that lived is there no more.
+    /// Whether nothing of it is there any more.
     is_gone: bool,
-    looked: Instant,
+    /// Whether it was taken away while it was written.
+    is_cut_short: bool,
+    /// The stores that were there.
+    present: Vec<Present>,
+    looked: Mutex<Instant>,
 }
 
-/// Time after which a store that lives is looked at again.
+/// Time after which it is looked again what there is.
 const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
 
 impl Now {
     fn new(shown: Shown) -> Self {
-        let state = state::state(&shown).to_string();
-        Self { state, is_live: shown.is_live(), is_gone: false, looked: Instant::now(), shown }
+        let (state, present) = (state::state(&shown).to_string(), shown.present());
+        let is_live = shown.is_live();
+        Self { state, is_live, is_gone: false, is_cut_short: false, present, looked: Mutex::new(Instant::now()), shown }
     }
 
     /// What there is a moment later. What cannot be looked at any more stays as it was seen, and nobody writes it.
@@ -63,11 +69,24 @@ impl Now {
         self.shown.again().map_or_else(
             |_| {
                 let (shown, state) = (self.shown.clone(), self.state.clone());
+                // What an interrupted run has left before there was anything to show is there.
                 let is_gone = shown.live().next().is_none();
-                Self { state, is_live: shown.is_live(), is_gone, looked: Instant::now(), shown }
+                let is_cut_short = is_gone && (self.is_live || self.is_cut_short);
+                let (is_live, present, looked) = (shown.is_live(), self.present.clone(), Mutex::new(Instant::now()));
+                Self { state, is_live, is_gone, is_cut_short, present, looked, shown }
             },
             Self::new,
         )
+    }
+
+    /// Whether it is time to look again, which this is then.
+    fn is_due(&self) -> bool {
+        let mut looked = self.looked.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_due = looked.elapsed() > BETWEEN_LOOKS;
+        if is_due {
+            *looked = Instant::now();
+        }
+        is_due
     }
 }
 
@@ -76,10 +95,10 @@ impl Site {
         self.now.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// What is shown; of what lives, looked at lately. Reads folders.
+    /// What is shown, looked at lately. Reads folders.
     fn looked_at(&self) -> Arc<Now> {
         let now = self.now();
-        if (now.is_live || now.is_gone) && now.looked.elapsed() > BETWEEN_LOOKS {
+        if now.is_due() && (now.is_live || now.is_gone || now.shown.present() != now.present) {
             *self.now.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(now.next());
         }
         self.now()
@@ -153,15 +172,16 @@ fn text<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     headers.get(name).and_then(|value| value.to_str().ok())
 }
 
-/// How far the stores are that are still written, a number that grows with what is written, and one that is another when there
-/// is something else to show.
+/// What the page is of and what there is to say of it, how far the stores are that are still written, a number that grows with what is
+/// written, one that is another when there is something else to show, and one for each store that is another when that is.
 async fn live(State(site): State<Arc<Site>>) -> Response {
     let now = looked_at(site).await;
     let states: Vec<Live> = now.shown.live().collect();
     let running = states.iter().filter(|live| live.state == LiveState::Running);
     let share = running.clone().map(|live| live.done).fold(1.0, f64::min);
     let words = match running.count() {
-        0 if now.is_gone => "interrupted: the store was taken away while it was written".into(),
+        0 if now.is_cut_short => format!("{} is gone: it was taken away while it was written", now.shown.name),
+        0 if now.is_gone => format!("{} is gone", now.shown.name),
         0 if states.iter().any(|live| live.state == LiveState::Interrupted) => {
             "interrupted before it was complete".into()
         }
@@ -173,7 +193,13 @@ async fn live(State(site): State<Arc<Site>>) -> Response {
     let mut hasher = DefaultHasher::new();
     now.state.hash(&mut hasher);
     let shown = format!("{:x}", hasher.finish());
-    let answer = json!({ "running": now.is_live, "text": words, "written": written, "shown": shown });
+    let stores: Map<String, Value> =
+        now.present.iter().map(|store| (store.name.clone(), format!("{:x}", store.number).into())).collect();
+    let answer = json!({
+        "name": now.shown.name, "reports": told::links(&now.shown), "notes": told::notes(&now.shown),
+        "running": now.is_live, "gone": now.is_gone, "text": words,
+        "written": written, "shown": shown, "stores": stores,
+    });
     of_type("application/json", answer.to_string())
 }
 
@@ -227,9 +253,13 @@ async fn data(State(site): State<Arc<Site>>, request: Request) -> Response {
     let path = request.uri().path().strip_prefix("/data/").unwrap_or_default().to_owned();
     let headers = request.headers().clone();
     let opened = tokio::task::spawn_blocking(move || {
-        let (name, inside) = path.split_once('/')?;
+        let shown = &site.now().shown;
+        let Some((name, inside)) = path.split_once('/') else {
+            // Of what lies beside stores one page alone.
+            return shown.beside.as_ref().filter(|_| path == told::BATCH)?.open(&path);
+        };
         let name = percent_encoding::percent_decode_str(name).decode_utf8().ok()?;
-        site.now().shown.roots.iter().find(|(root, _)| *root == name)?.1.open(inside)
+        shown.roots.iter().find(|(root, _)| *root == name)?.1.open(inside)
     });
     match opened.await {
         Ok(Some(opened)) => part_of(opened, &headers),

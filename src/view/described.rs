@@ -1,6 +1,6 @@
 //! What OME-Zarr says of an image (versions 0.4 and 0.5): its axes, grey range, colours of labels.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -35,8 +35,19 @@ pub(super) struct Image {
     pub(super) axes: Vec<Axis>,
     /// The values from black to white.
     pub(super) window: Option<[f64; 2]>,
+    /// What stands where nothing was solved.
+    pub(super) unsolved: Unsolved,
     /// Colours of labels: number, red, green, blue.
     pub(super) colors: Vec<(u64, [u8; 3])>,
+}
+
+/// Values of an image of real numbers that are none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Unsolved {
+    /// What stands in chunks that are not there.
+    pub(super) fill: Option<f64>,
+    /// What all voxels hold that are as far away as this, or farther.
+    pub(super) beyond: Option<f64>,
 }
 
 /// An axis of an image.
@@ -76,6 +87,17 @@ pub(super) fn multiscale(folder: &Path) -> Option<Multiscale> {
     }
 }
 
+/// The document of a folder that cannot be understood, and why.
+pub(super) fn fault(folder: &Path) -> Option<(PathBuf, String)> {
+    let path = ["zarr.json", ".zattrs"].map(|name| folder.join(name)).into_iter().find(|path| path.exists())?;
+    let why = match std::fs::metadata(&path).and_then(|found| Ok((found.len(), std::fs::read(&path)?))) {
+        Ok((length, _)) if length > MOST_BYTES => format!("is larger than {} MiB", MOST_BYTES >> 20),
+        Ok((_, text)) => format!("is no JSON: {}", serde_json::from_slice::<Value>(&text).err()?),
+        Err(error) => format!("cannot be read: {error}"),
+    };
+    Some((path, why))
+}
+
 fn json(path: &Path) -> Option<Value> {
     let is_short = std::fs::metadata(path).ok()?.len() <= MOST_BYTES;
     serde_json::from_slice(&std::fs::read(path).ok().filter(|_| is_short)?).ok()
@@ -107,25 +129,46 @@ pub(super) fn image(path: &str, folder: &Path, found: &Multiscale) -> Option<Ima
         })
     };
     let axes: Vec<Axis> = described["axes"].as_array()?.iter().enumerate().map(axis).collect::<Option<_>>()?;
+    // Nothing could be placed on such axes.
+    if axes.iter().any(|axis| axis.voxels == 0 || axis.spacing == 0.0) {
+        return None;
+    }
     let window = &found.attributes["omero"]["channels"][0]["window"];
     let is_labels = found.attributes["image-label"].is_object() || path.contains("/labels/");
-    let is_field = path.contains('/');
+    let kind = match (is_labels, path.contains('/')) {
+        (true, _) => Kind::Labels,
+        (_, true) => Kind::Field,
+        _ => Kind::Picture,
+    };
+    let window = window["start"].as_f64().zip(window["end"].as_f64()).map(|(low, high)| [low, high]);
+    let name = described["name"].as_str().filter(|name| !name.is_empty()).unwrap_or(path);
+    let beyond = if name != "distance" {
+        None
+    } else if kind == Kind::Field {
+        // Those beside an image or a surface are solved near it, and hold the farthest beyond.
+        window.map(|[_, high]| high)
+    } else {
+        json(&folder.join("report.json")).and_then(|report| report["settings"]["max_distance"].as_f64())
+    };
+    let fill = array["fill_value"].as_f64();
+    let unsolved = if is_real(&array) { Unsolved { fill, beyond } } else { Unsolved::default() };
     Some(Image {
         path: path.to_owned(),
-        name: described["name"].as_str().filter(|name| !name.is_empty()).unwrap_or(path).to_owned(),
-        kind: if is_labels {
-            Kind::Labels
-        } else if is_field {
-            Kind::Field
-        } else {
-            Kind::Picture
-        },
+        name: name.to_owned(),
+        kind,
         is_version_2: found.is_version_2,
         is_wide: is_wide(&array),
         axes,
-        window: window["start"].as_f64().zip(window["end"].as_f64()).map(|(low, high)| [low, high]),
+        window,
+        unsolved,
         colors: colors(&found.attributes["image-label"]["colors"]),
     })
+}
+
+/// Whether an array's voxels are real numbers.
+fn is_real(array: &Value) -> bool {
+    let name = array["data_type"].as_str().or(array["dtype"].as_str()).unwrap_or_default();
+    name.starts_with("float") || name.trim_start_matches(['<', '>']).starts_with('f')
 }
 
 /// Whether an array's voxels have four bytes or more: its type is `float32`, or `<f4` in version 2.

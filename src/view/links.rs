@@ -1,22 +1,18 @@
 //! Where and how other programs open what is shown.
 
-use std::path::Path;
-
-use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
-
 use super::described::Image;
+use super::listing::quoted;
 use super::shown::Shown;
 use super::state::{address, root_of};
+use super::told;
 
 /// Links and commands for the server at `origin`, such as `http://127.0.0.1:8000`, a line each.
 #[must_use]
 pub fn links(shown: &Shown, origin: &str) -> String {
     let source = |image: &Image| format!("neuroglancer source  {origin}{}\n", address(image));
     let images: String = shown.images.iter().map(source).collect();
-    let has_report = |folder: &super::folder::Folder| folder.root().join("report.html").is_file();
-    let reports = shown.roots.iter().filter(|(_, folder)| has_report(folder)).map(|(name, _)| {
-        format!("report               {origin}/data/{}/report.html\n", utf8_percent_encode(name, NON_ALPHANUMERIC))
-    });
+    let reports =
+        told::reports(shown).into_iter().map(|(_, address)| format!("report               {origin}{address}\n"));
     let segments = shown.meshes.iter().map(|mesh| {
         let name = mesh.name.as_ref().map_or(String::new(), |name| format!(", {name}"));
         format!("neuroglancer mesh    precomputed://{origin}/mesh  (segment {}: {}{name})\n", mesh.segment, mesh.path)
@@ -34,11 +30,4 @@ pub fn links(shown: &Shown, origin: &str) -> String {
     let meshes = files.map(|file| format!("ParaView             paraview {}\n", quoted(file)));
     let rest: String = reports.chain(segments).chain(stores).chain(meshes).collect();
     format!("page                 {origin}/\n{images}{rest}")
-}
-
-/// A path as a shell takes it.
-fn quoted(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:@,".contains(c);
-    if text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }

@@ -1,4 +1,4 @@
-//! What lies in the folders that are shown, in order of names; links and what is under way are passed over.
+//! What lies in the folders that are shown, in order of names; links and what is under way are passed over. Paths in words.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -32,4 +32,11 @@ pub(super) fn folders(folder: &Path) -> Vec<PathBuf> {
 
 pub(super) fn files(folder: &Path) -> Vec<PathBuf> {
     entries(folder).into_iter().filter(|path| path.is_file() && !path.is_symlink()).collect()
+}
+
+/// A path as a shell takes it.
+pub(super) fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:@,".contains(c);
+    if text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }

@@ -3,7 +3,8 @@
 //!
 //! `folder` and `ranges` hold what a request may get of a file, `shown` what lies in a folder that can be shown, `described` what
 //! is said of its images, `ready` what of it is there in a form that the page can draw, `state` and
-//! `links` how the page and other programs are told of it, `mesh` the meshes, `page` the bundled page, `server` the connections.
+//! `links` how the page and other programs are told of it, `mesh` the meshes, `page` the bundled page, `server` the connections,
+//! `present` whether all of it is still there, `told` what the page's line says.
 
 mod answers;
 mod described;
@@ -12,11 +13,13 @@ mod links;
 mod listing;
 mod mesh;
 mod page;
+mod present;
 mod ranges;
 mod ready;
 mod server;
 mod shown;
 mod state;
+mod told;
 
 pub use links::links;
 pub use server::{Server, Settings};

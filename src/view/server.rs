@@ -1,5 +1,6 @@
 //! The connections of the server: on this machine only, so many at a time, none that dawdles over its headers.
 
+use std::io::ErrorKind;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener as StdListener};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -47,7 +48,13 @@ impl Server {
     /// When the port is taken.
     pub fn listen(settings: Settings) -> Result<Self> {
         let port = settings.port.unwrap_or(0);
-        let refused = |e: std::io::Error| Error::from_io(&format!("cannot listen on port {port}"), &e);
+        let refused = |e: std::io::Error| match e.kind() {
+            ErrorKind::AddrInUse => {
+                let what = format!("port {port} is in use; give another --port, or none to take a free one");
+                Error::failed(what).caused_by(e)
+            }
+            _ => Error::from_io(&format!("cannot listen on port {port}"), &e),
+        };
         let listener = StdListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(refused)?;
         listener.set_nonblocking(true).map_err(refused)?;
         let address = listener.local_addr().map_err(refused)?;
@@ -71,7 +78,8 @@ impl Server {
             .enable_all()
             .build()
             .map_err(failed)?;
-        let until = self.within.map(|within| Instant::now() + within);
+        // A time that no clock reaches is none.
+        let until = self.within.and_then(|within| Instant::now().checked_add(within));
         runtime.block_on(async {
             let listener = TcpListener::from_std(self.listener).map_err(failed)?;
             let service = TowerToHyperService::new(router(shown));

@@ -1,12 +1,14 @@
 //! What lies in a store, in a folder of several, or in another program's OME-Zarr, that can be shown: images, label images and
 //! fields by their OME metadata (versions 0.4 and 0.5), and meshes.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use super::described::{Image, Kind, image, multiscale};
+use super::described::{Image, Kind, fault, image, multiscale};
 use super::folder::Folder;
 use super::listing::{file_name, files, folders, is_mesh};
+use super::present::{Present, present};
 use super::ready::Ready;
 use crate::error::{Error, Result};
 use crate::io::geometry::read::point_file::PointFile;
@@ -26,8 +28,11 @@ const MOST_MARKS: usize = 20_000;
 /// Everything that is shown.
 #[derive(Clone, Debug)]
 pub struct Shown {
-    /// What was given.
+    /// What was given, and what it is called.
     path: PathBuf,
+    pub(super) name: String,
+    /// The folder that was given, where stores lie in it.
+    pub(super) beside: Option<Folder>,
     /// The stores and files by the names that they have on the server.
     pub(super) roots: Vec<(String, Folder)>,
     pub(super) images: Vec<Image>,
@@ -36,6 +41,21 @@ pub struct Shown {
     pub(super) growing: (Vec<MeshFile>, u64),
     /// Marks of segmentations, of each store that has some.
     pub(super) marks: Vec<Marks>,
+    /// The times of segmentations over time.
+    pub(super) series: Vec<Series>,
+    /// What is wrong with stores that cannot be shown.
+    pub(super) faults: Vec<String>,
+}
+
+/// The times of a store that has several.
+#[derive(Clone, Debug)]
+pub(super) struct Series {
+    /// The store's name on the server.
+    pub(super) root: String,
+    /// Its times, as its groups are numbered.
+    pub(super) times: Range<u32>,
+    /// Those with surfaces.
+    pub(super) with_surfaces: Vec<u32>,
 }
 
 /// The marks of a store.
@@ -56,8 +76,10 @@ pub(super) struct MeshFile {
     pub(super) path: String,
     /// Where it lies.
     pub(super) file: PathBuf,
-    /// The number that the page knows it by: that of its object, where its name has one.
+    /// The number that the page knows it by: that of its object, where its name has one and no other store has the same.
     pub(super) segment: u64,
+    /// The number of its object, where its name has one.
+    pub(super) object: Option<u64>,
     /// What it is called, where it is a part of a surface.
     pub(super) name: Option<String>,
     /// What the page gets of it.
@@ -79,9 +101,12 @@ impl Shown {
     /// # Errors
     /// When there is nothing that can be shown.
     pub fn of(path: &Path) -> Result<Self> {
-        let path_given = path.to_path_buf();
         let mut shown = Self {
-            path: path_given,
+            path: path.to_path_buf(),
+            name: path.canonicalize().map_or_else(|_| file_name(path), |path| file_name(&path)),
+            beside: None,
+            series: Vec::new(),
+            faults: Vec::new(),
             roots: Vec::new(),
             images: Vec::new(),
             meshes: Vec::new(),
@@ -98,12 +123,15 @@ impl Shown {
             for below in folders(path) {
                 if multiscale(&below).is_some() && shown.roots.len() < MOST {
                     shown.add_store(&below)?;
+                } else if let Some((document, why)) = fault(&below) {
+                    shown.faults.push(format!("{}/{} {why}", file_name(&below), file_name(&document)));
                 }
             }
             // A store without an image of its own, such as one that was just begun.
             if shown.roots.is_empty() {
                 shown.add_store(path)?;
             } else {
+                shown.beside = Some(Folder::new(path)?);
                 files(path).iter().filter(|file| is_mesh(file)).try_for_each(|file| shown.add_mesh(file))?;
             }
         }
@@ -115,7 +143,8 @@ impl Shown {
         }
         if shown.images.is_empty() && shown.meshes.is_empty() && !shown.is_live() {
             let what = "holds nothing that can be shown; give an OME-Zarr store, a folder of some, or a mesh";
-            return Err(Error::input(what).at(path));
+            let refused = || Error::input(what).at(path);
+            return Err(fault(path).map_or_else(refused, |(document, why)| Error::input(why).at(&document)));
         }
         Ok(shown)
     }
@@ -130,6 +159,14 @@ impl Shown {
         self.live().any(|live| live.state == LiveState::Running)
     }
 
+    /// The stores that are there, or the mesh that was given.
+    pub(super) fn present(&self) -> Vec<Present> {
+        if self.roots.is_empty() {
+            return present(&self.name, &self.path).into_iter().collect();
+        }
+        self.roots.iter().filter_map(|(name, folder)| present(name, folder.root())).collect()
+    }
+
     /// What those stores say that are or were live.
     pub(super) fn live(&self) -> impl Iterator<Item = Live> {
         self.roots.iter().filter_map(|(_, folder)| live(folder.root()))
@@ -140,8 +177,21 @@ impl Shown {
         let name = self.free_name(folder.root());
         self.add_group(&name, folder.root(), DEEPEST);
         self.add_marks(&name, &folder.root().join(MARKS));
+        self.add_series(&name, folder.root());
         self.roots.push((name, folder));
         Ok(())
+    }
+
+    /// Tells which times of a store have surfaces, where it has several.
+    fn add_series(&mut self, root: &str, path: &Path) {
+        let axis = || self.images.iter().find(|image| image.path == root)?.axes.iter().find(|axis| axis.name == "t");
+        let Some(axis) = axis().filter(|_| is_series(path)) else { return };
+        let first = (axis.origin / axis.spacing).round() as u32;
+        let number =
+            |folder: &PathBuf| time_of(&file_name(folder)).filter(|_| files(folder).iter().any(|f| is_mesh(f)));
+        let with_surfaces = folders(&path.join("meshes")).iter().filter_map(number).collect();
+        let times = first..first.saturating_add(u32::try_from(axis.voxels).unwrap_or(u32::MAX));
+        self.series.push(Series { root: root.into(), times, with_surfaces });
     }
 
     /// Adds the marks of a store, every n-th where there are more than a page can hold.
@@ -175,13 +225,14 @@ impl Shown {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy();
             let own = stem.rsplit_once('-').and_then(|(_, number)| number.parse().ok());
             let drawn = Drawn::Mesh(ready.copy_of(&file));
-            self.meshes.push(MeshFile { path, segment: self.free_segment(own), name: None, drawn, file });
+            let segment = self.free_segment(own);
+            self.meshes.push(MeshFile { path, segment, object: own, name: None, drawn, file });
             return;
         }
         for fragment in fragments {
-            let segment = self.free_segment(Some(fragment.segment));
+            let (segment, object) = (self.free_segment(Some(fragment.segment)), Some(fragment.segment));
             let (name, drawn) = (fragment.name, Drawn::Fragment(fragment.file));
-            self.meshes.push(MeshFile { path: path.clone(), file: file.clone(), segment, name, drawn });
+            self.meshes.push(MeshFile { path: path.clone(), file: file.clone(), segment, object, name, drawn });
         }
     }
 
@@ -198,7 +249,7 @@ impl Shown {
         *moved = moved.wrapping_mul(31).wrapping_add(since.as_millis() as u64);
         let segment = meshes.len() as u64 + 1;
         let drawn = Drawn::Mesh(file.clone());
-        meshes.push(MeshFile { path: file_name(&file), file, segment, name: None, drawn });
+        meshes.push(MeshFile { path: file_name(&file), file, segment, object: None, name: None, drawn });
     }
 
     /// Leaves out fields where there are more than somebody would look through.
@@ -237,10 +288,9 @@ impl Shown {
             }
         }
         // Those hold the same meshes once more; fields and surfaces of single times of a series cannot be told from each other.
-        let is_series = folder.join(TIMES).is_dir() && multiscale(folder).is_some_and(|found| found.has_time());
+        let is_series = is_series(folder);
         let is_of_time = |below: &Path| {
-            let name = file_name(below);
-            let is_time = name.strip_prefix('t').is_some_and(|digits| digits.parse::<u32>().is_ok());
+            let is_time = time_of(&file_name(below)).is_some();
             (is_series && below.ends_with(TIMES)) || (is_time && folder.ends_with("meshes"))
         };
         let is_looked_into = |below: &PathBuf| {
@@ -250,4 +300,14 @@ impl Shown {
             self.add_group(&format!("{path}/{}", file_name(&below)), &below, depth - 1);
         }
     }
+}
+
+/// Whether a store was joined from several times.
+fn is_series(folder: &Path) -> bool {
+    folder.join(TIMES).is_dir() && multiscale(folder).is_some_and(|found| found.has_time())
+}
+
+/// The time of a group of one time.
+fn time_of(name: &str) -> Option<u32> {
+    name.strip_prefix('t')?.parse().ok()
 }

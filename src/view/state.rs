@@ -5,7 +5,7 @@
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Map, Value, json};
 
-use super::described::{Axis, Image, Kind};
+use super::described::{Axis, Image, Kind, Unsolved};
 use super::mesh;
 use super::shown::{Marks, MeshFile, Shown};
 
@@ -28,8 +28,10 @@ pub(super) fn state(shown: &Shown) -> Value {
     }));
     let has_unit = shown.images.iter().flat_map(|image| &image.axes).any(|axis| axis.metres.is_some());
     let mut state = json!({
+        "title": shown.name,
         "layers": layers,
-        "layout": "4panel-alt",
+        // Sections of surfaces alone are empty.
+        "layout": if shown.images.is_empty() && !shown.meshes.is_empty() { "3d" } else { "4panel-alt" },
         // Without a unit its letters would be read as one: m, a thousandth, as metres.
         "showScaleBar": has_unit,
         "showAxisLines": false,
@@ -93,25 +95,30 @@ fn joined((a, b): ([f64; 3], [f64; 3]), (c, d): ([f64; 3], [f64; 3])) -> ([f64; 
     (std::array::from_fn(|n| a[n].min(c[n])), std::array::from_fn(|n| b[n].max(d[n])))
 }
 
-/// Looks at the middle of an image, so that it fills the page.
+/// Looks at the middle of an image, so that it fills the page; where it has times, at one in the middle, in which its marks lie.
 fn place(image: &Image, state: &mut Map<String, Value>) {
-    let space: Vec<&Axis> =
-        image.axes.iter().rev().filter(|axis| ["x", "y", "z"].contains(&axis.name.as_str())).collect();
-    let dimensions: Map<String, Value> = space.iter().map(|axis| (axis.name.clone(), dimension(axis))).collect();
-    let middle = |axis: &&Axis| axis.origin / axis.spacing + 0.5 * axis.voxels as f64;
+    let named = |names: &'static [&str]| image.axes.iter().rev().filter(|axis| names.contains(&axis.name.as_str()));
+    let space: Vec<&Axis> = named(&["x", "y", "z"]).collect();
+    let time = || named(&["t"]);
+    let dimensions: Map<String, Value> =
+        space.iter().copied().chain(time()).map(|axis| (axis.name.clone(), dimension(axis))).collect();
+    let first = |axis: &Axis| axis.origin / axis.spacing;
+    let middle = space.iter().map(|axis| first(axis) + 0.5 * axis.voxels as f64);
+    let whole = time().map(|axis| first(axis) + (axis.voxels.saturating_sub(1) / 2) as f64);
     let longest = space.iter().map(|axis| axis.voxels as f64 * axis.spacing).fold(0.0, f64::max);
     let unit = space.first().map_or(1.0, |axis| axis.spacing);
     state.insert("dimensions".into(), Value::Object(dimensions));
-    state.insert("position".into(), space.iter().map(middle).collect());
+    state.insert("position".into(), middle.chain(whole).collect());
     // A panel is some 500 pixels wide.
     state.insert("crossSectionScale".into(), json!(longest / unit / 450.0));
     state.insert("projectionScale".into(), json!(1.6 * longest / unit));
 }
 
 fn dimension(axis: &Axis) -> Value {
-    match axis.metres {
-        Some(metres) => json!([axis.spacing * metres, "m"]),
-        None => json!([axis.spacing, ""]),
+    match (axis.metres, axis.seconds) {
+        (Some(metres), _) => json!([axis.spacing * metres, "m"]),
+        (_, Some(seconds)) => json!([axis.spacing * seconds, "s"]),
+        _ => json!([axis.spacing, ""]),
     }
 }
 
@@ -137,10 +144,26 @@ fn layer(image: &Image, shown: &Shown) -> Value {
             json!({
                 "type": "image", "name": name, "source": source, "visible": visible, "shaderControls": controls,
                 "crossSectionRenderScale": render_scale(image),
-                "shader": "#uicontrol invlerp normalized\nvoid main() {\n  emitGrayscale(normalized());\n}\n",
+                "shader": shader(image.unsolved),
             })
         }
     }
+}
+
+/// Grey values, and nothing where there are none.
+fn shader(unsolved: Unsolved) -> String {
+    let fill = unsolved.fill.filter(|fill| fill.is_finite()).map(|fill| format!("value == {fill:e}"));
+    // Inside of a closed surface distances are negative.
+    let beyond = unsolved.beyond.filter(|far| far.is_finite()).map(|far| format!("abs(value) >= {:e}", far as f32));
+    let nothing: Vec<String> = fill.into_iter().chain(beyond).collect();
+    let passed_over = match nothing.is_empty() {
+        true => String::new(),
+        false => format!(
+            "  float value = toRaw(getDataValue());\n  if ({}) {{\n    emitTransparent();\n    return;\n  }}\n",
+            nothing.join(" || ")
+        ),
+    };
+    format!("#uicontrol invlerp normalized\nvoid main() {{\n{passed_over}  emitGrayscale(normalized());\n}}\n")
 }
 
 /// Pixels that a voxel of a section may cover before a finer level is loaded: of large images the finer one would be most of what
@@ -165,8 +188,7 @@ fn marks(shown: &Shown, image: &Image, marks: &Marks) -> Value {
         ["x", "y", "z"].map(|name| (name.to_owned(), unit(name))).into_iter().collect();
     let time = image.axes.iter().find(|axis| axis.name == "t").filter(|_| !marks.times.is_empty());
     if let Some(axis) = time {
-        let unit = axis.seconds.map_or(json!([axis.spacing, ""]), |seconds| json!([axis.spacing * seconds, "s"]));
-        dimensions.insert("t".into(), unit);
+        dimensions.insert("t".into(), dimension(axis));
     }
     let point = |(n, place): (usize, &[f64; 3])| {
         let at = marks.times.get(n).filter(|_| time.is_some()).map(|&t| t as f64);
@@ -188,11 +210,10 @@ fn marks(shown: &Shown, image: &Image, marks: &Marks) -> Value {
 fn meshes(shown: &Shown, of: &[MeshFile]) -> Value {
     let path = of.first().map_or("", |mesh| &mesh.path);
     let images = || shown.images.iter().filter(|image| root_of(&image.path) == root_of(path));
-    // Numbers of objects are those of the page where no other store has the same.
     let labelled = |segment: u64| images().flat_map(|image| &image.colors).find(|(label, _)| *label == segment);
     let color = |mesh: &MeshFile| {
         // The number of a pair of labels is that of neither.
-        let label = labelled(mesh.segment).filter(|_| mesh.name.is_none());
+        let label = mesh.object.and_then(labelled).filter(|_| mesh.name.is_none());
         label.map_or_else(|| hue(mesh.segment as f64 * HUE_STEP), |(_, color)| *color)
     };
     let colors: Map<String, Value> =
@@ -253,11 +274,18 @@ mod tests {
         let scale = |voxels: u64, is_wide: bool, kind: Kind| {
             let axis = Axis { name: "x".into(), metres: None, seconds: None, voxels, spacing: 1.0, origin: 0.0 };
             let (path, name) = (String::new(), String::new());
-            let (window, colors) = (None, Vec::new());
-            render_scale(&Image { path, name, kind, is_version_2: false, is_wide, axes: vec![axis], window, colors })
+            let (window, unsolved, colors, axes) = (None, Unsolved::default(), Vec::new(), vec![axis]);
+            render_scale(&Image { path, name, kind, is_version_2: false, is_wide, axes, window, unsolved, colors })
         };
         assert_eq!([256, 257, 1024].map(|n| scale(n, false, Kind::Picture)), [1.0, 2.0, 2.0]);
         assert_eq!([256, 257, 1024].map(|n| scale(n, true, Kind::Picture)), [1.0, 4.0, 4.0]);
         assert_eq!(scale(1024, true, Kind::Labels), 2.0, "labels pack well");
+    }
+    #[test]
+    fn what_was_not_solved_is_not_drawn() {
+        let plain = shader(Unsolved::default());
+        assert!(!plain.contains("Transparent") && plain.contains("emitGrayscale"), "{plain}");
+        let capped = shader(Unsolved { fill: Some(0.0), beyond: Some(f64::from(2.6_f32)) });
+        assert!(capped.contains("(value == 0e0 || abs(value) >= 2.6e0)"), "{capped}");
     }
 }

@@ -45,7 +45,7 @@ impl Served {
         )
     }
 
-    fn get(&self, path: &str) -> Answer {
+    pub(crate) fn get(&self, path: &str) -> Answer {
         self.ask("GET", path, "")
     }
 
@@ -62,10 +62,10 @@ impl Drop for Served {
 }
 
 #[derive(Debug)]
-struct Answer {
-    code: u16,
+pub(crate) struct Answer {
+    pub(crate) code: u16,
     head: String,
-    body: Vec<u8>,
+    pub(crate) body: Vec<u8>,
 }
 
 impl Answer {
@@ -321,8 +321,41 @@ fn what_cannot_be_shown_is_refused_and_the_time_ends() {
     let bench = Bench::bare();
     assert!(bench.fail("view out --no-open", 2).contains("holds nothing that can be shown"));
     assert!(bench.fail("view none.zarr --no-open", 2).contains("none.zarr"));
+    fs::create_dir(bench.path("broken.zarr")).unwrap();
+    bench.write("broken.zarr/zarr.json", "{\"zarr_format\": 3,");
+    let told = bench.fail("view broken.zarr --no-open", 2);
+    assert!(told.contains("broken.zarr/zarr.json: is no JSON: "), "{told}");
+    let axis = |name: &str| serde_json::json!({ "name": name, "type": "space" });
+    let levels =
+        serde_json::json!([{ "path": "0", "coordinateTransformations": [{ "type": "scale", "scale": [1, 0, 1] }] }]);
+    let axes = ["z", "y", "x"].map(axis);
+    let ome = serde_json::json!({ "version": "0.5", "multiscales": [{ "axes": axes, "datasets": levels }] });
+    fs::create_dir_all(bench.path("flat.zarr/0")).unwrap();
+    bench.write("flat.zarr/0/zarr.json", r#"{"shape": [4, 4, 4], "data_type": "uint8"}"#);
+    bench.write(
+        "flat.zarr/zarr.json",
+        &serde_json::json!({ "zarr_format": 3, "attributes": { "ome": ome } }).to_string(),
+    );
+    assert!(bench.fail("view flat.zarr --no-open", 2).contains("holds nothing that can be shown"), "no spacing");
     bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     assert!(bench.succeed("view a.obj --no-open --for 1s --print-links").contains("precomputed://http://127.0.0.1:"));
+}
+
+/// A port that somebody has, and times without an end.
+#[test]
+fn ports_in_use_are_told_and_no_time_is_too_long() {
+    let bench = Bench::bare();
+    bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port();
+    let told = bench.fail(&format!("view a.obj --no-open --port {port}"), 1);
+    assert!(told.contains(&format!("port {port} is in use; give another --port")), "{told}");
+    let mut child =
+        bench.command("view a.obj --no-open --for 500000000000years").stdout(Stdio::piped()).spawn().unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+    let served = Served { address: line.trim().trim_end_matches('/').strip_prefix("http://").unwrap().into(), child };
+    assert_eq!(served.get("/").code, 200);
 }
 
 /// A run that is killed before there is anything to see, and a store that is taken away, are not told as running.

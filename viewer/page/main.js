@@ -1,18 +1,20 @@
-// The page of `strandline view`: neuroglancer laid out as the server's state says, and kept up with a store that is still written.
+// The page of `strandline view`: neuroglancer laid out as the server's state says, and kept up with what lies on the disk.
 //
-// `state.json` is a state of neuroglancer; sources in it that begin with a slash lie on this server. `live.json` says what is
-// running, how far it is, a number that grows with every shard (when it does, what was read of the store is read again), and one
-// that is another when there are other layers.
+// `state.json` is a state of neuroglancer; sources in it that begin with a slash lie on this server. `live.json` says what the page is of
+// and where its reports are, what is running and how far it is, a number that grows with every shard (when it does, what was read of
+// the store is read again), one that is another when there are other layers, and one for each store that is another when another store
+// lies in its place.
 
 import "neuroglancer/unstable/util/polyfills.js";
 import "neuroglancer/unstable/layer/enabled_frontend_modules.js";
 import "neuroglancer/unstable/datasource/enabled_frontend_modules.js";
 import "neuroglancer/unstable/kvstore/enabled_frontend_modules.js";
-import { makeLayer } from "neuroglancer/unstable/layer/index.js";
+import { initializeLayerFromSpec, makeLayer } from "neuroglancer/unstable/layer/index.js";
 import { setupDefaultViewer } from "neuroglancer/unstable/ui/default_viewer_setup.js";
 
-// Seconds between two looks at a store that is written.
+// Seconds between two looks at a store that is written, and at one that is whole.
 const PATIENCE = 2;
+const PATIENCE_OF_WHOLE = 5;
 
 const onThisServer = (value) => {
   if (typeof value === "string") return value.replace(/^((?:[a-z]+:\/\/)?)(\/(?!\/))/, (_, scheme, path) => scheme + location.origin + path);
@@ -32,66 +34,113 @@ const withUrl = (source) => (source && source.url ? { ...source, url: onThisServ
 
 const load = async (name) => (await fetch(name, { cache: "no-store" })).json();
 
-const status = document.getElementById("status");
+const element = (id) => document.getElementById(id);
 
 // Reads again what was read of the chunks; layers, position and colours stay.
 const readAgain = (viewer) => {
   for (const source of viewer.chunkManager.memoize.map.values()) source.invalidateCache?.();
 };
 
-// Layers as the server gave them, by their names.
+// Layers as the server gave them, by their names, and whether it has said where to look: of surfaces that still move it does not.
 let given = new Map();
+let isPlaced = true;
 
-// Puts in layers that are new or have another source, takes out those that are gone; leaves all others as they are.
+// Puts in layers that are new, at their places, gives others what is new of them, and takes out those that are gone; all else stays as it
+// is. The world is held meanwhile: with its last layer neuroglancer would forget its axes and where the page looks.
 const followLayers = async (viewer) => {
   const state = withSources(await load("state.json"));
-  if (given.size === 0) return open(viewer, state);
+  if (given.size === 0 || (!isPlaced && state.dimensions !== undefined)) return open(viewer, state);
   const now = byName(state);
-  for (const name of given.keys()) {
-    if (!now.has(name)) remove(viewer, name);
-  }
-  for (const [name, layer] of now) {
-    const before = given.get(name);
-    const there = viewer.layerManager.getLayerByName(name);
-    if (there !== undefined && (before === undefined || JSON.stringify(before) === JSON.stringify(layer))) continue;
-    const visible = there?.visible ?? layer.visible ?? true;
-    remove(viewer, name);
-    viewer.layerSpecification.add(makeLayer(viewer.layerSpecification, name, { ...layer, visible }));
+  // A document that is written just then says nothing.
+  if (now.size === 0) return;
+  const { layerManager, layerSpecification } = viewer;
+  const release = layerSpecification.coordinateSpaceCombiner.retain();
+  try {
+    let place = 0;
+    for (const [name, layer] of now) {
+      const there = layerManager.getLayerByName(name);
+      if (there === undefined) layerSpecification.add(makeLayer(layerSpecification, name, layer), place);
+      else update(there, given.get(name), layer);
+      place = 1 + layerManager.managedLayers.findIndex((other) => other.name === name);
+    }
+    for (const name of given.keys()) {
+      const gone = now.has(name) ? undefined : layerManager.getLayerByName(name);
+      if (gone !== undefined) layerManager.removeManagedLayer(gone);
+    }
+  } finally {
+    release();
   }
   given = now;
 };
 
-const remove = (viewer, name) => {
-  const layer = viewer.layerManager.getLayerByName(name);
-  if (layer !== undefined) viewer.layerManager.removeManagedLayer(layer);
+// Gives a layer what is another than before, and leaves it what was set on the page.
+const update = (there, before, layer) => {
+  const isNew = ([key, value]) => JSON.stringify(value) !== JSON.stringify(before?.[key]);
+  const changed = Object.entries(layer).filter(isNew);
+  if (changed.length === 0) return;
+  const { visible } = there;
+  initializeLayerFromSpec(there, { ...there.toJSON(), ...Object.fromEntries(changed), visible });
+};
+
+// What the page is of, links to its reports, and what is to be said of it.
+const introduce = ({ name, reports, notes, text }) => {
+  const linkTo = ({ title, address }) => Object.assign(document.createElement("a"), { href: address, textContent: title, target: "_blank", rel: "noopener" });
+  element("name").textContent = name;
+  element("reports").replaceChildren(...reports.map(linkTo));
+  element("status").textContent = text;
+  element("notes").textContent = notes.join("; ");
+};
+
+// Whether another store lies in the place of one that was shown, of which the page may know shapes that are not those any more.
+const isReplaced = (live, before) => {
+  const isOther = ([name, number]) => live.stores[name] !== undefined && live.stores[name] !== number;
+  return live.name !== before.name || (live.shown !== before.shown && Object.entries(before.stores).some(isOther));
+};
+
+const startAnew = () => {
+  history.replaceState(null, "", location.pathname);
+  location.reload();
 };
 
 const follow = async (viewer, before) => {
+  let known = before;
   const live = await load("live.json").catch(() => undefined);
   if (live === undefined) {
-    status.textContent = "the server has ended";
-    return;
+    element("status").textContent = "the server has ended";
+  } else {
+    try {
+      if (isReplaced(live, before)) return startAnew();
+      introduce(live);
+      if (live.shown !== before.shown) await followLayers(viewer);
+      const isOther = live.written !== before.written || JSON.stringify(live.stores) !== JSON.stringify(before.stores);
+      if (isOther || live.gone !== before.gone) readAgain(viewer);
+      known = live;
+    } catch (error) {
+      // It is tried again at the next look.
+      console.warn(error);
+    }
   }
-  status.textContent = live.text;
-  if (before !== undefined && live.shown !== before.shown) await followLayers(viewer);
-  if (before !== undefined && live.written !== before.written) readAgain(viewer);
-  // Once more when it is complete: the last shards have come since.
-  if (live.running || before?.running) setTimeout(() => follow(viewer, live), 1000 * PATIENCE);
+  setTimeout(() => follow(viewer, known), 1000 * (known.running ? PATIENCE : PATIENCE_OF_WHOLE));
 };
 
 // Lays out all that there is; nothing of a store that was just begun.
 const open = (viewer, state) => {
   given = byName(state);
+  isPlaced = state.dimensions !== undefined;
   if (given.size > 0) viewer.state.restoreState(state);
 };
 
 const byName = (state) => new Map(state.layers.map((layer) => [layer.name, layer]));
 
+// What is said before it is looked for: what comes in between is seen at the next look.
+const begun = await load("live.json");
+introduce(begun);
 // A store that was just begun has nothing to show yet, and nobody is to be asked for a layer then.
 const viewer = setupDefaultViewer({ showLayerDialog: false, resetStateWhenEmpty: false });
+viewer.title.value = begun.name;
 // Who opens a link to a place of the page finds that. Asked before the page writes its own place there.
 const isLink = location.hash.length >= 3;
 const first = withSources(await load("state.json"));
 if (isLink) given = byName(first);
 else open(viewer, first);
-follow(viewer, undefined);
+setTimeout(() => follow(viewer, begun), 1000 * PATIENCE);

@@ -9,7 +9,7 @@ use crate::io::png::rgb_bytes;
 use crate::kernel::image::picture::panel::Rgb;
 
 /// A picture and what it is called.
-pub(super) struct Picture {
+pub(crate) struct Picture {
     address: String,
     size: [usize; 2],
     caption: String,

@@ -1,14 +1,21 @@
-//! The page of a series: volumes over time, a table of all objects at all times, and the pages of single times.
+//! The page of a series: volumes over time, slices through some times, a table of all objects at all times, and the pages of single
+//! times.
+
+use std::path::Path;
 
 use serde_json::Value;
 
 use super::document::{command_line, whole_page};
+use super::evidence::{Evidence, Measure, Root};
 use super::html::Html;
+use super::picture::Picture;
 use super::settings::{settings, told};
-use super::{plots, warnings};
+use super::{plots, slices, warnings};
 use crate::cli::report::series::{Row, Whole, at};
-use crate::cli::terminal::text::duration;
+use crate::cli::terminal::text::{duration, number};
 use crate::error::Result;
+use crate::exec::Stage;
+use crate::grid::{DataSets, Geometry};
 use crate::kernel::image::picture::palette::label_color;
 
 /// Objects in a chart, the largest.
@@ -27,11 +34,43 @@ const HEAD: [&str; 9] = [
     "",
 ];
 
+/// Times whose objects are missing that are named, at most.
+const MOST_NAMED: usize = 30;
+
+/// Slices through a time.
+pub(crate) struct Slices {
+    pub(crate) time: u32,
+    pub(crate) pictures: Vec<Picture>,
+}
+
+/// Slices through the store of a time, with the outlines of its objects and the marks that these were made from.
+///
+/// # Errors
+/// When the store cannot be read.
+pub(crate) fn slices_of(
+    stage: &Stage<'_>,
+    store: &Path,
+    marks: &DataSets,
+    geometry: &Geometry,
+) -> Result<Vec<Picture>> {
+    let centre = geometry.position(geometry.shape.map(|n| n / 2));
+    slices::slices(stage, store, &evidence(marks, centre))
+}
+
+fn evidence(marks: &DataSets, centre: [f64; 3]) -> Evidence<'_> {
+    Evidence { root: Root::Image, measure: Measure::ToMarks, sources: marks, centre, points: "marks" }
+}
+
 /// The whole page; `page_of` is the page of a time, from where this one lies, where it has one.
 ///
 /// # Errors
 /// When a chart cannot be drawn.
-pub(crate) fn page(whole: &Whole<'_>, typed: &[String], page_of: &dyn Fn(u32) -> Option<String>) -> Result<String> {
+pub(crate) fn page(
+    whole: &Whole<'_>,
+    typed: &[String],
+    of_times: &[Slices],
+    page_of: &dyn Fn(u32) -> Option<String>,
+) -> Result<String> {
     let report = whole.report();
     let image = told(&report["settings"]["image"]);
     let title = format!("strandline segment: {} over time", image.rsplit('/').next().unwrap_or_default());
@@ -43,6 +82,7 @@ pub(crate) fn page(whole: &Whole<'_>, typed: &[String], page_of: &dyn Fn(u32) ->
         for line in warnings::lines(&whole.notes) {
             page.element("p", &[("class", "warning")], &line);
         }
+        missing(page, &rows);
         page.element("h2", &[], "Run");
         page.element("p", &[("class", "faint")], "The command as it was typed; a click selects it.");
         page.element("pre", &[], &command_line(typed));
@@ -53,6 +93,7 @@ pub(crate) fn page(whole: &Whole<'_>, typed: &[String], page_of: &dyn Fn(u32) ->
             }
         });
         table(page, rows);
+        put_slices(page, whole, of_times);
         page.element("h2", &[], "Times");
         page.within("p", &[], |page| {
             page.text("Slices, surfaces and all numbers of single times: ");
@@ -79,6 +120,36 @@ fn summary(page: &mut Html, whole: &Whole<'_>, report: &Value) {
             times.start
         ),
     );
+}
+
+/// Says at which times objects have no surface.
+fn missing(page: &mut Html, rows: &[Row]) {
+    let mut times: Vec<u32> = rows.iter().filter(|row| row.found.is_none()).map(|row| row.time).collect();
+    times.dedup();
+    if times.is_empty() {
+        return;
+    }
+    let named: Vec<String> = times.iter().take(MOST_NAMED).map(ToString::to_string).collect();
+    let more = times.len().saturating_sub(MOST_NAMED);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let which = if times.len() == 1 { "time" } else { "times" };
+    let text = format!("Surfaces are missing at {which} {}{more}: the table says why.", named.join(", "));
+    page.element("p", &[("class", "warning")], &text);
+}
+
+fn put_slices(page: &mut Html, whole: &Whole<'_>, of_times: &[Slices]) {
+    if of_times.is_empty() {
+        return;
+    }
+    page.element("h2", &[], "Slices");
+    let none = DataSets::default();
+    page.element("p", &[("class", "faint")], &slices::explained(&evidence(&none, [0.0; 3])));
+    for Slices { time, pictures } in of_times {
+        let unit = whole.axis.unit.as_deref().unwrap_or_default();
+        let of_clock = at(*time, whole.axis).map_or(String::new(), |at| format!(" ({} {unit})", number(at)));
+        page.element("h3", &[], &format!("Time {time}{of_clock}"));
+        page.within("div", &[("class", "figures")], |page| pictures.iter().for_each(|picture| picture.put(page)));
+    }
 }
 
 /// A chart of volumes; the largest objects where there are many.

@@ -18,6 +18,10 @@ const NODES: f64 = 60_000.0;
 /// How many smallest spacings they are apart at least.
 const APART: f64 = 2.0;
 
+/// What a cell takes to be told near the surface or not, in the mean, and what it takes to be filled.
+const TELLING: u64 = 1;
+const FILLING: u64 = 5;
+
 /// A fitted shape on the grid of its box.
 pub(crate) struct ShapeField<'a> {
     /// The grid of the box.
@@ -39,6 +43,8 @@ impl<'a> ShapeField<'a> {
         let (geometry, window) = box_around(image, sections, fitted, margin);
         let mut lattice = Lattice::for_box(geometry.shape, geometry.spacing, NODES, APART);
         let planes: Vec<usize> = (0..lattice.planes()).collect();
+        // These take little beside the cells of all but small objects.
+        stage.weigh(0);
         let of = |point: [f64; 3]| fitted.distance(point).0 as f32;
         let filled = stage.run(&planes, &Workers::none(), |(), &n| Ok(lattice.plane(n, &geometry, of)))?;
         lattice.fill(&filled);
@@ -71,11 +77,14 @@ impl<'a> ShapeField<'a> {
     pub(crate) fn cells_within(&self, stage: &Stage<'_>, reach: f64) -> Result<Arc<BrickSet>> {
         let grid = BrickGrid::new(self.geometry.shape, CELL as i64);
         let ids: Vec<BrickId> = (0..grid.len()).collect();
-        let near = stage.run(&ids, &Workers::new(Vec::new), |values, &id| {
+        let may_be_near =
+            stage.run(&ids, &Workers::none(), |(), &id| Ok(!self.shape.is_beyond(&grid.brick_box(id), reach)))?;
+        let asked: Vec<BrickId> = ids.into_iter().filter(|&id| may_be_near[id as usize]).collect();
+        let telling = TELLING * asked.len() as u64;
+        stage.expect(telling + FILLING * asked.len() as u64);
+        stage.weigh(TELLING);
+        let is_near = stage.run(&asked, &Workers::new(Vec::new), |values, &id| {
             let part = grid.brick_box(id);
-            if self.shape.is_beyond(&part, reach) {
-                return Ok(false);
-            }
             // Most cells near the surface show it at a few voxels.
             if a_few(&part).any(|voxel| f64::from(self.at(voxel).abs()) <= reach) {
                 return Ok(true);
@@ -84,7 +93,12 @@ impl<'a> ShapeField<'a> {
             self.read(&part, values);
             Ok(values.iter().any(|v| f64::from(v.abs()) <= reach))
         })?;
-        Ok(Arc::new(BrickSet::from_fn(grid, |id| near[id as usize])))
+        let mut near = may_be_near;
+        asked.iter().zip(is_near).for_each(|(&id, is_near)| near[id as usize] = is_near);
+        let set = Arc::new(BrickSet::from_fn(grid, |id| near[id as usize]));
+        stage.expect(telling + FILLING * set.len() as u64);
+        stage.weigh(FILLING);
+        Ok(set)
     }
 
     /// The signed distance on cells, and how deep the shape is in them; as deep as can be where it fills others.

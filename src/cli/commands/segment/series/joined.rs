@@ -6,14 +6,20 @@
 use std::fmt::Write;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::Series;
 use super::work::Work;
+use crate::cli::inputs::settings;
 use crate::cli::outputs::files::write_whole;
-use crate::cli::report::page::series::page;
+use crate::cli::report::page::series::{Slices, page, slices_of};
 use crate::cli::report::series::{TimeReport, Whole};
+use crate::cli::terminal::console::{Console, Voice};
 use crate::error::{Error, Result};
 use crate::exec::Progress;
+use crate::grid::DataSets;
+use crate::io::geometry::read::point_file::PointFile;
+use crate::io::geometry::read::points::read_points;
 use crate::io::ome_zarr::{StoreWriter, TIMES, time_name};
 
 /// What of a time's store goes into its group.
@@ -48,7 +54,7 @@ impl Series<'_> {
             seconds: self.started.elapsed().as_secs_f64(),
         };
         if let Some(store) = store {
-            self.write_report(&store, &whole)?;
+            self.write_report(&store, &whole, &self.slices(work, times)?)?;
             store.finish()?;
         }
         if let Some(path) = &output.report {
@@ -79,14 +85,45 @@ impl Series<'_> {
         Ok(())
     }
 
-    fn write_report(&self, store: &StoreWriter, whole: &Whole<'_>) -> Result<()> {
+    /// Slices through the first, the middle and the last time that were solved; where there is no memory for them, a note.
+    fn slices(&self, work: &Work, times: &[TimeReport]) -> Result<Vec<Slices>> {
+        let solved: Vec<u32> = times.iter().filter(|time| time.report.is_some()).map(|time| time.time).collect();
+        let mut chosen: Vec<u32> = [0, solved.len() / 2, solved.len().saturating_sub(1)]
+            .iter()
+            .filter_map(|&n| solved.get(n).copied())
+            .collect();
+        chosen.dedup();
+        let engine = settings::resources(&self.args.resources, self.args.output.store())?
+            .engine(&self.cancel, Arc::new(Console::new(Voice::Quiet)))?;
+        let stage = engine.stage("slices", 0);
+        let of = |time: u32| -> Result<Option<Slices>> {
+            let Some(store) = work.store_there(time) else { return Ok(None) };
+            let mut marks = DataSets::default();
+            if let Ok(PointFile { cloud, .. }) = read_points(&store.join("marks.csv")) {
+                marks.add_cloud(&cloud.positions);
+            }
+            Ok(Some(Slices { time, pictures: slices_of(&stage, &store, &marks, &self.geometry)? }))
+        };
+        let made: Result<Vec<Option<Slices>>> = chosen.into_iter().map(of).collect();
+        self.cancel.check()?;
+        Ok(made
+            .unwrap_or_else(|error| {
+                self.console.note(&format!("report.html has no slices: {error}"));
+                Vec::new()
+            })
+            .into_iter()
+            .flatten()
+            .collect())
+    }
+
+    fn write_report(&self, store: &StoreWriter, whole: &Whole<'_>, slices: &[Slices]) -> Result<()> {
         write(&store.file("volumes.csv")?, true, &whole.table())?;
         let path = store.file("report.html")?;
         let folder = store.folder();
         let of = |time: u32| {
             Some(format!("{TIMES}/{}/report.html", time_name(time))).filter(|page| folder.join(page).exists())
         };
-        match page(whole, self.typed, &of).and_then(|page| write(&path, true, &page)) {
+        match page(whole, self.typed, slices, &of).and_then(|page| write(&path, true, &page)) {
             Ok(()) => {}
             Err(error) => self.console.note(&format!("report.html is left out: {error}")),
         }
