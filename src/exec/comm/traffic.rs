@@ -56,8 +56,8 @@ impl<C: Comm> Comm for Counted<C> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::threads::ThreadComm;
     use super::*;
+    use crate::exec::ThreadComm;
 
     #[test]
     fn what_is_sent_is_counted_once_where_it_is_sent() {
