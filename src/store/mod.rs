@@ -13,6 +13,7 @@ mod slot_file;
 mod stream;
 mod unfinished;
 mod window;
+mod writeback;
 
 pub use both_sinks::BothSinks;
 pub use brick_array::BrickArray;
@@ -23,3 +24,4 @@ pub use scratch::Scratch;
 pub use stream::{BoxSource, MeshSink, NoMesh, PlaneSource, VolumeSource, Whereabouts};
 pub use unfinished::{Unfinished, remove_all as remove_unfinished};
 pub use window::{Traffic, Window};
+pub use writeback::begin_writeback;
