@@ -15,7 +15,7 @@ fn sphere(first: usize) -> Vec<[f64; 3]> {
     let point = |n: usize| {
         let z = (2.0 * n as f64 + 1.0) / 500.0 - 1.0;
         let (around, ring) = (PI * (1.0 + 5.0_f64.sqrt()) * n as f64, (1.0 - z * z).sqrt());
-        [ring * around.cos(), ring * around.sin(), z].map(|v| 16.0 + 9.0 * v)
+        [ring * libm::cos(around), ring * libm::sin(around), z].map(|v| 16.0 + 9.0 * v)
     };
     (0..first).map(point).collect()
 }
