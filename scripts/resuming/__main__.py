@@ -73,6 +73,7 @@ def full(program, arguments_, place, numbers, wanted, needed):
             trial.faults.append(f"a full disk ended it with {code}")
         if code != 0:
             trial.look_at_unfinished(wanted)
+            trial.look_at_what_a_full_disk_is_told()
         trials.enlarge(small, 8 * needed + (1 << 30))
         if code != 0:
             code = trial.once(True, 0.0, None)

@@ -85,6 +85,15 @@ class Trial:
         if (self.folder / "out.zarr").exists() and any(found.get(name) != wanted[name] for name in store):
             self.faults.append("a store stands under its name that is not finished")
 
+    def look_at_what_a_full_disk_is_told(self):
+        """What is needed, and that there is a checkpoint where there is one."""
+        last = self.said[-1].splitlines()[-1]
+        if "No space left" in last and "of disk" not in last:
+            self.faults.append("it is not told what a full disk needs")
+        kept = any((self.folder / "out.zarr.checkpoint").glob("0*.checkpoint"))
+        if "No space left" in last and kept != ("--resume goes on from the checkpoint in" in last):
+            self.faults.append("a checkpoint is told that is not there, or not that there is one")
+
     def ended(self, wanted):
         """Ends the run once to three times; whether it was done before."""
         sent = signal.SIGTERM if self.how == "term" else signal.SIGKILL

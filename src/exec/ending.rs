@@ -101,7 +101,7 @@ pub(crate) fn check_ended_anywhere<R: PartialEq>(
                 Err(error) => {
                     assert!(matches!(error.kind(), ErrorKind::Interrupted { .. }), "{what}: {error}");
                     // Before there is a place at which it can be put by nothing is lost.
-                    let is_saved = said.contains("--resume goes on from it") || moment <= moments / 6;
+                    let is_saved = said.contains("--resume goes on from it") || moment <= moments * 3 / 4;
                     assert!(is_saved, "{what}, ended at {moment} of {moments}: {said}");
                 }
             }

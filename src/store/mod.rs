@@ -14,6 +14,7 @@ mod spill;
 mod stream;
 mod unfinished;
 mod window;
+mod writeback;
 
 pub use both_sinks::BothSinks;
 pub use brick_array::BrickArray;
@@ -25,3 +26,4 @@ pub use spill::{Spill, Spilled};
 pub use stream::{BoxSource, MeshSink, NoMesh, PlaneSource, VolumeSource, Whereabouts};
 pub use unfinished::{Unfinished, remove_all as remove_unfinished};
 pub use window::{Traffic, Window};
+pub use writeback::begin_writeback;

@@ -195,3 +195,37 @@ fn check_can_be_made(folder: &Path) -> Result<()> {
         Error::from_io(what, &error).at(folder)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    /// What a command line of one flag for its output holds.
+    #[derive(Parser)]
+    struct Typed {
+        #[command(flatten)]
+        output: OutputArgs,
+    }
+
+    #[test]
+    fn a_full_disk_is_told_with_what_is_needed_and_what_was_left() {
+        let dir = tempfile::tempdir().unwrap();
+        let store = dir.path().join("x.zarr");
+        let output = Typed::parse_from(["strandline".as_ref(), "-o".as_ref(), store.as_os_str()]).output;
+        let told = |error: std::io::Error, most: u64| {
+            let failed = Error::from_io("a shard cannot be written", &error).at(&store);
+            told_of_room::<()>(Err(failed), most, &output).unwrap_err().to_string()
+        };
+        let full = || std::io::Error::from_raw_os_error(libc::ENOSPC);
+        let said = told(full(), 3 << 30);
+        assert!(said.ends_with("; temporary fields and output of this run take up to 3 GiB of disk"), "{said}");
+        let checkpoints = Checkpoints::begin(&checkpoints_of(&store), Vec::new(), false).unwrap();
+        checkpoints.save("moving", Vec::new(), (&[], &[]), &|| Ok(())).unwrap();
+        let said = told(full(), 3 << 30);
+        assert!(said.contains("of disk; when there is room --resume goes on from the checkpoint in "), "{said}");
+        assert!(said.ends_with("x.zarr.checkpoint"), "{said}");
+        assert!(!told(std::io::Error::from_raw_os_error(libc::EACCES), 3 << 30).contains("of disk"));
+    }
+}

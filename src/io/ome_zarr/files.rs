@@ -9,6 +9,10 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::error::{Error, Result};
+use crate::store::begin_writeback;
+
+/// Files of so many bytes take a disk a while.
+const LARGE: u64 = 1 << 20;
 
 /// An error of the operating system while writing, with what to do when the disk is full.
 pub(super) fn io_error(what: &str, error: &std::io::Error) -> Error {
@@ -49,6 +53,9 @@ fn write_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<u64>) ->
     let mut sink = BufWriter::new(file);
     let bytes = write(&mut sink)?;
     sink.flush().map_err(|error| io_error("a file cannot be written", &error))?;
+    if bytes >= LARGE {
+        begin_writeback(sink.get_ref());
+    }
     Ok(bytes)
 }
 

@@ -181,7 +181,7 @@ fn what_does_not_fit_is_told_with_what_it_needs_and_the_last_one_stays() {
     let full = run.save("moving", vec![3], (&[&Endless], &[]), &|| Ok(())).unwrap_err();
     let said = full.to_string();
     assert_eq!(full.kind(), io::ErrorKind::StorageFull);
-    assert!(said.contains("c.checkpoint: the disk is full: a checkpoint needs 1.0 EiB, and has "), "{said}");
+    assert!(said.contains("c.checkpoint: the disk is full: a checkpoint needs 1048576 TiB, and has "), "{said}");
     // The room of the one before may be what the run needs.
     assert_eq!((numbers(&folder), names(&folder).len()), (vec![2], 2));
     // Of one that fails half way nothing stays.
