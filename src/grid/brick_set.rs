@@ -125,6 +125,7 @@ impl BrickSet {
     }
 
     /// The bricks in order of their numbers; a brick's place is its slot.
+    #[must_use]
     pub fn ids(&self) -> impl ExactSizeIterator<Item = BrickId> {
         (0..self.len()).map(|slot| self.id(slot as Slot))
     }

@@ -85,7 +85,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let records: Vec<Vec<u8>> = (0..100_usize).map(|n| vec![n as u8; n * n % 1013]).collect();
         let mut spill = Spill::new(folder.path()).unwrap();
-        records.iter().for_each(|record| spill.put(record).unwrap());
+        for record in &records {
+            spill.put(record).unwrap();
+        }
         let mut spilled = spill.read_back().unwrap();
         for record in &records {
             assert_eq!(spilled.take().unwrap().as_ref(), Some(record));

@@ -66,15 +66,19 @@ pub(crate) fn give_way() {
 }
 
 /// Leaves the other processes at the end of a run: in order where it succeeded, else all of them end with this one's exit code.
-pub(crate) fn leave(_code: u8) {
-    #[cfg(feature = "mpi")]
-    if let Some(world) = WORLD.get() {
-        if _code == 0 {
-            world.end();
-        } else {
-            world.abort(i32::from(_code));
+#[cfg(feature = "mpi")]
+pub(crate) fn leave(code: u8) {
+    match WORLD.get() {
+        Some(world) if code == 0 => world.end(),
+        Some(world) => {
+            world.abort(i32::from(code));
             // The launcher ends this process too.
             std::thread::sleep(std::time::Duration::from_secs(10));
         }
+        None => {}
     }
 }
+
+/// There are no others.
+#[cfg(not(feature = "mpi"))]
+pub(crate) fn leave(_code: u8) {}

@@ -31,13 +31,16 @@ pub struct MpiComm {
     ranks: usize,
     to: Sender<Order>,
     /// What was ordered and has not been taken yet.
-    waiting: Mutex<VecDeque<Receiver<Result<Vec<Vec<u8>>>>>>,
+    waiting: Mutex<VecDeque<Receiver<Messages>>>,
 }
+
+/// A message for, or of, each of some ranks.
+type Messages = Vec<Vec<u8>>;
 
 /// What the thread that talks to MPI is to do.
 enum Order {
     /// Sends to ranks, and takes what they send.
-    Exchange { with: Vec<usize>, messages: Vec<Vec<u8>>, answer: Sender<Result<Vec<Vec<u8>>>> },
+    Exchange { with: Vec<usize>, messages: Messages, answer: Sender<Messages> },
     /// Ends all processes at once.
     Abort(i32),
     /// Ends MPI; all ranks do.
@@ -77,7 +80,7 @@ impl MpiComm {
         }
     }
 
-    fn waiting(&self) -> MutexGuard<'_, VecDeque<Receiver<Result<Vec<Vec<u8>>>>>> {
+    fn waiting(&self) -> MutexGuard<'_, VecDeque<Receiver<Messages>>> {
         // A list of channels is whole whatever thread was lost while holding it.
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -100,7 +103,7 @@ impl Comm for MpiComm {
 
     fn collect(&self, _with: &[usize]) -> Result<Vec<Vec<u8>>> {
         let answered = self.waiting().pop_front();
-        answered.ok_or_else(gone)?.recv().map_err(|_| gone())?
+        answered.ok_or_else(gone)?.recv().map_err(|_| gone())
     }
 }
 
@@ -119,7 +122,7 @@ fn talk(orders: &Receiver<Order>, tell: &Sender<Option<(usize, usize)>>) {
     while let Ok(order) = orders.recv() {
         match order {
             Order::Exchange { with, messages, answer } => {
-                let answered = exchange(&world, &with, messages, orders);
+                let answered = exchange(&world, &with, &messages, orders);
                 let _ = answer.send(answered);
             }
             Order::Abort(code) => world.abort(code),
@@ -133,13 +136,8 @@ fn talk(orders: &Receiver<Order>, tell: &Sender<Option<(usize, usize)>>) {
 }
 
 /// Sends to each rank its message, and takes theirs, whatever order they come in.
-fn exchange(
-    world: &SimpleCommunicator,
-    with: &[usize],
-    messages: Vec<Vec<u8>>,
-    orders: &Receiver<Order>,
-) -> Result<Vec<Vec<u8>>> {
-    let framed: Vec<Vec<u8>> = messages.into_iter().map(framed).collect();
+fn exchange(world: &SimpleCommunicator, with: &[usize], messages: &[Vec<u8>], orders: &Receiver<Order>) -> Messages {
+    let framed: Vec<Vec<u8>> = messages.iter().map(|message| framed(message)).collect();
     let mut received: Vec<Coming> = with.iter().map(|&rank| Coming { rank, bytes: Vec::new() }).collect();
     multiple_scope(with.len(), |scope, sends| {
         for (&rank, message) in with.iter().zip(&framed) {
@@ -162,14 +160,14 @@ fn exchange(
         }
         sends.wait_all(&mut Vec::new());
     });
-    Ok(received.into_iter().map(|coming| coming.bytes).map(unframed).collect())
+    received.into_iter().map(|coming| coming.bytes).map(unframed).collect()
 }
 
 /// A message with its length before it.
-fn framed(message: Vec<u8>) -> Vec<u8> {
+fn framed(message: &[u8]) -> Vec<u8> {
     let mut framed = Vec::with_capacity(HEAD + message.len());
     framed.extend_from_slice(&(message.len() as u64).to_le_bytes());
-    framed.extend_from_slice(&message);
+    framed.extend_from_slice(message);
     framed
 }
 

@@ -119,7 +119,9 @@ impl Root {
     /// Takes over the sums of shards that another process of the run has written.
     pub(super) fn take_sums(&self, sums: Vec<(String, FileSum)>) {
         self.written.fetch_add(sums.len() as u64, Relaxed);
-        sums.into_iter().for_each(|(path, sum)| self.sums.put(&path, sum));
+        for (path, sum) in sums {
+            self.sums.put(&path, sum);
+        }
     }
 
     /// Sees to it that all shards written here are on the disk.

@@ -88,6 +88,7 @@ pub(super) fn solve_once<'a, P: Precision>(
 }
 
 /// What is read of a solved distance by the rank that asks for it.
+#[derive(Clone, Copy)]
 pub struct Reads<'r, P> {
     /// Who reads bricks while others are still solved.
     pub early: Option<&'r dyn Early<P>>,
