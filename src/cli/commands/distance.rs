@@ -278,7 +278,10 @@ impl Job {
         })?;
         let output = self.args.job.output.store();
         let written = if output.is_some() { self.written() } else { 0 };
-        let disk = Disk::of_grid(&self.resources, output, &self.geometry, needs, written)?;
+        // Ranks beside this one keep as much on the same disk.
+        let Sharing { machine, process } = sharing(&self.args);
+        let all = Needs { scratch: needs.scratch.saturating_mul(machine.max(process) as u64), ..*needs };
+        let disk = Disk::of_grid(&self.resources, output, &self.geometry, &all, written)?;
         let has_mesh = self.middle.as_ref().is_some_and(|choice| choice.mesh.is_some());
         disk.with_waiting(if has_mesh { needs.waiting } else { 0 }).check(|text| self.console.note(text))
     }
