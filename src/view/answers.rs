@@ -61,7 +61,7 @@ impl Now {
     fn new(shown: Shown) -> Self {
         let (state, present) = (state::state(&shown).to_string(), shown.present());
         let is_live = shown.is_live();
-        Self { state, is_live, is_gone: false, is_cut_short: false, present, looked: Mutex::new(Instant::now()), shown }
+        Self { shown, state, is_live, is_gone: false, is_cut_short: false, present, looked: Mutex::new(Instant::now()) }
     }
 
     /// What there is a moment later. What cannot be looked at any more stays as it was seen, and nobody writes it.
@@ -73,7 +73,7 @@ impl Now {
                 let is_gone = shown.live().next().is_none();
                 let is_cut_short = is_gone && (self.is_live || self.is_cut_short);
                 let (is_live, present, looked) = (shown.is_live(), self.present.clone(), Mutex::new(Instant::now()));
-                Self { state, is_live, is_gone, is_cut_short, present, looked, shown }
+                Self { shown, state, is_live, is_gone, is_cut_short, present, looked }
             },
             Self::new,
         )

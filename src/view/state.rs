@@ -31,7 +31,7 @@ pub(super) fn state(shown: &Shown) -> Value {
         "title": shown.name,
         "layers": layers,
         // Sections of surfaces alone are empty.
-        "layout": if shown.images.is_empty() && !shown.meshes.is_empty() { "3d" } else { "4panel-alt" },
+        "layout": if shown.images.is_empty() && surfaces(shown).next().is_some() { "3d" } else { "4panel-alt" },
         // Without a unit its letters would be read as one: m, a thousandth, as metres.
         "showScaleBar": has_unit,
         "showAxisLines": false,
@@ -73,10 +73,15 @@ pub(super) fn address(image: &Image) -> String {
     format!("/data/{}/|{version}:", utf8_percent_encode(&image.path, PLAIN))
 }
 
+/// All surfaces, those that still move among them.
+fn surfaces(shown: &Shown) -> impl Iterator<Item = &MeshFile> {
+    shown.meshes.iter().chain(&shown.growing.0)
+}
+
 /// Looks at meshes alone, whose numbers have no unit, so that they fill the page.
 fn place_meshes(shown: &Shown, state: &mut Map<String, Value>) {
     // A page that only waits for a store.
-    let Some((low, high)) = shown.meshes.iter().filter_map(mesh::bounds).reduce(joined) else { return };
+    let Some((low, high)) = surfaces(shown).filter_map(mesh::bounds).reduce(joined) else { return };
     let longest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);
     let extent = if longest > 0.0 { longest } else { 1.0 };
     // As small a unit as an image would have voxels: positions are told in whole ones.
@@ -156,12 +161,13 @@ fn shader(unsolved: Unsolved) -> String {
     // Inside of a closed surface distances are negative.
     let beyond = unsolved.beyond.filter(|far| far.is_finite()).map(|far| format!("abs(value) >= {:e}", far as f32));
     let nothing: Vec<String> = fill.into_iter().chain(beyond).collect();
-    let passed_over = match nothing.is_empty() {
-        true => String::new(),
-        false => format!(
+    let passed_over = if nothing.is_empty() {
+        String::new()
+    } else {
+        format!(
             "  float value = toRaw(getDataValue());\n  if ({}) {{\n    emitTransparent();\n    return;\n  }}\n",
             nothing.join(" || ")
-        ),
+        )
     };
     format!("#uicontrol invlerp normalized\nvoid main() {{\n{passed_over}  emitGrayscale(normalized());\n}}\n")
 }

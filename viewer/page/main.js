@@ -41,16 +41,17 @@ const readAgain = (viewer) => {
   for (const source of viewer.chunkManager.memoize.map.values()) source.invalidateCache?.();
 };
 
-// Layers as the server gave them, by their names, and whether it has said where to look: of surfaces that still move it does not.
+// Layers as the server gave them, by their names, and whether an image was among them at any time.
 let given = new Map();
-let isPlaced = true;
+let hasLooked = false;
 
 // Puts in layers that are new, at their places, gives others what is new of them, and takes out those that are gone; all else stays as it
 // is. The world is held meanwhile: with its last layer neuroglancer would forget its axes and where the page looks.
 const followLayers = async (viewer) => {
   const state = withSources(await load("state.json"));
-  if (given.size === 0 || (!isPlaced && state.dimensions !== undefined)) return open(viewer, state);
   const now = byName(state);
+  // The first image is what there is to look at, after a surface that still moved before it.
+  if (given.size === 0 || (!hasLooked && hasImage(now))) return open(viewer, state);
   // A document that is written just then says nothing.
   if (now.size === 0) return;
   const { layerManager, layerSpecification } = viewer;
@@ -126,10 +127,11 @@ const follow = async (viewer, before) => {
 // Lays out all that there is; nothing of a store that was just begun.
 const open = (viewer, state) => {
   given = byName(state);
-  isPlaced = state.dimensions !== undefined;
+  hasLooked = hasImage(given);
   if (given.size > 0) viewer.state.restoreState(state);
 };
 
+const hasImage = (layers) => [...layers.values()].some((layer) => layer.type === "image");
 const byName = (state) => new Map(state.layers.map((layer) => [layer.name, layer]));
 
 // What is said before it is looked for: what comes in between is seen at the next look.
@@ -141,6 +143,6 @@ viewer.title.value = begun.name;
 // Who opens a link to a place of the page finds that. Asked before the page writes its own place there.
 const isLink = location.hash.length >= 3;
 const first = withSources(await load("state.json"));
-if (isLink) given = byName(first);
+if (isLink) [given, hasLooked] = [byName(first), true];
 else open(viewer, first);
 setTimeout(() => follow(viewer, begun), 1000 * PATIENCE);
