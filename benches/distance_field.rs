@@ -72,7 +72,15 @@ fn run(n: i64, points: Option<u64>, method: Method, edge: i64, threads: usize) {
             let stage = engine.stage("distance", 0);
             let options = Options { sources, ..Options::up_to(f64::INFINITY) };
             let solved = (solver.solve)(
-                &Solving { stage: &stage, engine: &engine, sources: &given, set: &set, options, early: None },
+                &Solving {
+                    stage: &stage,
+                    engine: &engine,
+                    sources: &given,
+                    set: &set,
+                    options,
+                    early: None,
+                    borrows: &[],
+                },
                 schedule,
             )
             .expect("room");

@@ -178,7 +178,9 @@ fn runs_that_are_terminated_while_they_search_or_sweep_go_on_there() {
         assert_eq!(bench.entries("out"), ["whole.zarr", "x.zarr"], "{run}");
         let [whole, resumed] = ["out/whole.zarr", "out/x.zarr"].map(|store| bench.path(store));
         same(&contents(&whole), &contents(&resumed), run);
-        [whole, resumed].iter().for_each(|store| fs::remove_dir_all(store).unwrap());
+        for store in [whole, resumed] {
+            fs::remove_dir_all(store).unwrap();
+        }
     }
 }
 

@@ -48,6 +48,7 @@ static WORLD: std::sync::OnceLock<Arc<MpiComm>> = std::sync::OnceLock::new();
 ///
 /// # Errors
 /// When MPI cannot be begun.
+#[cfg_attr(not(feature = "mpi"), expect(clippy::unnecessary_wraps, reason = "MPI may fail"))]
 pub(crate) fn ranks() -> Result<Arc<dyn Comm>> {
     #[cfg(feature = "mpi")]
     if launched().is_some() {

@@ -116,6 +116,7 @@ pub(super) fn dijkstra_pythagoras<'a, P: Precision>(
 }
 
 /// Nothing is made of the distance beside it.
+#[expect(clippy::unnecessary_wraps, reason = "what else is made of it may fail")]
 fn nothing() -> Result<()> {
     Ok(())
 }

@@ -158,6 +158,3 @@ impl<'a> Progress<'a> {
         save_point.as_mut().map_or(Ok(()), |save_point| save_point.reached(true, || &*known, fields))
     }
 }
-
-#[cfg(test)]
-mod tests;

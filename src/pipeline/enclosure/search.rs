@@ -398,3 +398,6 @@ impl Enclosure {
         Ok((band, self.held))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -356,6 +356,9 @@ pub fn write_levels<T: Element>(
 }
 
 #[cfg(test)]
+mod written_again;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};

@@ -209,13 +209,10 @@ fn parts(visits: &[Vec<Box3>], images: &[&dyn PartlyWritten]) -> Vec<usize> {
 }
 
 /// How many of the parts that are left make a batch: as many as have no more than so many visits, and one at least.
-fn batch(begins: &[usize], left: &[usize], most: usize) -> usize {
+pub(super) fn batch(begins: &[usize], left: &[usize], most: usize) -> usize {
     let visits = left.iter().scan(0, |sum, &part| {
         *sum += begins[part + 1] - begins[part];
         Some(*sum)
     });
     visits.take_while(|&visits| visits <= most).count().max(1)
 }
-
-#[cfg(test)]
-mod tests;

@@ -265,7 +265,7 @@ mod tests {
         assert_eq!((after.unwritten(2), after.unwritten(1)), (None, Some(9.0)));
         for (n, face) in FACES.into_iter().enumerate() {
             after.read_face(2, face, |values| {
-                assert_eq!((values[0], values[255]), ((n * 256) as f32, (n * 256 + 255) as f32))
+                assert_eq!((values[0], values[255]), ((n * 256) as f32, (n * 256 + 255) as f32));
             });
         }
     }

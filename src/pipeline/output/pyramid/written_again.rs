@@ -12,7 +12,7 @@ use crate::exec::ending::check_ended_anywhere;
 use crate::exec::{Budget, Cancel, Engine, Progress, SavePoints};
 use crate::grid::Geometry;
 use crate::io::ome_zarr::{Compression, Content, ImageSpec, StoreWriter};
-use crate::pipeline::output::pyramid::{Reduce, write_levels};
+use crate::pipeline::output::saved::batch;
 use crate::store::checkpoint::Checkpoints;
 use crate::store::{BoxSource, ElementType, Scratch};
 

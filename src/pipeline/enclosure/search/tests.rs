@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use super::super::search::{Found, Search, Start, enclose, first_reach_for};
+use super::{Found, Search, Start, enclose, first_reach_for};
 use crate::error::Result;
 use crate::exec::Engine;
 use crate::exec::ending::check_ended_anywhere;
