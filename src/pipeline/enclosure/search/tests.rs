@@ -49,7 +49,7 @@ fn a_search_that_is_ended_anywhere_goes_on_with_the_same_bits() {
             most.fetch_max(engine.reports().len(), Relaxed);
             found
         };
-        check_ended_anywhere(&format!("search {n}"), 12, 1.0, &run);
+        check_ended_anywhere(&format!("search {n}"), 6, 1.0, &run);
         // A stage for the distance within each reach, and one for the sides there, with each ball too.
         let least = if n == 1 { 7 } else { 2 };
         assert!(most.into_inner() >= least, "search {n}");
