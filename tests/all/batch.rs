@@ -78,6 +78,11 @@ sources = \"in/a.csv\"
 [[items]]
 command = \"middle\"
 sources = [[\"in/a.csv\", \"in/b.csv\"], [\"in/c.csv\"]]
+
+[[items]]
+command = \"distance\"
+name = \"none\"
+sources = \"in/b.csv\"
 threads = 0
 
 [thing]
@@ -97,8 +102,8 @@ a = 1
         "jobs.toml:19: two items are called a",
         "jobs.toml:23: `paint` is no command of items",
         "jobs.toml:28: in/c.csv is not there",
-        "jobs.toml:29: --threads is 0; give 1 to 1024",
-        "jobs.toml:31: unknown key `thing`",
+        "jobs.toml:34: --threads is 0; give 1 to 1024",
+        "jobs.toml:36: unknown key `thing`",
         "nothing was run",
     ] {
         let lines = said.lines().filter(|line| line.contains(wanted)).count();

@@ -159,7 +159,7 @@ fn a_damaged_shard_is_told_and_all_of_its_field_is_written_again() {
 /// Each command with a stage that looks for something or solves it, before the surface moves or anything is written.
 const SOLVING: [(&str, &str); 5] = [
     ("reconstruct a.xyz --tol 1e-30 --max-steps 3", "enclosure"),
-    ("reconstruct a.xyz --beta 0.2 --tol 1e-30 --max-steps 3", "enclosure"),
+    ("reconstruct a.xyz --beta 0.2 --tol 1e-30 --max-steps 20", "enclosure"),
     ("segment image.tif --points marks.csv --start flood --tol 1e-30 --max-steps 3", "enclosure 1"),
     ("distance a.xyz b.xyz --spacing 0.03 --padding 1 --labels --brick 16 --method fsm --schedule sweep", "distance"),
     ("distance a.xyz b.xyz --spacing 0.03 --padding 1 --labels --brick 16 --method vdt --schedule sweep", "distance"),
