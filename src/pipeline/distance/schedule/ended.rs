@@ -9,13 +9,13 @@ use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, NO_SOURCE, PointBins};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::pipeline::distance::{Method, Options, Schedule, Sources, solve};
 
-const SHAPE: [i64; 3] = [90, 70, 85];
+const SHAPE: [i64; 3] = [60, 50, 55];
 
 /// Values and sources of all voxels, as bits.
 fn solved(engine: &Engine, method: Method, schedule: Schedule, options: Options) -> Result<(Vec<u32>, Vec<u32>)> {
     let geometry = Geometry::new(SHAPE, [1.0, 1.1, 0.9], [0.0; 3]);
     let cloud: Vec<[f64; 3]> = (0..40)
-        .map(|n: i32| [f64::from(n * 37 % 90), f64::from(n * 53 % 70), f64::from(n * 29 % 70)].map(|v| 0.3 + 0.9 * v))
+        .map(|n: i32| [f64::from(n * 37 % 60), f64::from(n * 53 % 50), f64::from(n * 29 % 50)].map(|v| 0.3 + 0.9 * v))
         .collect();
     let set = Arc::new(BrickSet::dense(BrickGrid::new(SHAPE, 16)));
     let bins = PointBins::new(*set.grid(), &geometry, &cloud);
