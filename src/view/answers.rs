@@ -3,6 +3,7 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{Read, Seek, SeekFrom};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
@@ -49,8 +50,9 @@ struct Now {
     is_gone: bool,
     /// Whether it was taken away while it was written.
     is_cut_short: bool,
-    /// The stores that were there.
+    /// The stores that were there, and what lay beside them.
     present: Vec<Present>,
+    listed: Vec<PathBuf>,
     looked: Mutex<Instant>,
 }
 
@@ -60,8 +62,8 @@ const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
 impl Now {
     fn new(shown: Shown) -> Self {
         let (state, present) = (state::state(&shown).to_string(), shown.present());
-        let is_live = shown.is_live();
-        Self { shown, state, is_live, is_gone: false, is_cut_short: false, present, looked: Mutex::new(Instant::now()) }
+        let (is_live, listed, looked) = (shown.is_live(), shown.listed(), Mutex::new(Instant::now()));
+        Self { shown, state, is_live, is_gone: false, is_cut_short: false, present, listed, looked }
     }
 
     /// What there is a moment later. What cannot be looked at any more stays as it was seen, and nobody writes it.
@@ -72,8 +74,9 @@ impl Now {
                 // What an interrupted run has left before there was anything to show is there.
                 let is_gone = shown.live().next().is_none();
                 let is_cut_short = is_gone && (self.is_live || self.is_cut_short);
-                let (is_live, present, looked) = (shown.is_live(), self.present.clone(), Mutex::new(Instant::now()));
-                Self { shown, state, is_live, is_gone, is_cut_short, present, looked }
+                let (is_live, looked) = (shown.is_live(), Mutex::new(Instant::now()));
+                let (present, listed) = (self.present.clone(), self.listed.clone());
+                Self { shown, state, is_live, is_gone, is_cut_short, present, listed, looked }
             },
             Self::new,
         )
@@ -98,7 +101,8 @@ impl Site {
     /// What is shown, looked at lately. Reads folders.
     fn looked_at(&self) -> Arc<Now> {
         let now = self.now();
-        if now.is_due() && (now.is_live || now.is_gone || now.shown.present() != now.present) {
+        let is_other = || now.shown.present() != now.present || now.shown.listed() != now.listed;
+        if now.is_due() && (now.is_live || now.is_gone || is_other()) {
             *self.now.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(now.next());
         }
         self.now()

@@ -3,7 +3,7 @@
 use std::fs::Metadata;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
-use std::time::UNIX_EPOCH;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A store or mesh that is there.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -12,8 +12,8 @@ pub(super) struct Present {
     pub(super) name: String,
     /// Another where another one lies in its place.
     pub(super) number: u64,
-    /// Whether it says what it holds; a store may lose that before the rest.
-    is_described: bool,
+    /// When what says what it holds was written; a store may lose that before the rest.
+    described: [Option<SystemTime>; 2],
 }
 
 /// The store or file of that name, where it is there.
@@ -24,8 +24,8 @@ pub(super) fn present(name: &str, path: &Path) -> Option<Present> {
     if found.is_file() {
         (found.len(), found.modified().ok()).hash(&mut hasher);
     }
-    let is_described = ["zarr.json", ".zattrs"].iter().any(|document| path.join(document).is_file());
-    Some(Present { name: name.to_owned(), number: hasher.finish(), is_described })
+    let described = ["zarr.json", ".zattrs"].map(|document| path.join(document).metadata().ok()?.modified().ok());
+    Some(Present { name: name.to_owned(), number: hasher.finish(), described })
 }
 
 /// What tells a folder or file from another of its name: numbers are given again, so the time at which it was made counts too.

@@ -149,6 +149,11 @@ impl Shown {
         Ok(shown)
     }
 
+    /// What was given, as it was.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Looks again.
     pub(super) fn again(&self) -> Result<Self> {
         Self::of(&self.path)
@@ -165,6 +170,13 @@ impl Shown {
             return present(&self.name, &self.path).into_iter().collect();
         }
         self.roots.iter().filter_map(|(name, folder)| present(name, folder.root())).collect()
+    }
+
+    /// What may be stores or meshes in the folder that was given; nothing where a single one was.
+    pub(super) fn listed(&self) -> Vec<PathBuf> {
+        let Some(beside) = &self.beside else { return Vec::new() };
+        let meshes = files(beside.root()).into_iter().filter(|file| is_mesh(file));
+        folders(beside.root()).into_iter().chain(meshes).collect()
     }
 
     /// What those stores say that are or were live.

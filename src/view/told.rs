@@ -1,7 +1,5 @@
 //! What the page's line says beside the state of a run: whose page it is, where the reports are, and what cannot be shown.
 
-use std::path::Path;
-
 use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 
@@ -56,7 +54,10 @@ fn of_series(shown: &Shown, series: &Series) -> String {
         }
     };
     let root = shown.roots.iter().find(|(name, _)| *name == series.root);
-    let folder = root.map_or(series.root.clone(), |(_, folder)| file_name(folder.root()));
-    let of_time = quoted(Path::new(&format!("{folder}/meshes/t{first:04}")));
+    // As it was typed, or in the folder that was.
+    let store = root
+        .filter(|_| shown.beside.is_some())
+        .map_or_else(|| shown.path().to_path_buf(), |(_, folder)| shown.path().join(file_name(folder.root())));
+    let of_time = quoted(&store.join(format!("meshes/t{first:04}")));
     format!("{of}{without}surfaces of single times are not drawn here, strandline view {of_time} draws them")
 }

@@ -129,7 +129,7 @@ fn made_from(settings: &Value) -> String {
 /// A few lines out of a report.
 fn summary(report: &Value) -> Lines {
     let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned);
-    let unit = report["grid"]["unit"].as_str().unwrap_or("").to_owned();
+    let unit = report["grid"]["unit"].as_str().filter(|unit| !unit.is_empty()).unwrap_or("units of length").to_owned();
     let mut lines = vec![
         line("made by", format!("strandline {} {}", text(&report["version"]), text(&report["command"]))),
         line("from", made_from(&report["settings"])),
