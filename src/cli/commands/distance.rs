@@ -8,6 +8,7 @@ use half::f16;
 
 use crate::cli::args::distance::MiddleChoice;
 use crate::cli::args::distance::{DistanceJobArgs, InitArg, PrecisionArg, ScheduleArg};
+use crate::cli::inputs::agreed::check_agreed;
 use crate::cli::inputs::grid;
 use crate::cli::inputs::settings;
 use crate::cli::inputs::sources::{Read, read_sets};
@@ -31,6 +32,7 @@ use crate::cli::terminal::world;
 use crate::error::{Error, Result};
 use crate::exec::{Budget, Cancel, Comm, Engine, Plan, Progress, as_threads};
 use crate::grid::{DataSets, Geometry};
+use crate::io::geometry::read::sources::is_standard_input;
 use crate::io::geometry::write::formats::Values;
 use crate::io::ome_zarr::StoreWriter;
 use crate::job::disk::Disk;
@@ -77,7 +79,11 @@ fn begin(mut args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[Strin
         return Ok(());
     }
     settings::check_ranks(args.job.ranks)?;
+    let reads_input = args.sources.iter().any(|source| is_standard_input(source));
     let comm = world::ranks()?;
+    if reads_input && comm.ranks().max(args.job.ranks) > 1 {
+        return Err(Error::usage("several ranks cannot read standard input; give files that all of them can read"));
+    }
     if args.job.ranks == 1 || comm.ranks() > 1 {
         return Job::new(args, middle, typed, comm)?.run_precise();
     }
@@ -138,6 +144,7 @@ impl Job {
 
     fn run<P: Precision>(&self) -> Result<()> {
         self.settings.check_on::<P>(&self.geometry, &self.sets)?;
+        check_agreed(self.comm.as_ref(), &self.asked::<P>(), &self.sets)?;
         let threads = self.resources.threads;
         let needs = self.needs::<P>(threads);
         let plan = self.plan(&needs);
@@ -230,6 +237,13 @@ impl Job {
     fn middle_settings(&self) -> Option<MiddleSettings> {
         let MiddleChoice { surface, labels, .. } = *self.middle.as_ref()?;
         Some(MiddleSettings { distance: self.settings, surface, labels })
+    }
+
+    /// What all ranks have to be asked for alike.
+    fn asked<P: Precision>(&self) -> String {
+        let output = &self.args.job.output;
+        let written = (output.store(), output.live, output.dry_run, output.ome, output.compress);
+        format!("{:?} {:?} {:?} {:?} {}", self.geometry, self.settings, self.middle_settings(), written, P::TYPE.name())
     }
 
     /// What this rank takes.

@@ -1,5 +1,6 @@
 //! What was typed becomes what is read: images, marks, sources, grids, settings.
 
+pub(crate) mod agreed;
 pub(crate) mod content;
 pub(crate) mod grid;
 pub(crate) mod identity;

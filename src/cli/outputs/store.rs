@@ -29,6 +29,10 @@ pub(crate) fn begin_store_on_ranks(
     if is_first {
         return Ok((store, telling));
     }
+    if let Some(shared) = shared.as_ref().filter(|shared| !shared.is_there()) {
+        let what = "the store that rank 0 has begun is not to be seen here; all machines need the folder of the output under the same path";
+        return Err(Error::failed(what).at(shared.path()));
+    }
     Ok((shared.map(|shared| StoreWriter::shared(&shared).packed(output.compress.into())), None))
 }
 

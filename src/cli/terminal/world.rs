@@ -51,8 +51,17 @@ static WORLD: std::sync::OnceLock<Arc<MpiComm>> = std::sync::OnceLock::new();
 #[cfg_attr(not(feature = "mpi"), expect(clippy::unnecessary_wraps, reason = "MPI may fail"))]
 pub(crate) fn ranks() -> Result<Arc<dyn Comm>> {
     #[cfg(feature = "mpi")]
-    if launched().is_some() {
+    if let Some(launched) = launched() {
         let world = Arc::new(MpiComm::begin()?);
+        if world.ranks() != launched.processes {
+            return Err(Error::failed(format!(
+                "{} processes were started together ({}), but MPI knows of {}: the program was built for another MPI than the one \
+                 that has started it",
+                launched.processes,
+                launched.variable,
+                world.ranks()
+            )));
+        }
         return Ok(Arc::new(Counted::new(WORLD.get_or_init(|| world).clone())));
     }
     Ok(Arc::new(SelfComm))

@@ -40,6 +40,20 @@ pub struct SharedStore {
     is_live: bool,
 }
 
+impl SharedStore {
+    /// Where it will lie.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether this process sees what the other one has begun.
+    #[must_use]
+    pub fn is_there(&self) -> bool {
+        self.version.is_group(&self.folder)
+    }
+}
+
 /// A multiscale image in the making: its levels, finest first.
 #[derive(Debug)]
 pub struct ImageWriter {
