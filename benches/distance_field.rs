@@ -71,19 +71,7 @@ fn run(n: i64, points: Option<u64>, method: Method, edge: i64, threads: usize) {
             let started = Instant::now();
             let stage = engine.stage("distance", 0);
             let options = Options { sources, ..Options::up_to(f64::INFINITY) };
-            let solved = (solver.solve)(
-                &Solving {
-                    stage: &stage,
-                    engine: &engine,
-                    sources: &given,
-                    set: &set,
-                    options,
-                    early: None,
-                    borrows: &[],
-                },
-                schedule,
-            )
-            .expect("room");
+            let solved = (solver.solve)(&Solving::new(&stage, &engine, &given, &set, options), schedule).expect("room");
             let report = stage.finish();
             let solve = started.elapsed().as_secs_f64();
             let largest = (0..set.grid().len()).map(|id| {

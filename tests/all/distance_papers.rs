@@ -46,19 +46,8 @@ fn cube_error<P: Stored>(lab: &Lab, count: i64, method: Method, schedule: Schedu
     let sources = Sources { cubes: &cubes, ..Sources::cloud(&geometry, &cloud, &bins) };
     let stage = lab.engine.stage("distance", 0);
     let row = method.solver::<P>();
-    let solved = (row.solve)(
-        &Solving {
-            stage: &stage,
-            engine: &lab.engine,
-            sources: &sources,
-            set: &set,
-            options: everywhere(false),
-            early: None,
-            borrows: &[],
-        },
-        schedule,
-    )
-    .expect("room for a field");
+    let solved = (row.solve)(&Solving::new(&stage, &lab.engine, &sources, &set, everywhere(false)), schedule)
+        .expect("room for a field");
     assert_eq!(solved.fixed_voxels, cloud.len() as u64);
     let part = Box3::from_shape(geometry.shape);
     let mut values = vec![P::default(); part.len()];

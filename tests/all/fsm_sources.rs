@@ -42,19 +42,8 @@ fn fsm<P: Stored>(
     };
     let stage = lab.engine.stage("distance", 0);
     let solve = Method::FSM.solver::<P>().solve;
-    let solved = solve(
-        &Solving {
-            stage: &stage,
-            engine: &lab.engine,
-            sources: &sources,
-            set: &set,
-            options,
-            early: None,
-            borrows: &[],
-        },
-        schedule,
-    )
-    .expect("room for a distance");
+    let solved =
+        solve(&Solving::new(&stage, &lab.engine, &sources, &set, options), schedule).expect("room for a distance");
     let bricks = stage.finish().bricks;
     let part = Box3::from_shape(geometry.shape);
     let (mut values, mut nearest) = (vec![P::default(); part.len()], vec![0; part.len()]);

@@ -143,6 +143,7 @@ fn live_runs_leave_the_bits_of_others() {
 
 /// Two objects, apart and so near that what one is depends on the other, with small shards of labels between them.
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn live_segmentations_leave_the_bits_of_others() {
     for (case, between, flags) in [("apart", 24.0, ""), ("near", 11.5, ""), ("shared", 12.5, "--fill-gaps 2")] {
         let first = Ball::large();

@@ -41,7 +41,7 @@ impl Place<'_> {
 }
 
 /// A cloud on a grid, cut into bricks.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 struct Case {
     geometry: Geometry,
     cloud: Vec<[f64; 3]>,
@@ -157,6 +157,7 @@ fn any_number_of_ranks_gives_the_bits_of_one() {
 }
 
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn the_sponge_is_the_same_on_any_number_of_ranks() {
     let cloud = sponge();
     Case {
@@ -273,36 +274,42 @@ fn one_rank_that_fails_ends_those_that_solve() {
         let plan = strandline::exec::HaloPlan::new(grid, strandline::exec::Reach::Faces);
         let ownership = strandline::exec::Ownership::balanced(&BrickSet::dense(grid), 3);
         let own = Arc::new(ownership.part(&BrickSet::dense(grid), engine.comm().rank(), &plan));
-        (solver.solve)(
-            &Solving {
-                stage,
-                engine,
-                sources: &sources,
-                set: &own,
-                options: case.options(),
-                early: None,
-                borrows: &[],
-            },
-            Schedule::Front,
-        )
-        .map(|solved| solved.fixed_voxels)
+        (solver.solve)(&Solving::new(stage, engine, &sources, &own, case.options()), Schedule::Front)
+            .map(|solved| solved.fixed_voxels)
     });
     assert_eq!(failed.expect_err("rank 1 failed").to_string(), "the disk of rank 1 is full");
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(25))]
-
-    #[test]
-    fn random_clouds_are_the_same_on_any_number_of_ranks(
+prop_compose! {
+    /// A random cloud on a random grid, and a number of ranks.
+    fn random_case()(
         shape in prop::array::uniform3(1_i64..45),
         spacing in prop::sample::select(vec![[1.0; 3], [0.25, 0.5, 1.0], [0.31, 0.7, 0.113]]),
         edge in prop::sample::select(vec![8, 16, 32]),
         count in 1_usize..20,
         ranks in 2_usize..6,
         seed: u64,
-    ) {
-        case(shape, spacing, edge, count, seed).check::<f32>(&[ranks]);
+    ) -> (Case, usize) {
+        (case(shape, spacing, edge, count, seed), ranks)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    #[test]
+    fn a_few_random_clouds_are_the_same_on_any_number_of_ranks((case, ranks) in random_case()) {
+        case.check::<f32>(&[ranks]);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(25))]
+
+    #[test]
+    #[ignore = "long; .ci/run has it"]
+    fn random_clouds_are_the_same_on_any_number_of_ranks((case, ranks) in random_case()) {
+        case.check::<f32>(&[ranks]);
     }
 }
 

@@ -46,6 +46,7 @@ fn places(cloud: &[[f64; 3]]) -> Vec<[f64; 3]> {
 /// Volume and mean distance of the points at h = 0.05, as the papers' algorithms were run apart from this program: with
 /// FSM, each place of the cloud once. Within 1 % and half of the last digit that is given.
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn the_sponge_measures_what_the_papers_scheme_gives() {
     let (cloud, h) = (places(&sponge()), 0.05);
     assert_eq!(cloud.len(), 182);
@@ -158,6 +159,7 @@ fn turned(profile: impl Fn(f64) -> f64, heights: [f64; 2], step: f64) -> Vec<[f6
 /// A ball on a foot that widens towards its open end, as scans of busts have it: narrowest is the neck, and still most
 /// of the foot is inside; a ball closes it that touches the rim.
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn an_open_foot_is_closed_near_its_rim() {
     let foot = |z: f64| 0.35 + 0.45 * (z / 1.4).powi(2);
     let neck = -(1.0_f64 - 0.35 * 0.35).sqrt();
@@ -174,6 +176,7 @@ fn an_open_foot_is_closed_near_its_rim() {
 
 /// A fin without thickness on a ball: its points stay on the surface, in one piece with the ball.
 #[test]
+#[ignore = "long; .ci/run has it"]
 fn a_sheet_stays_as_a_shell() {
     let ball = sphere([0.0; 3], 1.0, 6000, |_| true);
     let fin = (0..1600).map(|n| [0.96 + 0.045 * f64::from(n % 40), 0.045 * (f64::from(n / 40) - 20.0), 0.01]);

@@ -139,19 +139,8 @@ fn ours<P: Precision>(
     let stage = lab.engine.stage("distance", 0);
     let options = Options { farthest: f64::INFINITY, neighbours, sources: true, labels: false };
     let solve = method.solver::<P>().solve;
-    let solved = solve(
-        &Solving {
-            stage: &stage,
-            engine: &lab.engine,
-            sources: &sources,
-            set: &set,
-            options,
-            early: None,
-            borrows: &[],
-        },
-        schedule,
-    )
-    .expect("room for a distance");
+    let solved =
+        solve(&Solving::new(&stage, &lab.engine, &sources, &set, options), schedule).expect("room for a distance");
     let part = Box3::from_shape(geometry.shape);
     let (mut values, mut nearest) = (vec![P::default(); part.len()], vec![0; part.len()]);
     solved.values.read_box(&part, &mut values).expect("memory can be read");
@@ -346,19 +335,8 @@ fn a_box_of_triangles_has_its_distance() {
         let stage = lab.engine.stage("distance", 0);
         let options = Options { farthest: f64::INFINITY, neighbours, sources: true, labels: false };
         let solve = Method::DP.solver::<f32>().solve;
-        let solved = solve(
-            &Solving {
-                stage: &stage,
-                engine: &lab.engine,
-                sources: &sources,
-                set: &set,
-                options,
-                early: None,
-                borrows: &[],
-            },
-            schedule,
-        )
-        .expect("room for a distance");
+        let solved =
+            solve(&Solving::new(&stage, &lab.engine, &sources, &set, options), schedule).expect("room for a distance");
         let part = Box3::from_shape(geometry.shape);
         let mut values = vec![0.0_f32; part.len()];
         solved.values.read_box(&part, &mut values).expect("memory can be read");

@@ -121,7 +121,19 @@ fn nothing() -> Result<()> {
     Ok(())
 }
 
-impl<'a, P: Precision> Solving<'_, 'a, P> {
+impl<'j, 'a, P: Precision> Solving<'j, 'a, P> {
+    /// What a rank is given that reads nothing of others, and that nobody watches.
+    #[must_use]
+    pub fn new(
+        stage: &'j Stage<'j>,
+        engine: &'j Engine,
+        sources: &'j Sources<'a>,
+        set: &'j Arc<BrickSet>,
+        options: Options,
+    ) -> Self {
+        Self { stage, engine, sources, set, options, early: None, borrows: &[] }
+    }
+
     /// A method's start: its state with the voxels that sources fix.
     fn start<M: DistanceState>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
