@@ -9,10 +9,11 @@
 
 use std::sync::Arc;
 
+use super::comm::messages::{Message, damaged};
 use super::engine::Stage;
 use super::ownership::Ownership;
 use crate::error::{Error, Result};
-use crate::grid::{Box3, BrickId, BrickSet, Slot};
+use crate::grid::{Box3, BrickGrid, BrickId, BrickSet, Slot};
 use crate::store::{BoxSource, BrickArray, Element};
 
 /// Bytes of the bricks that a rank asks for at a time, at most, but for one brick of each other rank.
@@ -37,7 +38,7 @@ pub fn borrow_bricks<T: Element>(
     let ownership = Ownership::agreed(comm, array.set())?;
     let set = Arc::new(BrickSet::from_ids(grid, wanted.to_vec()));
     let borrowed = BrickArray::blank(stage.scratch(), &set, blank)?;
-    let others: Vec<usize> = (0..comm.ranks()).filter(|&rank| rank != comm.rank()).collect();
+    let others = comm.others();
     // All others may ask one rank.
     let at_a_time = (ROUND_BYTES / others.len().max(1) / (grid.brick_len() * size_of::<T>())).max(1);
     let mut rounds = wanted.chunks(at_a_time);
@@ -70,16 +71,15 @@ fn answer<T: Element>(array: &BrickArray<T>, ids: &[u8]) -> Result<Vec<u8>> {
     Ok(message)
 }
 
-fn take<T: Element>(borrowed: &BrickArray<T>, mut bricks: &[u8]) -> Result<()> {
+fn take<T: Element>(borrowed: &BrickArray<T>, bricks: &[u8]) -> Result<()> {
     let len = borrowed.set().grid().brick_len() * size_of::<T>();
-    while let Some((id, rest)) = bricks.split_first_chunk() {
-        let slot = own(borrowed.set(), BrickId::from_le_bytes(*id)).ok_or_else(damaged)?;
-        let (written, rest) = rest.split_first().ok_or_else(damaged)?;
-        let (values, rest) = rest.split_at_checked(if *written == 1 { len } else { 0 }).ok_or_else(damaged)?;
-        if !values.is_empty() {
+    let mut bricks = Message(bricks);
+    while !bricks.is_empty() {
+        let slot = own(borrowed.set(), BrickId::from_le_bytes(bricks.word()?)).ok_or_else(damaged)?;
+        if bricks.word()? == [1] {
+            let values = bricks.take(len)?;
             borrowed.write(slot, |brick| T::fill_from_bytes(brick, values));
         }
-        bricks = rest;
     }
     Ok(())
 }
@@ -87,10 +87,6 @@ fn take<T: Element>(borrowed: &BrickArray<T>, mut bricks: &[u8]) -> Result<()> {
 fn own(set: &BrickSet, id: BrickId) -> Option<Slot> {
     let known = Some(id).filter(|&id| id < set.grid().len()).and_then(|id| set.slot(id));
     known.filter(|slot| set.owned().contains(slot))
-}
-
-fn damaged() -> Error {
-    Error::failed("a message between ranks is damaged; all ranks must run the same version of the program")
 }
 
 /// Reads a box, dense `[z][y][x]`, of a field of which a rank has its own bricks and copies of others.
@@ -107,13 +103,28 @@ pub fn read_with_borrowed<T: Element>(
     let Some(borrowed) = borrowed.filter(|_| !grid.bricks_in(part).all(|id| own(array.set(), id).is_some())) else {
         return array.read_box(part, out);
     };
+    read_by_bricks(&grid, part, out, |id, shared, values| {
+        let from = [array, borrowed].into_iter().find(|array| own(array.set(), id).is_some());
+        from.ok_or_else(|| Error::failed("a brick of another rank was not asked for"))?.read_box(shared, values)
+    })
+}
+
+/// Reads a box, dense `[z][y][x]`, of which each brick's part is read in its own way: `read` gets the brick, that part, and room
+/// for its values.
+///
+/// # Errors
+/// Of `read`.
+pub fn read_by_bricks<T: Element>(
+    grid: &BrickGrid,
+    part: &Box3,
+    out: &mut [T],
+    mut read: impl FnMut(BrickId, &Box3, &mut [T]) -> Result<()>,
+) -> Result<()> {
     let mut values = Vec::new();
     for id in grid.bricks_in(part) {
         let shared = grid.brick_box(id).intersect(part);
         values.resize(shared.len(), T::default());
-        let from = [array, borrowed].into_iter().find(|array| own(array.set(), id).is_some());
-        from.ok_or_else(|| Error::failed("a brick of another rank was not asked for"))?
-            .read_box(&shared, &mut values)?;
+        read(id, &shared, &mut values)?;
         let width = shared.shape()[0] as usize;
         for ((y, z), row) in shared.rows().zip(values.chunks_exact(width)) {
             out[part.offset_of([shared.lo[0], y, z])..][..width].copy_from_slice(row);
@@ -126,7 +137,6 @@ pub fn read_with_borrowed<T: Element>(
 mod tests {
     use super::*;
     use crate::exec::{Budget, Cancel, Comm, Engine, HaloPlan, Reach, Silent, ThreadComm};
-    use crate::grid::BrickGrid;
     use crate::store::Scratch;
 
     /// The value of every voxel of a field.

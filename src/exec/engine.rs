@@ -13,7 +13,7 @@ use super::memory::budget::{Budget, machine_memory, peak_resident};
 use super::memory::footprint::{Account, Footprint, Hold};
 use super::progress::heard::{OfRank, Progress};
 use super::progress::outlook::{Outlook, Running};
-use super::progress::report::StageReport;
+use super::progress::report::{Reports, StageReport};
 use super::save_points::{SavePoint, SavePoints};
 use super::workers::Workers;
 use crate::error::{Error, ErrorKind, Result};
@@ -32,7 +32,7 @@ pub struct Engine {
     account: Arc<Account>,
     outlook: Arc<Outlook>,
     saving: Option<Arc<SavePoints>>,
-    reports: Mutex<Vec<StageReport>>,
+    reports: Reports,
 }
 
 impl Engine {
@@ -51,7 +51,7 @@ impl Engine {
         let pool = Arc::new(pool(threads)?);
         let comm = Arc::new(SelfComm);
         let account = Account::new(budget, scratch.clone());
-        let (outlook, reports) = (Arc::default(), Mutex::default());
+        let (outlook, reports) = (Arc::default(), Reports::default());
         progress.look_out(&outlook);
         Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, outlook, saving: None, reports })
     }
@@ -103,7 +103,7 @@ impl Engine {
             account: self.account.clone(),
             outlook: self.outlook.clone(),
             saving: None,
-            reports: Mutex::default(),
+            reports: Reports::default(),
         })
     }
 
@@ -121,7 +121,7 @@ impl Engine {
             account: self.account.clone(),
             outlook: self.outlook.clone(),
             saving: self.saving.clone(),
-            reports: Mutex::default(),
+            reports: Reports::default(),
         }
     }
 
@@ -132,20 +132,12 @@ impl Engine {
 
     /// Takes over the reports of stages that were done on an engine beside this one.
     pub(super) fn take_reports(&self, reports: Vec<StageReport>) {
-        self.reports.lock().unwrap_or_else(PoisonError::into_inner).extend(reports);
+        self.reports.add(reports);
     }
 
     /// Counts what another rank did in the stages that are finished here, which are those of all ranks.
     pub fn count_rank(&self, done: &[StageReport]) {
-        let mut reports = self.reports.lock().unwrap_or_else(PoisonError::into_inner);
-        for (own, other) in reports.iter_mut().zip(done) {
-            own.bricks += other.bricks;
-            own.brick_loads += other.brick_loads;
-            own.bytes_read += other.bytes_read;
-            own.bytes_written += other.bytes_written;
-            own.seconds = own.seconds.max(other.seconds);
-            own.peak_rss_bytes = own.peak_rss_bytes.max(other.peak_rss_bytes);
-        }
+        self.reports.count_rank(done);
     }
 
     /// Number of threads.
@@ -253,7 +245,7 @@ impl Engine {
     /// What the finished stages cost, in the order they ended.
     #[must_use]
     pub fn reports(&self) -> Vec<StageReport> {
-        self.reports.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.reports.copied()
     }
 }
 
@@ -430,7 +422,7 @@ impl<'a> Stage<'a> {
         report.peak_rss_bytes = peak_resident();
         self.engine.progress.end();
         self.planned.iter().for_each(|planned| self.engine.outlook.end(planned));
-        self.engine.reports.lock().unwrap_or_else(PoisonError::into_inner).push(report.clone());
+        self.engine.reports.add([report.clone()]);
         report
     }
 }

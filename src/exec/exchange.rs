@@ -10,10 +10,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::comm::messages::Comm;
+use super::comm::messages::{Comm, Message, damaged};
 use super::halo::HaloPlan;
 use super::ownership::Ownership;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::grid::{BrickId, BrickSet, FACES, Slot};
 use crate::store::{BrickArray, Element};
 
@@ -102,7 +102,7 @@ impl<'a> Exchange<'a> {
         let mut received = Vec::new();
         for message in self.comm.collect(&self.peers)? {
             let mut message = Message(&message);
-            while !message.0.is_empty() {
+            while !message.is_empty() {
                 let ghost = self.slot(BrickId::from_le_bytes(message.word()?))?;
                 let mut note = N::default();
                 for number in note.as_mut() {
@@ -135,25 +135,6 @@ impl<'a> Exchange<'a> {
         let known = Some(id).filter(|&id| id < self.set.grid().len()).and_then(|id| self.set.slot(id));
         known.ok_or_else(damaged)
     }
-}
-
-/// What is left of a message.
-struct Message<'m>(&'m [u8]);
-
-impl<'m> Message<'m> {
-    fn take(&mut self, len: usize) -> Result<&'m [u8]> {
-        let (taken, rest) = self.0.split_at_checked(len).ok_or_else(damaged)?;
-        self.0 = rest;
-        Ok(taken)
-    }
-
-    fn word<const N: usize>(&mut self) -> Result<[u8; N]> {
-        self.take(N)?.try_into().map_err(|_| damaged())
-    }
-}
-
-fn damaged() -> Error {
-    Error::failed("a message between ranks is damaged; all ranks must run the same version of the program")
 }
 
 #[cfg(test)]

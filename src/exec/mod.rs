@@ -20,12 +20,13 @@ mod schedule;
 mod side_by_side;
 mod workers;
 
-pub use borrow::{ROUND_BYTES, borrow_bricks, read_with_borrowed};
+pub use borrow::{ROUND_BYTES, borrow_bricks, read_by_bricks, read_with_borrowed};
 pub use cancel::Cancel;
 pub use comm::launch::{Launched, launched};
-pub use comm::messages::{Comm, RankTraffic, SelfComm};
+pub use comm::messages::{Comm, Message, RankTraffic, SelfComm};
 #[cfg(feature = "mpi")]
 pub use comm::mpi::MpiComm;
+pub use comm::records::{gather_records, pack_message, unpack_message};
 pub use comm::threads::ThreadComm;
 pub use comm::traffic::Counted;
 pub use engine::{Engine, Stage};

@@ -248,12 +248,11 @@ impl Job {
 
     /// What this rank takes.
     fn needs<P: Precision>(&self, threads: usize) -> Needs {
-        let writes = self.args.job.output.store().is_some();
-        let needs = match self.middle_settings() {
-            Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, 1, writes),
-            None => self.settings.needs::<P>(&self.geometry, &self.sets, [threads, 1], self.writes()),
-        };
-        needs.of_rank(self.comm.ranks() as u64, threads as u64)
+        let (writes, ranks) = (self.args.job.output.store().is_some(), self.comm.ranks());
+        match self.middle_settings() {
+            Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes),
+            None => self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], self.writes()),
+        }
     }
 
     /// The stages of the run, and what each will probably take.
@@ -395,7 +394,6 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
         brick: args.job.resources.brick.unwrap_or(field.method.solver::<f32>().brick),
     };
     settings.check()?;
-    settings::check_ranks(args.job.ranks)?;
     check_iterations(field.iterations)?;
     Ok(settings)
 }

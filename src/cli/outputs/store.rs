@@ -1,14 +1,10 @@
 //! The store that a run writes, as its flags ask for it.
 
 use crate::cli::args::common::OutputArgs;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-
 use crate::error::{Error, Result};
-use crate::exec::Engine;
+use crate::exec::{Engine, gather_records};
 use crate::io::ome_zarr::{SharedStore, StoreWriter};
 use crate::job::live::Telling;
-use crate::store::checkpoint::{pack, unpack};
 
 /// Begins the store on the first rank; the others add to it.
 ///
@@ -24,8 +20,8 @@ pub(crate) fn begin_store_on_ranks(
     if comm.ranks() == 1 {
         return Ok((store, telling));
     }
-    let told = if is_first { packed(&store.as_ref().map(StoreWriter::share))? } else { Vec::new() };
-    let shared: Option<SharedStore> = unpacked(comm.gather(told)?.first())?;
+    let told = gather_records(comm, &store.as_ref().map(StoreWriter::share))?;
+    let shared: Option<SharedStore> = told.into_iter().next().flatten();
     if is_first {
         return Ok((store, telling));
     }
@@ -54,21 +50,12 @@ pub(crate) fn join_store(store: Option<StoreWriter>, engine: &Engine) -> Result<
     {
         store.finish()?;
     }
-    for told in comm.gather(packed(&sums)?)? {
+    for sums in gather_records(comm, &sums)? {
         if let Some(store) = &first {
-            store.take_sums(unpacked(Some(&told))?);
+            store.take_sums(sums);
         }
     }
     Ok(first)
-}
-
-fn packed<R: Serialize>(record: &R) -> Result<Vec<u8>> {
-    pack(record).map_err(|error| Error::failed(format!("the store cannot be told to other ranks: {error}")))
-}
-
-fn unpacked<R: DeserializeOwned>(bytes: Option<&Vec<u8>>) -> Result<R> {
-    let read = unpack(bytes.map_or(&[], Vec::as_slice));
-    read.map_err(|error| Error::failed(format!("what another rank tells of the store cannot be read: {error}")))
 }
 
 /// Begins the store, where there is to be one; one that is live says how far the run is, until what comes with it goes.

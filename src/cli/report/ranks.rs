@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
-use crate::exec::{Engine, StageReport, peak_resident};
-use crate::store::checkpoint::{pack, unpack};
+use crate::error::Result;
+use crate::exec::{Engine, StageReport, gather_records, peak_resident};
 
 /// What one rank did.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -53,11 +52,10 @@ pub(crate) fn gather_ranks(engine: &Engine) -> Result<Vec<RankReport>> {
     if comm.ranks() == 1 {
         return Ok(Vec::new());
     }
-    let fault = |error: std::io::Error| Error::failed(format!("what a rank did cannot be told: {error}"));
-    let told = comm.gather(pack(&(RankReport::of(engine), engine.reports())).map_err(fault)?)?;
     let mut ranks = Vec::new();
-    for (rank, bytes) in told.iter().enumerate() {
-        let (report, stages): (RankReport, Vec<StageReport>) = unpack(bytes).map_err(fault)?;
+    for (rank, (report, stages)) in
+        gather_records(comm, &(RankReport::of(engine), engine.reports()))?.into_iter().enumerate()
+    {
         if rank != comm.rank() {
             engine.count_rank(&stages);
         }

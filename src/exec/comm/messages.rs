@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// The ranks of a run.
 ///
@@ -47,12 +47,17 @@ pub trait Comm: Send + Sync {
         RankTraffic::default()
     }
 
+    /// The numbers of all other ranks.
+    fn others(&self) -> Vec<usize> {
+        (0..self.ranks()).filter(|&rank| rank != self.rank()).collect()
+    }
+
     /// What all ranks give, in order of their numbers.
     ///
     /// # Errors
     /// When another rank is gone.
     fn gather(&self, own: Vec<u8>) -> Result<Vec<Vec<u8>>> {
-        let others: Vec<usize> = (0..self.ranks()).filter(|&rank| rank != self.rank()).collect();
+        let others = self.others();
         let mut all = self.exchange(&others, vec![own.clone(); others.len()])?;
         all.insert(self.rank(), own);
         Ok(all)
@@ -106,6 +111,41 @@ impl<C: Comm + ?Sized> Comm for Arc<C> {
     fn traffic(&self) -> RankTraffic {
         self.as_ref().traffic()
     }
+}
+
+/// What is left of a message that is read.
+pub struct Message<'m>(pub &'m [u8]);
+
+impl<'m> Message<'m> {
+    /// Whether all of it was read.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The next bytes.
+    ///
+    /// # Errors
+    /// When there are fewer.
+    pub fn take(&mut self, len: usize) -> Result<&'m [u8]> {
+        let (taken, rest) = self.0.split_at_checked(len).ok_or_else(damaged)?;
+        self.0 = rest;
+        Ok(taken)
+    }
+
+    /// The next bytes, of a number or several.
+    ///
+    /// # Errors
+    /// When there are fewer.
+    pub fn word<const N: usize>(&mut self) -> Result<[u8; N]> {
+        self.take(N)?.try_into().map_err(|_| damaged())
+    }
+}
+
+/// That a message is not what a rank of this version sends.
+#[must_use]
+pub(in crate::exec) fn damaged() -> Error {
+    Error::failed("a message between ranks is damaged; all ranks must run the same version of the program")
 }
 
 fn numbers(bytes: &[u8]) -> impl Iterator<Item = f64> {

@@ -1,5 +1,7 @@
 //! `StageReport`: the record of what a stage cost.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use serde::{Deserialize, Serialize};
 
 /// What one stage of a run cost.
@@ -25,4 +27,35 @@ pub struct StageReport {
     pub residual: f64,
     /// The most memory the process has had resident when the stage ended.
     pub peak_rss_bytes: u64,
+}
+
+/// What the finished stages of a run cost, in the order in which they ended.
+#[derive(Debug, Default)]
+pub(in crate::exec) struct Reports(Mutex<Vec<StageReport>>);
+
+impl Reports {
+    pub(in crate::exec) fn add(&self, reports: impl IntoIterator<Item = StageReport>) {
+        self.all().extend(reports);
+    }
+
+    pub(in crate::exec) fn copied(&self) -> Vec<StageReport> {
+        self.all().clone()
+    }
+
+    /// Counts what another rank did in the same stages.
+    pub(in crate::exec) fn count_rank(&self, done: &[StageReport]) {
+        for (own, other) in self.all().iter_mut().zip(done) {
+            own.bricks += other.bricks;
+            own.brick_loads += other.brick_loads;
+            own.bytes_read += other.bytes_read;
+            own.bytes_written += other.bytes_written;
+            own.seconds = own.seconds.max(other.seconds);
+            own.peak_rss_bytes = own.peak_rss_bytes.max(other.peak_rss_bytes);
+        }
+    }
+
+    fn all(&self) -> MutexGuard<'_, Vec<StageReport>> {
+        // A list of figures is whole whatever thread was lost while holding it.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }

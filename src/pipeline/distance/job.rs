@@ -101,8 +101,7 @@ pub fn distance_kept<P: Precision>(
         Some(_) => Writes::Fields,
         None => Writes::Nothing,
     };
-    let needs = settings.needs::<P>(geometry, sets, [engine.threads(), engine.ranks()], writes);
-    let needs = needs.of_rank(engine.comm().ranks() as u64, engine.threads() as u64);
+    let needs = settings.needs::<P>(geometry, sets, [engine.threads(), engine.comm().ranks()], writes);
     let held = engine.reserve(needs.footprint)?;
     let lent = held.lend(needs.later);
     let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));

@@ -32,16 +32,10 @@ impl Needs {
     pub fn keeping<P: Precision>(self, geometry: &Geometry, sources: bool) -> Self {
         Self { scratch: self.scratch.saturating_add(Kept::<P>::bytes(geometry, sources)), ..self }
     }
-}
 
-/// Bytes of messages that a rank holds at a time: bricks that it lends and borrows, and as much for what waits to be sent.
-const MESSAGE_BYTES: u64 = 3 * ROUND_BYTES as u64;
-
-impl Needs {
     /// The same for one of so many ranks of so many threads, each of which has its part of the fields, and of some bricks of others
     /// copies; tables are of the whole grid.
-    #[must_use]
-    pub fn of_rank(self, ranks: u64, threads: u64) -> Self {
+    fn of_rank(self, ranks: u64, threads: u64) -> Self {
         if ranks == 1 {
             return self;
         }
@@ -66,6 +60,8 @@ pub enum Writes {
     FieldsAndBorders,
 }
 
+/// Bytes of messages that a rank holds at a time: bricks that it lends and borrows, and as much for what waits to be sent.
+const MESSAGE_BYTES: u64 = 3 * ROUND_BYTES as u64;
 /// Bytes of a voxel of a brick while sources are entered: the squared distance and source of those that fix it, and of
 /// those it is told of.
 const SEED_BYTES: u64 = 2 * (8 + 4);
@@ -74,8 +70,6 @@ const SEED_BYTES: u64 = 2 * (8 + 4);
 const TRACE_BYTES: u64 = 24;
 /// Bytes kept of each brick: its lock, its state, its places in tables.
 const BRICK_BYTES: u64 = 96;
-/// Bytes that every further rank keeps of each brick of the grid: its slot, its value where it is not stored.
-const RANK_BYTES: u64 = 16;
 /// Bytes kept of each source: its position, twice, its place in a brick's list, its corners.
 const SOURCE_BYTES: u64 = 160;
 /// Bytes of a triangle while it is told whether a mesh is closed: its three edges, and its share of the corners by place.
@@ -103,7 +97,7 @@ pub(crate) fn tree_bytes(sets: &DataSets) -> u64 {
 }
 
 impl DistanceSettings {
-    /// What these settings take on a grid, on so many threads that so many ranks share; each rank has one at least.
+    /// What these settings take on a grid, on so many threads of one of so many ranks.
     /// `writes` says what is stored.
     #[must_use]
     pub fn needs<P: Precision>(
@@ -114,10 +108,11 @@ impl DistanceSettings {
         writes: Writes,
     ) -> Needs {
         let grid = BrickGrid::new(geometry.shape, self.brick);
-        let (footprint, later) = self.footprint::<P>(geometry, sets, [threads, ranks], writes);
+        let (footprint, later) = self.footprint::<P>(geometry, sets, threads, writes);
         let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
         let held = footprint.bytes(threads as u64);
-        Needs { footprint, held, later, scratch: self.scratch::<P>(&grid, ranks), waiting: 0, seconds }
+        let needs = Needs { footprint, held, later, scratch: self.scratch::<P>(&grid), waiting: 0, seconds };
+        needs.of_rank(ranks as u64, threads as u64)
     }
 
     /// The stages of a distance, and what each will probably take.
@@ -154,13 +149,10 @@ impl DistanceSettings {
         &self,
         geometry: &Geometry,
         sets: &DataSets,
-        [threads, ranks]: [usize; 2],
+        threads: usize,
         writes: Writes,
     ) -> (Footprint, u64) {
         let solving = self.solving::<P>(geometry);
-        // Where ranks outnumber threads each has one of its own all the same.
-        let more = solving.per_thread.saturating_mul(ranks.saturating_sub(threads) as u64);
-        let solving = solving.and(Footprint::of_all(more));
         let reading = self.reading::<P>(geometry, sets, threads, writes);
         let at_once =
             if writes == Writes::FieldsMeanwhile { solving.and(reading) } else { solving.or(reading, threads as u64) };
@@ -169,20 +161,19 @@ impl DistanceSettings {
         } else {
             at_once.bytes(threads as u64) - solving.bytes(threads as u64)
         };
-        (self.tables::<P>(geometry, sets, ranks).and(at_once), later)
+        (self.tables::<P>(geometry, sets).and(at_once), later)
     }
 
     /// What is kept from the start to the end.
-    fn tables<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, ranks: usize) -> Footprint {
+    fn tables<P: Precision>(&self, geometry: &Geometry, sets: &DataSets) -> Footprint {
         let bricks = BrickGrid::new(geometry.shape, self.brick).len();
-        let of_brick = BRICK_BYTES + ranks.saturating_sub(1) as u64 * RANK_BYTES;
         let triangles = sets.mesh.len() as u64;
         let copies = triangles * TRIANGLE_COPIES * size_of::<Triangle>() as u64;
         let inside = if self.signed { WindingTree::bytes(triangles) + triangles * CLOSED_BYTES } else { 0 };
         let trees = if self.looks_closer::<P>(sets) { tree_bytes(sets) } else { 0 };
         let outside = if count_outside(geometry, sets) > 0 { tree_bytes(sets) } else { 0 };
         let of_sources = sets.len() as u64 * SOURCE_BYTES + copies + inside + trees + outside;
-        Footprint::of_all(bricks.saturating_mul(of_brick).saturating_add(of_sources))
+        Footprint::of_all(bricks.saturating_mul(BRICK_BYTES).saturating_add(of_sources))
     }
 
     /// What entering sources and solving take: one after the other, in the same threads.
@@ -215,18 +206,14 @@ impl DistanceSettings {
     }
 
     /// Temporary fields.
-    fn scratch<P: Precision>(&self, grid: &BrickGrid, ranks: usize) -> u64 {
+    fn scratch<P: Precision>(&self, grid: &BrickGrid) -> u64 {
         let (brick, faces) = (grid.brick_len() as u64, 6 * (self.brick * self.brick) as u64);
         let row = self.method.solver::<P>();
         let apart = if self.keeps_sources() { row.source_bytes } else { 0 };
         let element = row.state_bytes + apart;
-        // On either side of a cut lie ghosts, a plane of bricks at most, of which only faces are stored.
-        let cuts = ranks.saturating_sub(1) as u64;
-        let plane = grid.counts()[0].unsigned_abs().saturating_mul(grid.counts()[1].unsigned_abs());
         // Along with sweeps the faces of sources are kept a second time, as they were before.
         let swept = if matches!(self.schedule, Schedule::Sweep { .. }) { apart } else { 0 };
-        let ghosts = plane.saturating_mul(2 * cuts).saturating_mul(faces * (element + swept));
-        grid.len().saturating_mul((brick + faces) * element + faces * swept).saturating_add(ghosts)
+        grid.len().saturating_mul((brick + faces) * element + faces * swept)
     }
 
     /// What one heap over the whole volume takes, where these settings call for one.

@@ -8,7 +8,7 @@ use super::readout::repair::looked_over;
 use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::{Error, Result};
-use crate::exec::{HaloPlan, Ownership, Reach, Stage};
+use crate::exec::{HaloPlan, Ownership, Reach, Stage, read_by_bricks};
 use crate::grid::{Box3, BrickGrid, BrickId, BrickSet};
 use crate::kernel::distance::state::precision::Precision;
 use crate::store::{BoxSource, Element};
@@ -147,16 +147,6 @@ impl<T: Element> BoxSource<T> for Joined<'_, T> {
         if owners.all(|owner| owner == first) {
             return self.parts[first].read_box(part, out);
         }
-        let mut values = Vec::new();
-        for id in grid.bricks_in(part) {
-            let shared = grid.brick_box(id).intersect(part);
-            values.resize(shared.len(), T::default());
-            self.parts[ownership.owner(id)].read_box(&shared, &mut values)?;
-            let width = shared.shape()[0] as usize;
-            for ((y, z), row) in shared.rows().zip(values.chunks_exact(width)) {
-                out[part.offset_of([shared.lo[0], y, z])..][..width].copy_from_slice(row);
-            }
-        }
-        Ok(())
+        read_by_bricks(grid, part, out, |id, shared, values| self.parts[ownership.owner(id)].read_box(shared, values))
     }
 }

@@ -1,11 +1,10 @@
 //! The surfaces between labels put together of patches in the order of their boxes, also of patches that other ranks have drawn:
 //! these wait on the disk until it is their rank's turn.
 
-use crate::error::{Error, Result};
-use crate::exec::Comm;
+use crate::error::Result;
+use crate::exec::{Comm, Message, pack_message, unpack_message};
 use crate::grid::Geometry;
 use crate::kernel::surface::{Growing, Pairs, SurfaceMeasure, TaggedPatch, Welder};
-use crate::store::checkpoint::{pack, unpack};
 use crate::store::{MeshSink, Spill, Spilled};
 
 /// A patch, and how wide the gap is at each of its vertices, where somebody wants to know.
@@ -34,15 +33,18 @@ impl<'s> Whole<'s> {
         Self { welder: Welder::new(geometry), measure, pairs: Pairs::default(), sink }
     }
 
-    /// Takes what another rank has drawn, some patches at a time.
+    /// Takes what another rank has drawn, some patches at a time: the length of each and it, packed.
     pub(super) fn take_from(&mut self, comm: &dyn Comm, rank: usize) -> Result<()> {
         loop {
             let message = comm.exchange(&[rank], vec![Vec::new()])?.concat();
-            let patches: Vec<MadePatch> = unpack(&message).map_err(|error| told_wrongly(&error))?;
+            let mut patches = Message(&message);
             if patches.is_empty() {
                 return Ok(());
             }
-            patches.iter().try_for_each(|patch| self.take(patch))?;
+            while !patches.is_empty() {
+                let length = u64::from_le_bytes(patches.word()?);
+                self.take(&unpack_message(patches.take(length as usize)?)?)?;
+            }
         }
     }
 }
@@ -75,7 +77,7 @@ impl Takes for Spill {
     }
 
     fn take(&mut self, patch: &MadePatch) -> Result<()> {
-        self.put(&pack(patch).map_err(|error| told_wrongly(&error))?)
+        self.put(&pack_message(patch)?)
     }
 
     fn holds(&self) -> (u64, Vec<Growing>) {
@@ -90,20 +92,16 @@ const MESSAGE: usize = 4 << 20;
 pub(super) fn send(comm: &dyn Comm, mut spilled: Spilled) -> Result<()> {
     let mut next = spilled.take()?;
     loop {
-        // A list of records is packed as its length and they.
-        let (mut records, mut bytes) = (Vec::new(), 0);
-        while let Some(record) = next.take_if(|record| records.is_empty() || bytes + record.len() <= MESSAGE) {
-            bytes += record.len();
-            records.push(unpack::<MadePatch>(&record).map_err(|error| told_wrongly(&error))?);
+        let mut message = Vec::new();
+        while let Some(patch) = next.take_if(|patch| message.is_empty() || message.len() + patch.len() <= MESSAGE) {
+            message.extend_from_slice(&(patch.len() as u64).to_le_bytes());
+            message.extend_from_slice(&patch);
             next = spilled.take()?;
         }
-        comm.exchange(&[0], vec![pack(&records).map_err(|error| told_wrongly(&error))?])?;
-        if records.is_empty() {
+        let was_last = message.is_empty();
+        comm.exchange(&[0], vec![message])?;
+        if was_last {
             return Ok(());
         }
     }
-}
-
-fn told_wrongly(error: &std::io::Error) -> Error {
-    Error::failed(format!("what a rank has drawn cannot be told: {error}"))
 }

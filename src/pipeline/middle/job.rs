@@ -63,8 +63,7 @@ pub fn middle_kept<P: Precision>(
 ) -> Result<MiddleFound> {
     check_sets(sets, settings.surface)?;
     let comm = engine.comm();
-    let needs = settings.needs::<P>(geometry, sets, engine.threads(), engine.ranks(), store.is_some());
-    let needs = needs.of_rank(comm.ranks() as u64, engine.threads() as u64);
+    let needs = settings.needs::<P>(geometry, sets, engine.threads(), comm.ranks(), store.is_some());
     let held = engine.reserve(needs.footprint)?;
     let lent = held.lend(needs.later);
     let Drawing { stated, .. } = Drawing::new(geometry, sets, engine.threads());

@@ -37,7 +37,7 @@ pub struct MiddleSettings {
 }
 
 impl MiddleSettings {
-    /// What these settings take on a grid, on so many threads that so many ranks share; `writes` says whether there is a
+    /// What these settings take on a grid, on so many threads of one of so many ranks; `writes` says whether there is a
     /// store.
     #[must_use]
     pub fn needs<P: Precision>(
@@ -57,7 +57,8 @@ impl MiddleSettings {
         let drawing = Drawing::new(geometry, sets, threads);
         let footprint = needs.footprint.and(Footprint::of_all(trees + shapes)).and(drawing.footprint());
         let later = needs.later + drawing.footprint().bytes(threads as u64);
-        let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
+        let seconds: f64 = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
+        let seconds = seconds / ranks as f64;
         let held = footprint.bytes(threads as u64);
         Needs { footprint, held, later, waiting: drawing.waiting, seconds, ..needs }
     }

@@ -155,9 +155,9 @@ impl<T: Element> Pyramid<T> {
         coarser.came(n, &part, chunk.volume())
     }
 
-    /// The boxes of level `n` that this rank has put there for others to write: of its visits, or of the shards that it has
-    /// written of the level below.
-    fn for_others(&self, n: usize, share: &Share<'_>) -> Result<Vec<(usize, Piece<T>)>> {
+    /// The chunks below level `n` that this rank has put there for others to write, with who does: of its visits, or of the shards
+    /// that it has written of the level below.
+    fn for_others(&self, n: usize, share: &Share<'_>) -> Vec<(usize, Box3)> {
         let (levels, coarser) = (self.image.levels(), &self.coarser[n - 1]);
         let owner = |level: usize, voxel: [i64; 3]| {
             let factors = levels[1..=level].iter().map(LevelWriter::factors);
@@ -169,20 +169,22 @@ impl<T: Element> Pyramid<T> {
             let own = self.coarser[n - 2].shards.boxes.iter().filter(|shard| owner(n - 1, shard.lo) == share.rank());
             own.flat_map(|shard| shard.tiles(levels[n - 1].chunk_shape())).collect()
         };
-        let mut pieces = Vec::new();
-        for chunk in below {
-            let part = coarse_box(&chunk, levels[n].factors());
-            let to = owner(n, coarser.shards.boxes[coarser.shards.of(part.lo)].lo);
-            if to != share.rank() {
-                let mut values = vec![T::default(); part.len()];
-                coarser.waiting.read_box(&part, &mut values)?;
-                if values.iter().all(|&value| value == T::default()) {
-                    values.clear();
-                }
-                pieces.push((to, Piece { part, below: chunk.volume(), values }));
-            }
+        let to = |chunk: &Box3| {
+            let part = coarse_box(chunk, levels[n].factors());
+            owner(n, coarser.shards.boxes[coarser.shards.of(part.lo)].lo)
+        };
+        below.into_iter().map(|chunk| (to(&chunk), chunk)).filter(|(to, _)| *to != share.rank()).collect()
+    }
+
+    /// What level `n` has of a chunk of the level below.
+    fn piece(&self, n: usize, chunk: &Box3) -> Result<Piece<T>> {
+        let part = coarse_box(chunk, self.image.levels()[n].factors());
+        let mut values = vec![T::default(); part.len()];
+        self.coarser[n - 1].waiting.read_box(&part, &mut values)?;
+        if values.iter().all(|&value| value == T::default()) {
+            values.clear();
         }
-        Ok(pieces)
+        Ok(Piece { part, below: chunk.volume(), values })
     }
 
     /// Takes all chunks once more, of a finest level that has changed since.
@@ -216,12 +218,13 @@ impl<T: Element> PartlyWritten for Pyramid<T> {
     fn join(&self, share: &Share<'_>) -> Result<()> {
         let mut buffer = Vec::new();
         for (n, coarser) in (1..).zip(&self.coarser) {
-            for piece in share.exchange(&self.for_others(n, share)?)? {
+            let take = |piece: Piece<T>| {
                 if !piece.values.is_empty() {
                     coarser.waiting.write_box(&piece.part, &piece.values);
                 }
-                self.complete(coarser.came(n, &piece.part, piece.below), &mut buffer)?;
-            }
+                self.complete(coarser.came(n, &piece.part, piece.below), &mut buffer)
+            };
+            share.exchange(&self.for_others(n, share), |chunk| self.piece(n, chunk), take)?;
         }
         Ok(())
     }
@@ -280,11 +283,6 @@ pub(crate) fn visits<'a>(levels: impl IntoIterator<Item = &'a LevelWriter>, thre
         edges.extend([level.shard_shape(), level.chunk_shape()]);
     }
     visits_of(domain, edges, threads)
-}
-
-/// The largest shard of some levels.
-pub(crate) fn largest_shard<'a>(levels: impl IntoIterator<Item = &'a LevelWriter>) -> Option<[i64; 3]> {
-    levels.into_iter().map(LevelWriter::shard_shape).max_by_key(|edge| edge.iter().product::<i64>())
 }
 
 /// Visits of the tiles of a grid of the smallest of some edges, each a multiple of the smaller ones, likewise.

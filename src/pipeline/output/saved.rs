@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::share::Share;
+use super::share::{Share, largest_shard, parts};
 use crate::error::Result;
 use crate::exec::{SavePoint, Saved, Stage, Workers};
 use crate::grid::Box3;
@@ -80,7 +80,8 @@ pub(crate) fn in_batches<F: Serialize + DeserializeOwned>(
         stage.expect(visits.len() as u64);
         return take(&all, &Door(None), found);
     };
-    let begins = parts(visits, images);
+    let finest = images.iter().filter_map(|image| image.image().levels().first());
+    let begins = [parts(visits, largest_shard(finest).unwrap_or([1; 3])), vec![visits.len()]].concat();
     let (mut done, mut steps) = (vec![false; begins.len() - 1], 0);
     if let Some(known) = go_on(stage, &save_point, images, done.len())? {
         (done, *found) = (known.done, known.found);
@@ -197,15 +198,6 @@ fn take_over(
         Ok(taken.err().map(|fault| format!("{}: {fault}", file.display())))
     })?;
     Ok(faults.into_iter().flatten().next())
-}
-
-/// The visits with which parts begin, and their number.
-fn parts(visits: &[Vec<Box3>], images: &[&dyn PartlyWritten]) -> Vec<usize> {
-    let shards = images.iter().filter_map(|image| Some(image.image().levels().first()?.shard_shape()));
-    let edge = shards.max_by_key(|edge| edge.iter().product::<i64>()).unwrap_or([1; 3]);
-    let part = |visit: &Vec<Box3>| visit.first().map(|chunk| [0, 1, 2].map(|a| chunk.lo[a] / edge[a]));
-    let is_new = |&n: &usize| n == 0 || part(&visits[n]) != part(&visits[n - 1]);
-    (0..visits.len()).filter(is_new).chain([visits.len()]).collect()
 }
 
 /// How many of the parts that are left make a batch: as many as have no more than so many visits, and one at least.

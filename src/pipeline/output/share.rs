@@ -10,9 +10,10 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use crate::error::{Error, Result};
-use crate::exec::Comm;
+use crate::error::Result;
+use crate::exec::{Comm, Message, ROUND_BYTES};
 use crate::grid::Box3;
+use crate::io::ome_zarr::LevelWriter;
 use crate::store::Element;
 
 /// Which rank takes which visits.
@@ -39,14 +40,9 @@ impl<'a> Share<'a> {
     /// Shares out visits, which all ranks list alike. Those of a part, a box of `edge` voxels that begins at a multiple of that,
     /// come one after the other and stay together: it holds whole shards.
     pub(crate) fn new(comm: &'a dyn Comm, visits: &[Vec<Box3>], edge: [i64; 3]) -> Self {
-        let (mut parts, mut begins) = (HashMap::new(), Vec::new());
-        for (n, visit) in visits.iter().enumerate() {
-            let Some(chunk) = visit.first() else { continue };
-            parts.entry(std::array::from_fn(|a| chunk.lo[a] / edge[a])).or_insert_with(|| {
-                begins.push(n);
-                begins.len() - 1
-            });
-        }
+        let begins = parts(visits, edge);
+        let cell = |&begin: &usize| visits[begin].first().map(|chunk| std::array::from_fn(|a| chunk.lo[a] / edge[a]));
+        let parts = begins.iter().enumerate().filter_map(|(part, begin)| Some((cell(begin)?, part))).collect();
         let begin = |part: usize| begins.get(part).copied().unwrap_or(visits.len());
         let (rank, ranks) = (comm.rank(), comm.ranks());
         let own = begin(begins.len() * rank / ranks)..begin(begins.len() * (rank + 1) / ranks);
@@ -78,32 +74,51 @@ impl<'a> Share<'a> {
         (0..ranks).find(|rank| part < self.parts.len() * (rank + 1) / ranks).unwrap_or(ranks - 1)
     }
 
-    /// Sends pieces to the ranks they are for, and returns what has come for this one.
+    /// Sends pieces to the ranks they are for, some at a time, and hands on what comes for this one. `pieces` are told by what they
+    /// are and to whom, and made when it is their turn.
     ///
     /// # Errors
-    /// When another rank is gone.
-    pub(crate) fn exchange<T: Element>(&self, pieces: &[(usize, Piece<T>)]) -> Result<Vec<Piece<T>>> {
-        let others: Vec<usize> = (0..self.comm.ranks()).filter(|&rank| rank != self.comm.rank()).collect();
-        let message = |rank: usize| {
-            let mut message = Vec::new();
-            pieces.iter().filter(|(to, _)| *to == rank).for_each(|(_, piece)| piece.append_to(&mut message));
-            message
-        };
-        let mut come = Vec::new();
-        for message in self.comm.exchange(&others, others.iter().map(|&rank| message(rank)).collect())? {
-            let mut rest = message.as_slice();
-            while !rest.is_empty() {
-                let (piece, behind) = Piece::first_of(rest).ok_or_else(|| {
-                    Error::failed(
-                        "a message between ranks is damaged; all ranks must run the same version of the program",
-                    )
-                })?;
-                come.push(piece);
-                rest = behind;
+    /// When a piece cannot be made or taken, or another rank is gone.
+    pub(crate) fn exchange<T: Element, W>(
+        &self,
+        pieces: &[(usize, W)],
+        make: impl Fn(&W) -> Result<Piece<T>>,
+        mut take: impl FnMut(Piece<T>) -> Result<()>,
+    ) -> Result<()> {
+        let others = self.comm.others();
+        let mut left = pieces.iter();
+        while self.comm.any(left.len() > 0)? {
+            let mut messages = vec![Vec::new(); self.comm.ranks()];
+            let mut bytes = 0;
+            while bytes < ROUND_BYTES
+                && let Some((to, what)) = left.next()
+            {
+                let before = messages[*to].len();
+                make(what)?.append_to(&mut messages[*to]);
+                bytes += messages[*to].len() - before;
+            }
+            let messages = others.iter().map(|&rank| std::mem::take(&mut messages[rank])).collect();
+            for message in self.comm.exchange(&others, messages)? {
+                let mut rest = Message(&message);
+                while !rest.is_empty() {
+                    take(Piece::first_of(&mut rest)?)?;
+                }
             }
         }
-        Ok(come)
+        Ok(())
     }
+}
+
+/// The visits with which parts begin: boxes of `edge` voxels, whose visits come one after the other.
+pub(crate) fn parts(visits: &[Vec<Box3>], edge: [i64; 3]) -> Vec<usize> {
+    let part = |visit: &Vec<Box3>| visit.first().map(|chunk| [0, 1, 2].map(|a| chunk.lo[a] / edge[a]));
+    let is_new = |&n: &usize| n == 0 || part(&visits[n]) != part(&visits[n - 1]);
+    (0..visits.len()).filter(is_new).collect()
+}
+
+/// The largest shard of some levels.
+pub(crate) fn largest_shard<'a>(levels: impl IntoIterator<Item = &'a LevelWriter>) -> Option<[i64; 3]> {
+    levels.into_iter().map(LevelWriter::shard_shape).max_by_key(|edge| edge.iter().product::<i64>())
 }
 
 impl<T: Element> Piece<T> {
@@ -114,16 +129,64 @@ impl<T: Element> Piece<T> {
         T::append_bytes(&self.values, message);
     }
 
-    fn first_of(message: &[u8]) -> Option<(Self, &[u8])> {
-        let (head, rest) = message.split_at_checked(7 * 8)?;
-        let words = head.as_chunks().0;
-        let at = |n: usize| std::array::from_fn(|a| i64::from_le_bytes(words[n + a]));
-        let part = Box3::new(at(0), at(3));
-        let (has_values, rest) = rest.split_first()?;
-        let count = if *has_values == 1 { part.len() } else { 0 };
-        let (bytes, rest) = rest.split_at_checked(count.checked_mul(size_of::<T>())?)?;
+    fn first_of(message: &mut Message<'_>) -> Result<Self> {
+        let mut corner = || -> Result<[i64; 3]> {
+            let words: [u8; 24] = message.word()?;
+            let words = words.as_chunks().0;
+            Ok(std::array::from_fn(|a| i64::from_le_bytes(words[a])))
+        };
+        let part = Box3::new(corner()?, corner()?);
+        let below = u64::from_le_bytes(message.word()?);
+        let count = if message.word()? == [1] { part.len() } else { 0 };
         let mut values = vec![T::default(); count];
-        T::fill_from_bytes(&mut values, bytes);
-        Some((Self { part, below: u64::from_le_bytes(words[6]), values }, rest))
+        T::fill_from_bytes(&mut values, message.take(count * size_of::<T>())?);
+        Ok(Self { part, below, values })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exec::ThreadComm;
+
+    /// Boxes of a row of cubes, numbered along it.
+    fn cube(number: i64) -> Box3 {
+        Box3::new([64 * number, 0, 0], [64 * (number + 1), 64, 64])
+    }
+
+    /// More than travels at a time, pieces without a value among it: each arrives once, where it was sent, as it was.
+    #[test]
+    fn pieces_arrive_in_as_many_rounds_as_it_takes() {
+        let visits: Vec<Vec<Box3>> = (0..30).map(|number| vec![cube(number)]).collect();
+        let values = |number: i64| if number % 7 == 0 { Vec::new() } else { vec![number as f64; 1 << 18] };
+        std::thread::scope(|scope| {
+            for comm in ThreadComm::connected(3) {
+                let (visits, values) = (&visits, &values);
+                scope.spawn(move || {
+                    let share = Share::new(&comm, visits, [64; 3]);
+                    let to = |number: i64| ((number + 1) % 3) as usize;
+                    let own = share.own().map(|visit| visit as i64).filter(|&number| to(number) != share.rank());
+                    let pieces: Vec<(usize, i64)> = own.map(|number| (to(number), number)).collect();
+                    let make = |&number: &i64| {
+                        Ok(Piece { part: cube(number), below: number as u64 + 5, values: values(number) })
+                    };
+                    let mut come = Vec::new();
+                    let take = |piece: Piece<f64>| {
+                        let number = piece.part.lo[0] / 64;
+                        assert_eq!((piece.part, piece.below), (cube(number), number as u64 + 5));
+                        assert!(piece.values == values(number), "{number}");
+                        come.push(number);
+                        Ok(())
+                    };
+                    share.exchange(&pieces, make, take).unwrap();
+                    let is_for_me =
+                        |number: &i64| to(*number) == share.rank() && share.owner(cube(*number).lo) != share.rank();
+                    come.sort_unstable();
+                    assert_eq!(come, (0..30).filter(is_for_me).collect::<Vec<_>>());
+                    let sent: usize = pieces.iter().map(|(_, number)| 8 * values(*number).len()).sum();
+                    assert!(sent > ROUND_BYTES, "{sent}");
+                });
+            }
+        });
     }
 }

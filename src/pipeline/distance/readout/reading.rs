@@ -11,8 +11,8 @@ use super::field::Solved;
 use super::found::DistanceFound;
 use super::images::{Buffers, Images};
 use super::visit::{Measured, ReadOut, Voxels};
-use crate::error::{Error, Result};
-use crate::exec::{Engine, Stage, Workers};
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers, gather_records};
 use crate::grid::Box3;
 use crate::io::ome_zarr::StoreWriter;
 use crate::kernel::distance::features::closest_point::ClosestPoints;
@@ -20,10 +20,9 @@ use crate::kernel::distance::features::inside::Inside;
 use crate::kernel::distance::repair::bends::MARGIN;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::schedule::passing::Passed;
-use crate::pipeline::output::pyramid::{largest_shard, visits, visits_of};
+use crate::pipeline::output::pyramid::{visits, visits_of};
 use crate::pipeline::output::saved::in_batches;
-use crate::pipeline::output::share::Share;
-use crate::store::checkpoint::{pack, unpack};
+use crate::pipeline::output::share::{Share, largest_shard};
 
 /// Edges of the boxes that voxels are looked at in where nothing is written: as if something was.
 const LOOK_EDGES: [[i64; 3]; 2] = [[128; 3], [64; 3]];
@@ -137,13 +136,7 @@ impl<'a, P: Precision> Reading<'a, P> {
         if let Some(images) = &self.images {
             images.all().into_iter().try_for_each(|image| image.join(&self.share))?;
         }
-        let told = pack(&own).map_err(|error| Error::failed(format!("what was found cannot be told: {error}")))?;
-        let all = comm.gather(told)?;
-        let heard = |bytes: &Vec<u8>| {
-            unpack::<Found>(bytes)
-                .map_err(|error| Error::failed(format!("what another rank found cannot be read: {error}")))
-        };
-        all.iter().map(heard).try_fold(Found::default(), |sum, found| Ok(sum.and(found?)))
+        Ok(gather_records(comm, &own)?.into_iter().fold(Found::default(), Found::and))
     }
 
     /// Next to never: what was read early is read once more.
@@ -222,9 +215,7 @@ impl Found {
 
 /// The threads of all ranks: whatever each has, all cut the volume alike.
 fn all_threads(engine: &Engine) -> Result<usize> {
-    let all = engine.comm().gather((engine.threads() as u64).to_le_bytes().to_vec())?;
-    let words = all.iter().filter_map(|bytes| bytes.as_slice().try_into().ok());
-    Ok(words.map(u64::from_le_bytes).sum::<u64>() as usize)
+    Ok(gather_records(engine.comm(), &engine.threads())?.into_iter().sum())
 }
 
 impl<P: Precision> Early<P> for Reading<'_, P> {
