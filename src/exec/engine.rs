@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::by_itself::ByItself;
 use super::cancel::Cancel;
 use super::comm::messages::{Comm, SelfComm};
 use super::memory::budget::{Budget, machine_memory, peak_resident};
@@ -92,19 +93,8 @@ impl Engine {
 
     /// The engine of one of this engine's ranks: its share of the threads, at least one; the same window.
     pub(super) fn of_rank(&self, comm: Arc<dyn Comm>) -> Result<Self> {
-        Ok(Self {
-            pool: Arc::new(pool((self.threads() / self.ranks).max(1))?),
-            cancel: self.cancel.clone(),
-            progress: Arc::new(OfRank(self.progress.clone())),
-            comm,
-            ranks: 1,
-            scratch: self.scratch.clone(),
-            budget: self.budget,
-            account: self.account.clone(),
-            outlook: self.outlook.clone(),
-            saving: None,
-            reports: Reports::default(),
-        })
+        let pool = Arc::new(pool((self.threads() / self.ranks).max(1))?);
+        Ok(Self { pool, comm, ranks: 1, saving: None, ..self.beside() })
     }
 
     /// An engine that shares this one's threads and window, for one of several jobs side by side: it keeps reports of
@@ -123,6 +113,13 @@ impl Engine {
             saving: self.saving.clone(),
             reports: Reports::default(),
         }
+    }
+
+    /// This engine for what a rank does by itself, without the others.
+    pub(crate) fn by_itself(&self) -> ByItself<'_> {
+        let (progress, comm) = (self.progress.clone(), Arc::new(SelfComm));
+        let own = (self.comm.ranks() > 1).then(|| Self { progress, comm, saving: None, ..self.beside() });
+        ByItself { of: self, own }
     }
 
     /// Runs on this engine's threads.

@@ -304,7 +304,8 @@ mod tests {
         let far = [&3_u64.to_le_bytes()[..], &[1 << 4], &[0; 4 * 8]].concat();
         let beyond = u64::MAX.to_le_bytes().to_vec();
         for (message, good) in [(face.clone(), true), (face[..40].to_vec(), false), (far, false), (beyond, false)] {
-            let ownership = Liar(4_u64.to_le_bytes().to_vec());
+            // What all tell is packed: its length, then it.
+            let ownership = Liar([8_u64.to_le_bytes(), 4_u64.to_le_bytes()].concat());
             let mut exchange = Exchange::new(&ownership, &set, &plan).unwrap();
             let liar = Liar(message);
             exchange.comm = &liar;

@@ -2,6 +2,7 @@
 //! The only threads of the crate.
 
 mod borrow;
+mod by_itself;
 mod cancel;
 mod comm;
 #[cfg(test)]
@@ -18,6 +19,7 @@ mod relax;
 mod save_points;
 mod schedule;
 mod side_by_side;
+mod spread;
 mod workers;
 
 pub use borrow::{ROUND_BYTES, borrow_bricks, read_by_bricks, read_with_borrowed};
@@ -43,4 +45,5 @@ pub use ranks::as_threads;
 pub use relax::{Place, Relax, Until, Waves};
 pub use save_points::{SavePoint, SavePoints, Saved};
 pub use schedule::{checkerboard, corner_colours, one_wave, sweep_waves};
+pub use spread::spread_fields;
 pub use workers::Workers;

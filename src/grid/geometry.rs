@@ -1,5 +1,7 @@
 //! `Geometry`: how a box of voxels lies in the physical world (docs/algorithms.md, "Grid").
 
+use serde::{Deserialize, Serialize};
+
 use super::Box3;
 
 /// So many spacings from zero f32 still tells places on an axis apart that are less than a 4096th of a spacing from each
@@ -7,7 +9,7 @@ use super::Box3;
 const SINGLE_SPACINGS: f64 = 4096.0;
 
 /// Shape, spacing and place of a grid of voxels. Triples are `[x, y, z]`; lengths are physical.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Geometry {
     /// Voxels along each axis.
     pub shape: [i64; 3],

@@ -14,7 +14,7 @@ use crate::store::{BoxSource, BrickArray, MeshSink};
 const BATCH: usize = 256;
 
 /// A surface that was drawn.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawn {
     /// What it measures.
     pub measures: Measures,

@@ -35,6 +35,7 @@ mod pace;
 mod point_forms;
 mod points;
 mod ranks;
+mod ranks_jobs;
 mod reconstruct;
 mod reconstruct_cli;
 mod surfaces;

@@ -428,7 +428,7 @@ fn a_launcher_of_several_processes_is_noticed() {
         (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
     };
     for variable in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"] {
-        let (code, said) = run("reconstruct", variable, "4");
+        let (code, said) = run("batch", variable, "4");
         assert!(code == Some(2) && said.contains("4 processes") && said.contains(variable), "{code:?} {said}");
     }
     #[cfg(not(feature = "mpi"))]

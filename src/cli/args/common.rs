@@ -43,6 +43,9 @@ pub(crate) struct SegmentArgs {
     pub(crate) distance: DistanceArgs,
     #[command(flatten)]
     pub(crate) resources: ResourceArgs,
+    /// Ranks that share the objects, each a thread with files of its own; results do not depend on it
+    #[arg(long, value_name = "N", default_value_t = 1, hide = true)]
+    pub(crate) ranks: usize,
     #[command(flatten)]
     pub(crate) output: OutputArgs,
     #[command(flatten)]

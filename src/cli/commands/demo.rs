@@ -1,6 +1,7 @@
 //! `strandline demo`: the built-in stack, from border points to labels, surface and a picture.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Parser;
 
@@ -12,6 +13,7 @@ use crate::cli::args::values::Output;
 use crate::cli::print;
 use crate::cli::terminal::signals;
 use crate::error::{Error, Result};
+use crate::exec::SelfComm;
 use crate::store::HiddenFolder;
 
 const STACK: &[u8] = include_bytes!("../../../data/arabidopsis-embryo.tif");
@@ -50,7 +52,7 @@ pub(crate) fn run(args: &DemoArgs, typed: &[String]) -> Result<()> {
         image: "the built-in arabidopsis-embryo.tif".into(),
         points: vec!["the built-in arabidopsis-marks.csv".into()],
     };
-    let job = Job::new(names, *segment, typed, cancel)?;
+    let job = Job::new(names, *segment, typed, (cancel, Arc::new(SelfComm)))?;
     job.run(&job.estimate())?;
     if !args.quiet {
         print(&farewell(&args.output))?;

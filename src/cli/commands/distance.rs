@@ -106,8 +106,10 @@ impl Job {
         outputs.check()?;
         mesh.as_deref().map(mesh_format).transpose()?;
         let resources = settings::resources(&args.job.resources, args.job.output.store())?;
-        let resources = resources
-            .share(sharing(&args), [args.job.resources.memory.is_some(), args.job.resources.threads.is_some()]);
+        let resources = resources.share(
+            world::sharing(args.job.ranks),
+            [args.job.resources.memory.is_some(), args.job.resources.threads.is_some()],
+        );
         // The first rank speaks for all.
         let voice = if comm.rank() == 0 { Voice::of_run(&args.job.output) } else { Voice::Quiet };
         let console = Arc::new(Console::new(voice));
@@ -292,7 +294,7 @@ impl Job {
         let output = self.args.job.output.store();
         let written = if output.is_some() { self.written() } else { 0 };
         // Ranks beside this one keep as much on the same disk.
-        let Sharing { machine, process } = sharing(&self.args);
+        let Sharing { machine, process } = world::sharing(self.args.job.ranks);
         let all = Needs { scratch: needs.scratch.saturating_mul(machine.max(process) as u64), ..*needs };
         let disk = Disk::of_grid(&self.resources, output, &self.geometry, &all, written)?;
         let has_mesh = self.middle.as_ref().is_some_and(|choice| choice.mesh.is_some());
@@ -366,12 +368,6 @@ impl Job {
             found,
         )
     }
-}
-
-/// How many ranks share this process or this machine.
-fn sharing(args: &DistanceJobArgs) -> Sharing {
-    let machine = world::on_this_machine();
-    Sharing { machine, process: if machine > 1 { 1 } else { args.job.ranks } }
 }
 
 /// The settings that the flags mean.

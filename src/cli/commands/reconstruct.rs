@@ -7,17 +7,19 @@ use std::time::Instant;
 
 use crate::cli::args::grid::GridArgs;
 use crate::cli::args::reconstruct::{CloudGridArgs, ReconstructArgs};
+use crate::cli::inputs::agreed::check_agreed;
 use crate::cli::inputs::grid::asked_grid;
 use crate::cli::inputs::noted::read_told;
 use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile, distance_to_marks};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
-use crate::cli::outputs::store::begin_store;
+use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
 use crate::cli::outputs::survival::{finished_before, save_points, told_of_room};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
+use crate::cli::report::ranks::{RankReport, gather_ranks};
 use crate::cli::report::reconstruction::{Found, Settings};
 use crate::cli::report::run_report::{Ran, Report};
 use crate::cli::report::table;
@@ -25,10 +27,12 @@ use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::log;
 use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
+use crate::cli::terminal::world;
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Engine, Progress};
+use crate::exec::{Budget, Cancel, Comm, Engine, Progress, as_threads};
 use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::read::source::Source;
+use crate::io::geometry::read::sources::is_standard_input;
 use crate::job::disk::Disk;
 use crate::job::resources::Resources;
 use crate::pipeline::output::viewer_mesh::{Segments, Simplified};
@@ -54,6 +58,8 @@ struct Job {
     console: Arc<Console>,
     cancel: Cancel,
     started: Instant,
+    /// The ranks that run this job, each on its own part.
+    comm: Arc<dyn Comm>,
 }
 
 /// Runs the command.
@@ -63,17 +69,32 @@ pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
     if finished_before(&mut args.output, &files, typed)? {
         return Ok(());
     }
-    let job = Job::new(args.clone(), typed)?;
+    settings::check_ranks(args.ranks)?;
+    let comm = world::ranks()?;
+    if is_standard_input(&args.cloud) && comm.ranks().max(args.ranks) > 1 {
+        return Err(Error::usage("several ranks cannot read standard input; give a file that all of them can read"));
+    }
+    if args.ranks == 1 || comm.ranks() > 1 {
+        return run_rank(args, typed, comm);
+    }
+    as_threads(args.ranks, |comm| run_rank(args.clone(), typed, comm)).map(drop)
+}
+
+/// Runs the command on one of the ranks.
+fn run_rank(args: ReconstructArgs, typed: &[String], comm: Arc<dyn Comm>) -> Result<()> {
+    let job = Job::new(args, typed, comm)?;
+    job.check_agreed()?;
     let threads = job.resources.threads as u64;
     let estimate = estimate(&job.grid, &job.cloud, &job.settings, threads, job.writes_fields());
     let plan = job.plan(&estimate);
-    if args.output.dry_run {
+    let is_dry = job.args.output.dry_run;
+    if is_dry && job.comm.rank() == 0 {
         print(&format!("{plan}\n"))?;
         let output = if job.writes_fields() { estimate.output } else { 0 };
         log::plan(Budget::least(estimate.held), estimate.scratch, output, estimate.seconds);
     }
     let most = job.fits(&estimate)?;
-    if args.output.dry_run {
+    if is_dry {
         return Ok(());
     }
     job.console.say(&plan);
@@ -120,12 +141,11 @@ fn laid_grid(
 }
 
 impl Job {
-    fn new(args: ReconstructArgs, typed: &[String]) -> Result<Self> {
+    fn new(args: ReconstructArgs, typed: &[String], comm: Arc<dyn Comm>) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
         let mut settings = settings::reconstruct_settings(&args.motion, args.distance.method)?;
         let spacing = settings::spacing("--spacing", args.grid.spacing)?;
-        settings::check_ranks(args.ranks)?;
         let outputs = Outputs {
             inputs: vec![&args.cloud],
             store: args.output.store(),
@@ -135,7 +155,11 @@ impl Job {
         outputs.check()?;
         args.mesh.as_deref().map(mesh_format).transpose()?;
         let resources = settings::resources(&args.resources, args.output.store())?;
-        let console = Arc::new(Console::new(Voice::of_run(&args.output)));
+        let gave = [args.resources.memory.is_some(), args.resources.threads.is_some()];
+        let resources = resources.share(world::sharing(args.ranks), gave);
+        // The first rank speaks for all.
+        let voice = if comm.rank() == 0 { Voice::of_run(&args.output) } else { Voice::Quiet };
+        let console = Arc::new(Console::new(voice));
         let cloud = match read_told(&args.cloud, &|text| console.note(text))? {
             Source::Cloud(cloud) => cloud.positions,
             Source::Mesh(mesh) => {
@@ -162,7 +186,18 @@ impl Job {
             }
         })?;
         let typed = typed.to_vec();
-        Ok(Self { args, typed, settings, resources, cloud, grid, console, cancel, started })
+        Ok(Self { args, typed, settings, resources, cloud, grid, console, cancel, started, comm })
+    }
+
+    /// Refuses ranks that were given something else.
+    fn check_agreed(&self) -> Result<()> {
+        let output = &self.args.output;
+        let written = (output.store(), output.live, output.dry_run, output.ome, output.compress);
+        let mut sets = DataSets::default();
+        if self.comm.ranks() > 1 {
+            sets.add_cloud(&self.cloud);
+        }
+        check_agreed(self.comm.as_ref(), &format!("{:?} {:?} {written:?}", self.grid, self.settings), &sets)
     }
 
     /// Fields are written out, or needed for the mesh.
@@ -196,15 +231,19 @@ impl Job {
     }
 
     fn run(&self, seconds: f64, most: u64) -> Result<()> {
-        let saving = save_points(&self.args.output, &self.typed, self.console.as_ref())?;
-        let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_ranks(self.args.ranks);
+        let saving = if self.comm.ranks() == 1 {
+            save_points(&self.args.output, &self.typed, self.console.as_ref())?
+        } else {
+            None
+        };
+        let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
         let engine = engine.with_save_points(saving);
         engine.outlook().expect(with_page(plan(seconds, self.writes_fields()), self.writes_fields()));
         let result = self.solve_and_write(&engine);
         self.console.clear();
         engine.settle_save_points(&result);
         let found = told_of_room(result, most, &self.args.output)?;
-        if !self.args.output.quiet {
+        if !self.args.output.quiet && self.comm.rank() == 0 {
             print(&format!("{}\n{}", table::stages(&engine.reports()), describe_found(&found)))?;
         }
         Ok(())
@@ -212,22 +251,29 @@ impl Job {
 
     fn solve_and_write(&self, engine: &Engine) -> Result<Reconstruction> {
         let output = &self.args.output;
-        let (store, telling) = begin_store(output, engine)?;
+        let (store, telling) = begin_store_on_ranks(output, engine)?;
         let (scratch, is_copy) = (self.resources.scratch.as_path(), store.is_some());
         let replace = output.overwrite;
         let points = || self.cloud.clone();
-        let values =
-            self.args.mesh.as_deref().map(|path| distance_to_marks(engine, path, points)).transpose()?.flatten();
+        // The first rank alone draws the surface.
+        let is_first = self.comm.rank() == 0;
+        let path = self.args.mesh.as_deref().filter(|_| is_first);
+        let values = path.map(|path| distance_to_marks(engine, path, points)).transpose()?.flatten();
         let values = values.as_ref();
-        let to =
-            self.args.mesh.as_deref().map(|path| ToFile { path, scratch, is_tagged: false, is_copy, replace, values });
-        let mut drawing = Drawing::new(store.as_ref(), to, &self.grid, false)?;
+        let to = path.map(|path| ToFile { path, scratch, is_tagged: false, is_copy, replace, values });
+        let mut drawing = Drawing::new(store.as_ref().filter(|_| is_first), to, &self.grid, false)?;
         let found = reconstruct_shown(engine, &self.grid, &self.cloud, &self.settings, (&mut drawing, store.as_ref()))
             .map_err(|error| error.at(&self.args.cloud))?;
         let (geometry, segments) = (&self.grid, Segments::Object(1));
-        let (mesh, copy) = drawing.finish(&ForViewers { engine, store: store.as_ref(), geometry, segments })?;
+        let viewers = ForViewers { engine, store: store.as_ref(), geometry, segments };
+        let (mesh, copy) = if is_first { drawing.finish(&viewers)? } else { (None, None) };
         if let Some(store) = &store {
             found.write(engine, store)?;
+        }
+        let ranks = gather_ranks(engine)?;
+        let store = join_store(store, engine)?;
+        if !is_first {
+            return Ok(found);
         }
         self.note_lost(&found);
         note_anchor(self.args.mesh.as_deref(), &found.geometry, &self.console);
@@ -245,7 +291,7 @@ impl Job {
                 points: "points",
             };
             let written = Written { store: &store, engine, console: self.console.as_ref() };
-            written.write(&evidence, || self.report(engine, &found, copy))?;
+            written.write(&evidence, || self.report(engine, &ranks, (&found, copy)))?;
             engine.check()?;
             drop(telling);
             store.finish()?;
@@ -253,7 +299,7 @@ impl Job {
         engine.check()?;
         mesh.map_or(Ok(()), Finished::place)?;
         if let Some(path) = &output.report {
-            self.report(engine, &found, copy).write(path, output.overwrite)?;
+            self.report(engine, &ranks, (&found, copy)).write(path, output.overwrite)?;
         }
         Ok(found)
     }
@@ -271,15 +317,20 @@ impl Job {
         }
     }
 
-    fn report(&self, engine: &Engine, found: &Reconstruction, copy: Option<Simplified>) -> Report<Settings, Found> {
+    fn report(
+        &self,
+        engine: &Engine,
+        rank_reports: &[RankReport],
+        (found, copy): (&Reconstruction, Option<Simplified>),
+    ) -> Report<Settings, Found> {
         let ran = Ran {
             command: "reconstruct",
             typed: &self.typed,
             resources: &self.resources,
             console: &self.console,
             engine,
-            ranks: engine.ranks(),
-            rank_reports: &[],
+            ranks: self.comm.ranks(),
+            rank_reports,
             started: self.started,
         };
         Report::new(

@@ -3,6 +3,7 @@
 mod notes;
 mod plan;
 mod series;
+mod told;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::cli::args::common::SegmentArgs;
+use crate::cli::inputs::agreed::check_agreed;
 use crate::cli::inputs::image::{OpenStack, chosen_notes, crop_box, open_stack};
 use crate::cli::inputs::marks::{Objects, Reading, check_all_marks, read_marks};
 use crate::cli::inputs::over_time::MarksAt;
@@ -17,20 +19,21 @@ use crate::cli::inputs::settings;
 use crate::cli::outputs::checks::{Outputs, numbered};
 use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
-use crate::cli::outputs::store::begin_store;
+use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
 use crate::cli::outputs::survival::{finished_before, save_points, save_points_of, told_of_room};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
-use crate::cli::report::run_report::{Found, Ran, Report, crop_xyz};
-use crate::cli::report::settings::{Settings, Solver};
+use crate::cli::report::ranks::{RankReport, gather_ranks};
 use crate::cli::report::{picture, table};
 use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration};
+use crate::cli::terminal::world;
 use crate::error::{Error, Result};
-use crate::exec::{Cancel, Engine, Progress};
-use crate::grid::{Box3, DataSets, Geometry};
+use crate::exec::{Cancel, Comm, Engine, Progress, as_threads};
+use crate::grid::{Box3, Geometry};
+use crate::io::geometry::read::sources::is_standard_input;
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stack::volume::Stack;
 use crate::job::resources::Resources;
@@ -59,6 +62,8 @@ pub(crate) struct Job {
     objects: Objects,
     console: Arc<Console>,
     cancel: Cancel,
+    /// The ranks that run this job, each on its own objects.
+    comm: Arc<dyn Comm>,
     started: Instant,
     /// The image's time, counted from 0.
     time: u32,
@@ -79,7 +84,12 @@ pub(crate) struct Names {
 
 /// Runs the command.
 pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
+    settings::check_ranks(args.ranks)?;
     if args.picture.time.one().is_none() {
+        if args.ranks > 1 || world::ranks()?.ranks() > 1 {
+            let what = "several times are solved by one rank; give one --time, or run the times as items of a batch";
+            return Err(Error::usage(what));
+        }
         return series::run(args, typed);
     }
     let mut args = args.clone();
@@ -87,11 +97,40 @@ pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     if finished_before(&mut args.output, &files, typed)? {
         return Ok(());
     }
-    let names = Names::of(&args);
-    let job = Job::new(names, args.clone(), typed, signals::cancel_on_signals()?)?;
+    let comm = world::ranks()?;
+    if comm.ranks().max(args.ranks) > 1 {
+        check_for_ranks(&args)?;
+    }
+    let cancel = signals::cancel_on_signals()?;
+    if args.ranks == 1 || comm.ranks() > 1 {
+        return run_rank(args, typed, cancel, comm);
+    }
+    as_threads(args.ranks, |comm| run_rank(args.clone(), typed, cancel.clone(), comm)).map(drop)
+}
+
+/// What several ranks cannot do.
+fn check_for_ranks(args: &SegmentArgs) -> Result<()> {
+    if args.points.iter().any(|path| is_standard_input(path)) {
+        return Err(Error::usage("several ranks cannot read standard input; give files that all of them can read"));
+    }
+    if args.drawn.picture.is_some() && args.output.store().is_none() {
+        return Err(Error::usage(
+            "a picture is drawn from a store, which several ranks write together; give -o OUT.zarr too",
+        ));
+    }
+    Ok(())
+}
+
+/// Runs the command on one of the ranks.
+fn run_rank(args: SegmentArgs, typed: &[String], cancel: Cancel, comm: Arc<dyn Comm>) -> Result<()> {
+    let (names, dry_run) = (Names::of(&args), args.output.dry_run);
+    let job = Job::new(names, args, typed, (cancel, comm))?;
+    job.check_agreed()?;
     let estimate = job.estimate();
-    if args.output.dry_run {
-        job.print_plan(&estimate)?;
+    if dry_run {
+        if job.comm.rank() == 0 {
+            job.print_plan(&estimate)?;
+        }
         return job.fits(&estimate).map(drop);
     }
     job.run(&estimate).map(|_| ())
@@ -110,14 +149,21 @@ type Marking<'a> = &'a mut dyn FnMut(&OpenStack, &Console) -> Result<MarksAt>;
 
 impl Job {
     /// Understands what was typed and opens the inputs.
-    pub(crate) fn new(names: Names, args: SegmentArgs, typed: &[String], cancel: Cancel) -> Result<Self> {
-        let console = Console::new(Voice::of_run(&args.output));
+    pub(crate) fn new(
+        names: Names,
+        args: SegmentArgs,
+        typed: &[String],
+        (cancel, comm): (Cancel, Arc<dyn Comm>),
+    ) -> Result<Self> {
+        // The first rank speaks for all.
+        let voice = if comm.rank() == 0 { Voice::of_run(&args.output) } else { Voice::Quiet };
+        let console = Console::new(voice);
         let (points, points_in, time) = (args.points.clone(), args.points_in, args.picture.time.first());
         let mut marking = |opened: &OpenStack, console: &Console| {
             let reading = Reading { image: &opened.geometry, points_in, time: Some(time) };
             Ok(MarksAt { marks: read_marks(&points, &reading, console)?, origins: BTreeMap::new() })
         };
-        Self::of_time(names, args, typed, (cancel, console), time, &mut marking)
+        Self::of_time(names, args, typed, (cancel, console, comm), time, &mut marking)
     }
 
     /// The same for a time of the image, with marks from somewhere.
@@ -125,7 +171,7 @@ impl Job {
         names: Names,
         args: SegmentArgs,
         typed: &[String],
-        (cancel, console): (Cancel, Console),
+        (cancel, console, comm): (Cancel, Console, Arc<dyn Comm>),
         time: u32,
         marking: Marking<'_>,
     ) -> Result<Self> {
@@ -147,6 +193,8 @@ impl Job {
         args.drawn.mesh.as_deref().map(mesh_format).transpose()?;
         args.drawn.picture.as_deref().map(picture::check_name).transpose()?;
         let resources = settings::resources(&args.resources, args.output.store())?;
+        let gave = [args.resources.memory.is_some(), args.resources.threads.is_some()];
+        let resources = resources.share(world::sharing(args.ranks), gave);
         let console = Arc::new(console);
         let select = args.picture.volume.select_at(time);
         let opened = open_stack(&args.image, select, spacing)?;
@@ -187,12 +235,26 @@ impl Job {
             objects,
             console,
             cancel,
+            comm,
             started,
             time,
             identity: None,
             has_page: true,
             prints: true,
         })
+    }
+
+    /// Refuses ranks that were given something else.
+    fn check_agreed(&self) -> Result<()> {
+        let (info, output) = (self.stack.info(), &self.args.output);
+        let written = (output.store(), output.live, output.dry_run, output.ome, output.compress);
+        let of_image = (&self.geometry, &self.crop, self.stack.shape(), self.stack.element().name(), &info.file_type);
+        let numbers = (self.objects.numbers(), &self.args.seed);
+        check_agreed(
+            self.comm.as_ref(),
+            &format!("{of_image:?} {numbers:?} {:?} {written:?}", self.settings),
+            &self.marks_by_label(),
+        )
     }
 
     fn guides(&self) -> Guides<'_> {
@@ -228,19 +290,24 @@ impl Job {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
         let saving = match &self.identity {
+            _ if self.comm.ranks() > 1 => None,
             Some(known) => save_points_of(&self.args.output, known, self.console.as_ref())?,
             None => save_points(&self.args.output, &self.typed, self.console.as_ref())?,
         };
-        let engine = self.resources.engine(&self.cancel, self.console.clone())?.with_save_points(saving);
+        let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
+        let engine = engine.with_save_points(saving);
         let (voxels, threads, writes) = (self.crop.volume(), self.resources.threads, self.needs_store());
         engine.outlook().expect(with_page(
-            plan(estimate, &self.guides(), voxels, threads, writes),
+            plan(estimate, &self.guides(), self.comm.as_ref(), (voxels, threads, writes)),
             self.has_page && self.args.output.store().is_some(),
         ));
         let result = self.solve_and_write(&engine);
         self.console.clear();
         engine.settle_save_points(&result);
         let outcome = told_of_room(result, most, &self.args.output)?;
+        if self.comm.rank() > 0 {
+            return Ok(outcome);
+        }
         if self.prints && !self.args.output.quiet {
             print(&format!("{}\n{}", table::stages(&engine.reports()), table::objects(&outcome, &self.whole_in())))?;
         }
@@ -260,7 +327,7 @@ impl Job {
         // What is drawn from fields that nobody wants to keep needs them for a while all the same.
         let passing = HiddenFolder::create(&self.resources.scratch)
             .map_err(|e| Error::from_io("cannot make a folder for temporary fields", &e).at(&self.resources.scratch))?;
-        let (store, telling) = begin_store(output, engine)?;
+        let (store, telling) = begin_store_on_ranks(output, engine)?;
         let store = match store {
             None if self.needs_store() => Some(StoreWriter::create(&passing.path().join("passing.zarr"), false)?),
             store => store,
@@ -270,6 +337,12 @@ impl Job {
         let out = (store.as_ref(), taken);
         let outcome = segment(engine, self.stack.as_ref(), &self.crop, &self.guides(), &self.settings, out)
             .map_err(|error| self.marks.marks.named_in(error))?;
+        let ranks = gather_ranks(engine)?;
+        let store = join_store(store, engine)?;
+        if self.comm.rank() > 0 {
+            meshes.map_or(Ok(()), ObjectFiles::place)?;
+            return Ok(outcome);
+        }
         self.note_findings(&outcome);
         note_anchor(self.args.drawn.mesh.as_deref(), &self.geometry, &self.console);
         if let Some(store) = &store {
@@ -286,9 +359,9 @@ impl Job {
             };
             let written = Written { store, engine, console: self.console.as_ref() };
             if self.has_page {
-                written.write(&evidence, || self.report(engine, &outcome))?;
+                written.write(&evidence, || self.report(engine, &ranks, &outcome))?;
             } else {
-                self.report(engine, &outcome).write(&store.file("report.json")?, true)?;
+                self.report(engine, &ranks, &outcome).write(&store.file("report.json")?, true)?;
             }
         }
         engine.check()?;
@@ -306,7 +379,7 @@ impl Job {
             (None, _) => PathBuf::new(),
         };
         meshes.map_or(Ok(()), ObjectFiles::place)?;
-        self.write_copies(engine, &outcome, &folder)?;
+        self.write_copies(engine, (&ranks, &outcome), &folder)?;
         Ok(outcome)
     }
 
@@ -321,12 +394,12 @@ impl Job {
     }
 
     /// The picture and the report beside the store.
-    fn write_copies(&self, engine: &Engine, outcome: &Outcome, folder: &Path) -> Result<()> {
+    fn write_copies(&self, engine: &Engine, (ranks, outcome): (&[RankReport], &Outcome), folder: &Path) -> Result<()> {
         if let Some(path) = &self.args.drawn.picture {
             picture::draw(folder, self.centre(), path, self.args.output.overwrite)?;
         }
         match &self.args.output.report {
-            Some(path) => self.report(engine, outcome).write(path, self.args.output.overwrite),
+            Some(path) => self.report(engine, ranks, outcome).write(path, self.args.output.overwrite),
             None => Ok(()),
         }
     }
@@ -336,48 +409,5 @@ impl Job {
         let seed = self.args.seed.first().map_or([0.0; 3], |seed| seed.centre);
         let (low, high) = self.marks.marks.cloud.bounds().unwrap_or((seed, seed));
         std::array::from_fn(|a| 0.5 * (low[a] + high[a]))
-    }
-
-    /// The marks of each object under its label.
-    fn marks_by_label(&self) -> DataSets {
-        let mut objects: Vec<_> = self.objects.fit.iter().filter(|marks| marks.seed.is_none()).collect();
-        objects.sort_by_key(|marks| marks.object);
-        let mut sets = DataSets::default();
-        for marks in objects {
-            sets.add_labelled(marks.object, &marks.contours.concat());
-        }
-        sets
-    }
-
-    fn report(&self, engine: &Engine, outcome: &Outcome) -> Report<Settings, Found> {
-        let (volume, output) = (&self.args.picture.volume, &self.args.output);
-        let settings = Settings {
-            image: self.names.image.clone(),
-            points: self.names.points.clone(),
-            seeds: self.args.seed.iter().map(|s| [s.centre[0], s.centre[1], s.centre[2], s.radius]).collect(),
-            output: output.store().map(|path| path.display().to_string()),
-            compress: output.compress.name(),
-            ome: output.ome.name(),
-            channel: volume.channel,
-            axes: volume.pages.axes.map(|axes| axes.to_string()),
-            image_index: volume.pages.image_index,
-            time: self.time,
-            level: volume.level,
-            crop_xyz: crop_xyz(&self.crop),
-            image_type: outcome.element.name(),
-            solver: Solver::new(&self.settings, &self.geometry),
-            scratch: self.resources.scratch.display().to_string(),
-        };
-        let ran = Ran {
-            command: self.names.command,
-            typed: &self.typed,
-            resources: &self.resources,
-            console: &self.console,
-            engine,
-            ranks: engine.comm().ranks(),
-            rank_reports: &[],
-            started: self.started,
-        };
-        Report::new(&ran, settings, &outcome.geometry, Found::new(outcome, &self.marks.origins))
     }
 }

@@ -96,7 +96,7 @@ struct Object {
     #[serde(flatten)]
     moved: Moved,
     /// What was taken from the image, and how much marks and image weighed.
-    image_model: &'static str,
+    image_model: String,
     theta: f64,
     rho: f64,
     /// Marks farther than a voxel from the surface.
@@ -245,7 +245,7 @@ impl Object {
             hole: object.hole.map(Into::into),
             band_voxels: object.band_voxels,
             moved: Moved::from(&object.evolution),
-            image_model: object.image_model,
+            image_model: object.image_model.to_string(),
             theta: object.theta,
             rho: object.rho,
             marks_off: object.marks_off,

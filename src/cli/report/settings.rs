@@ -122,7 +122,7 @@ impl Moves {
 pub(crate) struct Moved {
     time_steps: u32,
     sor_iterations: u64,
-    stopped_by: &'static str,
+    stopped_by: String,
     residual: f64,
     /// What the rule that ends the motion looked at after each time step.
     residuals: Vec<f64>,
@@ -133,7 +133,7 @@ impl From<&Evolution> for Moved {
         Self {
             time_steps: evolution.steps,
             sor_iterations: evolution.sor_iterations,
-            stopped_by: evolution.stopped_by,
+            stopped_by: evolution.stopped_by.to_string(),
             residual: evolution.residual,
             residuals: evolution.residuals.clone(),
         }

@@ -115,9 +115,9 @@ pub(crate) fn objects(outcome: &Outcome, whole_in: &str) -> String {
             number(object.beta),
             object.hole.map_or("-".into(), |hole| number(hole.width)),
             object.hole.map_or("-".into(), |hole| place(hole.place, 0.1 * hole.width)),
-            object.image_model.into(),
+            object.image_model.to_string(),
             object.evolution.steps.to_string(),
-            object.evolution.stopped_by.into(),
+            object.evolution.stopped_by.to_string(),
         ]);
     }
     let neighbours = neighbours(outcome);

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::exec::{Comm, SelfComm, launched};
 #[cfg(feature = "mpi")]
 use crate::exec::{Counted, MpiComm};
+use crate::job::resources::Sharing;
 
 /// Refuses what would be done by each of several processes alike: all would write over each other's output.
 ///
@@ -16,13 +17,13 @@ pub(crate) fn check(command: &Command) -> Result<()> {
     let Some(launched) = launched() else { return Ok(()) };
     let (processes, variable) = (launched.processes, launched.variable);
     let name = match command {
-        Command::Segment(_) => "segment",
-        Command::Reconstruct(_) => "reconstruct",
         Command::Batch(_) => "batch",
         Command::Demo(_) => "demo",
         Command::Convert(_) => "convert",
-        Command::Distance(_) | Command::Middle(_) if cfg!(feature = "mpi") => return Ok(()),
-        Command::Distance(_) | Command::Middle(_) => {
+        Command::Distance(_) | Command::Middle(_) | Command::Reconstruct(_) | Command::Segment(_) => {
+            if cfg!(feature = "mpi") {
+                return Ok(());
+            }
             return Err(Error::usage(format!(
                 "{processes} processes were started together ({variable}), but this build knows no MPI: each would do all of the work and \
                  write over the others; build it with --features mpi, or start it once"
@@ -39,6 +40,12 @@ pub(crate) fn check(command: &Command) -> Result<()> {
 /// How many of the processes share this machine.
 pub(crate) fn on_this_machine() -> usize {
     launched().map_or(1, |launched| launched.on_this_machine)
+}
+
+/// How ranks share this machine, of which so many are threads of this process.
+pub(crate) fn sharing(in_process: usize) -> Sharing {
+    let machine = on_this_machine();
+    Sharing { machine, process: if machine > 1 { 1 } else { in_process } }
 }
 
 #[cfg(feature = "mpi")]

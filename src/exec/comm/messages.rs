@@ -52,15 +52,58 @@ pub trait Comm: Send + Sync {
         (0..self.ranks()).filter(|&rank| rank != self.rank()).collect()
     }
 
-    /// What all ranks give, in order of their numbers.
+    /// Sends a message to the rank so many numbers further round, and returns that of the rank as many numbers before. All ranks do.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    fn round(&self, by: usize, message: Vec<u8>) -> Result<Vec<u8>> {
+        let ranks = self.ranks();
+        let (to, from) = ((self.rank() + by) % ranks, (self.rank() + ranks - by) % ranks);
+        let received = if to == from {
+            self.exchange(&[to], vec![message])
+        } else {
+            self.exchange(&[to, from], vec![message, Vec::new()])
+        };
+        received?.pop().ok_or_else(damaged)
+    }
+
+    /// What all ranks give, in order of their numbers: each passes on what it knows to one twice as far away each time (Bruck and
+    /// others 1997), so it takes as many messages as the number of ranks has binary digits.
     ///
     /// # Errors
     /// When another rank is gone.
     fn gather(&self, own: Vec<u8>) -> Result<Vec<Vec<u8>>> {
-        let others = self.others();
-        let mut all = self.exchange(&others, vec![own.clone(); others.len()])?;
-        all.insert(self.rank(), own);
-        Ok(all)
+        let (rank, ranks) = (self.rank(), self.ranks());
+        // Of this rank, of the one before it, and so on.
+        let mut known = vec![own];
+        while known.len() < ranks {
+            let by = known.len();
+            let received = self.round(by, packed(&known[..by.min(ranks - by)]))?;
+            let mut received = Message(&received);
+            while !received.is_empty() {
+                let length = u64::from_le_bytes(received.word()?);
+                known.push(received.take(length as usize)?.to_vec());
+            }
+            if known.len() != ranks.min(2 * by) {
+                return Err(damaged());
+            }
+        }
+        Ok((0..ranks).map(|other| std::mem::take(&mut known[(rank + ranks - other) % ranks])).collect())
+    }
+
+    /// What all ranks agree on, where it does not matter how often each is asked, and in which order (dissemination; Hensgen and others
+    /// 1988).
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    fn agree(&self, own: f64, join: fn(f64, f64) -> f64) -> Result<f64> {
+        let (mut known, mut by) = (own, 1);
+        while by < self.ranks() {
+            let received = self.round(by, known.to_le_bytes().to_vec())?;
+            known = join(known, f64::from_le_bytes(Message(&received).word()?));
+            by *= 2;
+        }
+        Ok(known)
     }
 
     /// The smallest of all ranks' values, none of them NaN.
@@ -68,8 +111,7 @@ pub trait Comm: Send + Sync {
     /// # Errors
     /// When another rank is gone.
     fn least(&self, value: f64) -> Result<f64> {
-        let all = self.gather(value.to_le_bytes().to_vec())?;
-        Ok(all.iter().flat_map(|bytes| numbers(bytes)).fold(f64::INFINITY, f64::min))
+        self.agree(value, f64::min)
     }
 
     /// Whether any rank says yes.
@@ -77,7 +119,7 @@ pub trait Comm: Send + Sync {
     /// # Errors
     /// When another rank is gone.
     fn any(&self, value: bool) -> Result<bool> {
-        Ok(self.gather(vec![u8::from(value)])?.concat().contains(&1))
+        Ok(self.agree(f64::from(u8::from(value)), f64::max)? > 0.0)
     }
 
     /// The sum of all ranks' partial sums, given per cell in grid order and added in that order in f64: a rank's cells
@@ -146,6 +188,16 @@ impl<'m> Message<'m> {
 #[must_use]
 pub(in crate::exec) fn damaged() -> Error {
     Error::failed("a message between ranks is damaged; all ranks must run the same version of the program")
+}
+
+/// Messages one after the other, each with its length before it.
+fn packed(messages: &[Vec<u8>]) -> Vec<u8> {
+    let mut packed = Vec::with_capacity(messages.iter().map(|message| message.len() + 8).sum());
+    for message in messages {
+        packed.extend_from_slice(&(message.len() as u64).to_le_bytes());
+        packed.extend_from_slice(message);
+    }
+    packed
 }
 
 fn numbers(bytes: &[u8]) -> impl Iterator<Item = f64> {

@@ -44,7 +44,16 @@ impl Reports {
 
     /// Counts what another rank did in the same stages.
     pub(in crate::exec) fn count_rank(&self, done: &[StageReport]) {
-        for (own, other) in self.all().iter_mut().zip(done) {
+        let mut all = self.all();
+        let (known, mut counted) = (all.len(), vec![false; all.len()]);
+        for other in done {
+            let same = (0..known).find(|&n| !counted[n] && all[n].name == other.name);
+            let Some(same) = same else {
+                all.push(other.clone());
+                continue;
+            };
+            counted[same] = true;
+            let own = &mut all[same];
             own.bricks += other.bricks;
             own.brick_loads += other.brick_loads;
             own.bytes_read += other.bytes_read;

@@ -45,6 +45,11 @@ impl ShardLayout {
         Self::halved(shape, element, version, 0)
     }
 
+    /// The edges of its shards and of its chunks.
+    pub(super) fn edges(&self) -> [[i64; 3]; 2] {
+        [self.shard, self.chunk]
+    }
+
     /// The same with shards whose edges are halved so many times, down to one chunk: those of a coarser level then cover as much
     /// of the image as those of the finest, and appear as early.
     pub(super) fn halved(shape: [i64; 3], element: ElementType, version: OmeVersion, times: usize) -> Self {

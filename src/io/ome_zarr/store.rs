@@ -208,6 +208,25 @@ impl StoreWriter {
         self.multiscale(group, attributes, levels, (spec.element, spec.content)).map_err(|error| error.at(&self.path))
     }
 
+    /// Begins an image that this process alone writes, also where others have joined to write the store: it describes it too.
+    ///
+    /// # Errors
+    /// When the metadata cannot be written.
+    ///
+    /// # Panics
+    /// As [`StoreWriter::image`].
+    pub fn image_of_one(&self, group: &str, spec: &ImageSpec<'_>) -> Result<ImageWriter> {
+        let levels = plan_levels(spec.geometry);
+        let attributes = metadata::image(spec, &levels);
+        self.begin_image((group, true), attributes, levels, (spec.element, spec.content))
+            .map_err(|error| error.at(&self.path))
+    }
+
+    /// The edges of the shards and of the chunks of the finest level of an image of such a shape.
+    pub(crate) fn finest_edges(&self, shape: [i64; 3], element: ElementType) -> [[i64; 3]; 2] {
+        ShardLayout::new(shape, element, self.root.version()).edges()
+    }
+
     /// Describes an image anew, where its values are known only when they have been written: the window that viewers show.
     ///
     /// # Errors
@@ -298,30 +317,47 @@ impl StoreWriter {
         group: &str,
         attributes: Map<String, Value>,
         levels: Vec<LevelPlan>,
+        of: (ElementType, Content),
+    ) -> Result<ImageWriter> {
+        self.begin_image((group, !self.place.is_joined()), attributes, levels, of)
+    }
+
+    fn begin_image(
+        &self,
+        (group, describes): (&str, bool),
+        attributes: Map<String, Value>,
+        levels: Vec<LevelPlan>,
         (element, content): (ElementType, Content),
     ) -> Result<ImageWriter> {
         let folder = self.inside(group);
-        assert!(self.place.is_joined() || !folder.join("0").exists(), "the store holds an image at {group:?} already");
-        self.ensure_groups(Path::new(group))?;
+        if describes {
+            assert!(!folder.join("0").exists(), "the store holds an image at {group:?} already");
+            self.ensure_groups(Path::new(group))?;
+        }
         let packed = (content, self.compression);
         let create = |(level, plan): (usize, LevelPlan)| {
             let halved = if self.place.is_live() { level } else { 0 };
             let layout = ShardLayout::halved(plan.geometry.shape, element, self.root.version(), halved);
             let level = LevelWriter::new(&folder.join(level.to_string()), &self.path, plan, element, packed, layout)?;
-            if !self.place.is_joined() {
+            if describes {
                 level.describe()?;
             }
             Ok(level.counted_by(self.root.clone()))
         };
         let levels = levels.into_iter().enumerate().map(create).collect::<Result<_>>()?;
-        self.write_group(group, attributes)?;
+        if describes {
+            self.describe_group(group, attributes)?;
+        }
         Ok(ImageWriter { levels })
     }
 
     /// Says what the image in a group is, last: who reads that finds the levels that it names.
     fn write_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
+        if self.place.is_joined() { Ok(()) } else { self.describe_group(group, attributes) }
+    }
+
+    fn describe_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
         match group {
-            _ if self.place.is_joined() => Ok(()),
             "" => self.root.describe(attributes),
             _ => self.root.version().write(&self.inside(group), &metadata::group(Some(attributes))),
         }
@@ -329,9 +365,6 @@ impl StoreWriter {
 
     /// Makes sure that `group` and all groups above it say that they are groups.
     fn ensure_groups(&self, group: &Path) -> Result<()> {
-        if self.place.is_joined() {
-            return Ok(());
-        }
         let _alone = self.lock();
         for folder in group.ancestors() {
             let (folder, version) = (self.place.folder().join(folder), self.root.version());

@@ -88,7 +88,11 @@ pub fn cloud_distance(
     farthest: f32,
 ) -> Result<BrickArray<f32>> {
     let options = Options::up_to(f64::from(farthest));
-    let solved = ranks::solve_once::<f32>(stage, sources, set, (method, Schedule::Front), options, Reads::default())?;
+    // Of several ranks each has all of it in the end.
+    let all =
+        |ranks: usize| if ranks == 1 { Vec::new() } else { set.ids().map(|id| set.grid().brick_box(id)).collect() };
+    let reads = Reads { early: None, boxes: &all(stage.comm().ranks()) };
+    let solved = ranks::solve_once::<f32>(stage, sources, set, (method, Schedule::Front), options, reads)?;
     let mut distance = BrickArray::with_faces(engine.scratch(), set)?;
     let (edge, len) = (set.grid().edge(), set.grid().brick_len());
     let workers = Workers::new(move || vec![0.0; len]);

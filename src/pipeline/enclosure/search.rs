@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::needs::box_bytes;
 use super::pockets::pockets;
 use super::region::{RegionOfInterest, voxel_bounds};
@@ -91,7 +93,7 @@ impl Search<'_> {
 }
 
 /// The hole through which a cloud would leak first.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hole {
     /// Its width: twice the saddle's distance to the cloud.
     pub width: f64,
@@ -217,6 +219,7 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     let mut farthest = progress.farthest_or(search.first_reach);
     loop {
         let around = Around::new(engine, search, farthest, &mut progress)?;
+        let engine = &*engine.by_itself();
         let stage = around.tagging(engine, search);
         // Whoever names a beta knows how deep the inside is.
         let ratio = if search.beta.is_some() { 1.0 } else { PERSISTENCE };
@@ -309,6 +312,7 @@ impl Around {
 
     /// The sides of the cloud; with a radius, what is open is closed by a ball of it, what is inside stays so.
     fn sides(&self, engine: &Engine, search: &Search<'_>, ball: Option<(f64, &BrickArray<u8>)>) -> Result<Sides> {
+        let engine = &*engine.by_itself();
         let stage = self.tagging(engine, search);
         let pockets = ball
             .map(|(radius, inside)| pockets(&stage, engine, &self.region.geometry, &self.distance, inside, radius))
@@ -320,6 +324,7 @@ impl Around {
 
     /// The deepest space of a cloud that encloses nothing: what a given beta could start from.
     fn deepest(&self, engine: &Engine, search: &Search<'_>, progress: &mut Progress<'_>) -> Result<Option<Deepest>> {
+        let engine = &*engine.by_itself();
         let stage = self.tagging(engine, search);
         let flood = || tag(&stage, engine, &self.sources(search), &self.distance, 1.0, |_| false);
         let tagging = progress.step(&[&self.distance], flood)?;

@@ -1,5 +1,7 @@
 //! The settings of the time loop, when it ends, and how it ended (docs/algorithms.md, "Time loop").
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
@@ -44,14 +46,14 @@ pub struct TimeLoop {
 }
 
 /// How the time loop ended.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evolution {
     /// Steps taken.
     pub steps: u32,
     /// Relaxations of a cell, all steps together, mean over the cells.
     pub sor_iterations: u64,
     /// Which rule ended it.
-    pub stopped_by: &'static str,
+    pub stopped_by: Cow<'static, str>,
     /// What the rule looked at when it ended.
     pub residual: f64,
     /// What it looked at after each step.
@@ -89,6 +91,12 @@ impl Taken {
     pub(super) fn evolution(self, stop: Stop, sor_iterations: u64) -> Evolution {
         let stopped_by = if self.ended { stop.name() } else { "max-steps" };
         let residual = self.residuals.last().copied().unwrap_or(f64::INFINITY);
-        Evolution { steps: self.steps, sor_iterations, stopped_by, residual, residuals: self.residuals }
+        Evolution {
+            steps: self.steps,
+            sor_iterations,
+            stopped_by: stopped_by.into(),
+            residual,
+            residuals: self.residuals,
+        }
     }
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering::{AcqRel, Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use super::saved::{PartlyWritten, in_batches};
-use super::share::{Piece, Share};
+use super::share::{Piece, Share, all_threads};
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Saved, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, Slot};
@@ -321,7 +321,22 @@ pub(crate) fn held(geometry: &Geometry, elements: &[ElementType], threads: u64) 
     elements.iter().map(bytes).fold(joined.unwrap_or(0), u64::saturating_add)
 }
 
-/// Fills all levels of an image from `source`; where the stage is resumable, a run that is ended in it is gone on with.
+/// The boxes of an image that this rank of several writes, where [`write_levels`] does and its finest level has such shards and chunks.
+///
+/// # Errors
+/// When another rank is gone.
+pub(crate) fn written_by_this_rank(
+    engine: &Engine,
+    geometry: &Geometry,
+    [shard, chunk]: [[i64; 3]; 2],
+) -> Result<Vec<Box3>> {
+    let comm = engine.comm();
+    let visits = visits_of(geometry.domain(), vec![shard, chunk], all_threads(comm, engine.threads())?);
+    Ok(visits[Share::new(comm, &visits, shard).own()].concat())
+}
+
+/// Fills all levels of an image from `source`, each rank of several its share of them, which it alone has to be able to read; where
+/// the stage is resumable, a run that is ended in it is gone on with.
 ///
 /// # Errors
 /// When a shard cannot be written, scratch runs out or the run is interrupted.
@@ -334,7 +349,8 @@ pub fn write_levels<T: Element>(
 ) -> Result<()> {
     let pyramid = Pyramid::new(engine, image, reduce)?;
     let workers = Workers::new(|| (Vec::new(), Vec::new()));
-    let visits = visits([pyramid.finest()], engine.threads());
+    let comm = engine.comm();
+    let visits = visits([pyramid.finest()], all_threads(comm, engine.threads())?);
     let write = |(values, buffer): &mut (Vec<T>, Vec<T>), visit: &Vec<Box3>| {
         visit.iter().try_for_each(|chunk| {
             values.resize(chunk.len(), T::default());
@@ -346,6 +362,12 @@ pub fn write_levels<T: Element>(
             pyramid.put(chunk, values, buffer)
         })
     };
+    if comm.ranks() > 1 {
+        let share = Share::new(comm, &visits, pyramid.finest().shard_shape());
+        stage.expect(share.own().len() as u64);
+        stage.run(&visits[share.own()], &workers, |worker, visit| write(worker, visit))?;
+        return pyramid.join(&share);
+    }
     in_batches(stage, &[&pyramid], &visits, &mut (), |batch, door, ()| {
         let visit =
             |worker: &mut _, &visit: &usize| if door.opens(visit) { write(worker, &visits[visit]) } else { Ok(()) };

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::error::Result;
-use crate::exec::{Comm, Message, ROUND_BYTES};
+use crate::exec::{Comm, Message, ROUND_BYTES, gather_records};
 use crate::grid::Box3;
 use crate::io::ome_zarr::LevelWriter;
 use crate::store::Element;
@@ -114,6 +114,14 @@ pub(crate) fn parts(visits: &[Vec<Box3>], edge: [i64; 3]) -> Vec<usize> {
     let part = |visit: &Vec<Box3>| visit.first().map(|chunk| [0, 1, 2].map(|a| chunk.lo[a] / edge[a]));
     let is_new = |&n: &usize| n == 0 || part(&visits[n]) != part(&visits[n - 1]);
     (0..visits.len()).filter(is_new).collect()
+}
+
+/// The threads of all ranks: whatever each has, all cut the volume alike.
+///
+/// # Errors
+/// When another rank is gone.
+pub(crate) fn all_threads(comm: &dyn Comm, own: usize) -> Result<usize> {
+    Ok(gather_records(comm, &own)?.into_iter().sum())
 }
 
 /// The largest shard of some levels.

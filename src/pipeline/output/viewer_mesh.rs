@@ -4,6 +4,8 @@
 
 use std::collections::BTreeSet;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Result;
 use crate::exec::Engine;
 use crate::grid::Geometry;
@@ -45,7 +47,7 @@ pub enum Segments {
 }
 
 /// A copy with fewer triangles.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Simplified {
     /// Number of triangles.
     pub triangles: u64,

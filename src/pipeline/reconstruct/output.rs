@@ -117,7 +117,8 @@ impl Reconstruction {
 }
 
 /// Reconstructs the surface of a cloud on a grid, on a box of it that grows as far around the cloud as is needed; `mesh` gets
-/// the surface. Distance and level set are solved by all ranks of the engine, whose number changes no bit.
+/// the surface. Of several ranks, whose number changes no bit, each solves its part of the distance and of the level set and writes its part
+/// of the fields; the first draws the surface.
 ///
 /// # Errors
 /// When the memory is too little, the cloud encloses nothing, the surface vanishes, the mesh is not taken, scratch runs out, or the run is
@@ -156,11 +157,10 @@ pub fn reconstruct_shown(
     drop(growing);
     let told = if settings.keeps_grid { grid.clone() } else { geometry.clone() };
     mesh.on_grid(&told)?;
-    let stage = engine.stage("surface", 0);
-    stage.voxels(band.voxels);
-    let Drawn { measures, hausdorff, spread, lost_points } = surface::draw(&stage, &band.u, &geometry, cloud, mesh)?;
-    stage.finish();
-    if measures.triangles == 0 || lost_points == cloud.len() as u64 {
+    let is_first = engine.comm().rank() == 0;
+    let drawn = if is_first { draw(engine, (&band, &geometry), cloud, mesh)? } else { Drawn::default() };
+    let Drawn { measures, hausdorff, spread, lost_points } = drawn;
+    if is_first && (measures.triangles == 0 || lost_points == cloud.len() as u64) {
         return Err(vanished(settings, grid, larger_beta));
     }
     Ok(Reconstruction {
@@ -179,6 +179,20 @@ pub fn reconstruct_shown(
         window: settings.keeps_grid.then_some(window),
         _held: [held, held_by_box],
     })
+}
+
+/// Draws and measures the surface.
+fn draw(
+    engine: &Engine,
+    (band, geometry): (&Band, &Geometry),
+    cloud: &[[f64; 3]],
+    mesh: &mut dyn MeshSink,
+) -> Result<Drawn> {
+    let stage = engine.stage("surface", 0);
+    stage.voxels(band.voxels);
+    let drawn = surface::draw(&stage, &band.u, geometry, cloud, mesh)?;
+    stage.finish();
+    Ok(drawn)
 }
 
 /// What the cloud encloses.

@@ -82,7 +82,13 @@ impl Begun {
         let stage = engine.resumable_stage(&name("level set", marks), 0);
         stage.voxels(band.voxels);
         let evolution = if rests {
-            Evolution { steps: 0, sor_iterations: 0, stopped_by: "too thin", residual: 0.0, residuals: Vec::new() }
+            Evolution {
+                steps: 0,
+                sor_iterations: 0,
+                stopped_by: "too thin".into(),
+                residual: 0.0,
+                residuals: Vec::new(),
+            }
         } else {
             let shown = Geometry { origin: picture.world.of(geometry.origin), ..geometry.clone() };
             let mut growing = Growing::of(picture.shown_in, &format!("object-{}", marks.object), &shown)?;

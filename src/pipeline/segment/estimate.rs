@@ -7,9 +7,10 @@
 use super::kept::label_bytes;
 use super::neighbours::needs;
 use super::outlined::shape_start::BAND;
+use super::ranks::parts::own_objects;
 use super::reach::first_reach;
 use super::settings::{Guides, SegmentSettings};
-use crate::exec::{Footprint, Plan};
+use crate::exec::{Comm, Footprint, Plan};
 use crate::grid::{Box3, BrickGrid};
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
 use crate::pipeline::enclosure::needs::{
@@ -197,9 +198,14 @@ pub fn estimate(
     }
 }
 
-/// The stages of a segmentation, and what each will probably take.
+/// The stages of a segmentation on this rank, and what each will probably take.
 #[must_use]
-pub fn plan(estimate: &Estimate, guides: &Guides<'_>, voxels: u64, threads: usize, writes: bool) -> Plan {
+pub fn plan(
+    estimate: &Estimate,
+    guides: &Guides<'_>,
+    comm: &dyn Comm,
+    (voxels, threads, writes): (u64, usize, bool),
+) -> Plan {
     let all = voxels as f64 / threads as f64;
     let mut plan = vec![("read stack".to_owned(), all * STACK_SECONDS[0])];
     if writes {
@@ -215,7 +221,8 @@ pub fn plan(estimate: &Estimate, guides: &Guides<'_>, voxels: u64, threads: usiz
     };
     let surfaces: Vec<f64> = guides.objects.iter().map(surface).collect();
     let near = estimate.near_voxels as f64 * SECONDS_PER_NEAR_VOXEL / threads as f64 / surfaces.iter().sum::<f64>();
-    for (marks, surface) in guides.objects.iter().zip(surfaces) {
+    for n in own_objects(comm, guides.objects, guides.geometry) {
+        let (marks, surface) = (&guides.objects[n], surfaces[n]);
         let stages = OBJECT_STAGES.iter();
         plan.extend(stages.map(|(name, share)| (format!("{name} {}", marks.object), near * surface * share)));
         plan.extend(writes.then(|| (viewer_mesh::STAGE.to_owned(), near * surface * VIEWER_SHARE)));

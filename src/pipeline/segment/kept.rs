@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::begun::Solution;
 use super::neighbours::Joined;
 use super::object_report::ObjectReport;
+use super::objects::Solved;
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, Slot};
@@ -62,10 +62,8 @@ pub(super) fn labels_of(engine: &Engine, geometry: &Geometry, joined: &Joined<'_
 }
 
 /// The objects without what they were solved with.
-pub(super) fn objects_of(solved: Vec<(Solution, ObjectReport)>) -> (Vec<KeptObject>, Vec<ObjectReport>) {
-    let kept = |(Solution { geometry, u, .. }, report): (Solution, ObjectReport)| {
-        (KeptObject { label: report.label, geometry, u }, report)
-    };
+pub(super) fn objects_of(solved: Vec<Solved>) -> (Vec<KeptObject>, Vec<ObjectReport>) {
+    let kept = |Solved { geometry, u, report, .. }: Solved| (KeptObject { label: report.label, geometry, u }, report);
     solved.into_iter().map(kept).unzip()
 }
 

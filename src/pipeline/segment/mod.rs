@@ -21,6 +21,7 @@ mod objects;
 pub mod outlined;
 mod output;
 pub(crate) mod picture;
+mod ranks;
 mod reach;
 mod seed;
 mod settings;

@@ -1,12 +1,16 @@
 //! What is told of an object when it is solved, or why it was not.
 
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
 use crate::kernel::surface::{Hausdorff, Measures, Spread};
 use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::level_set::time_loop::Evolution;
 use crate::pipeline::output::viewer_mesh::Simplified;
 
 /// What is reported of a solved object.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ObjectReport {
     /// The object's number, its label.
     pub label: u32,
@@ -29,7 +33,7 @@ pub struct ObjectReport {
     /// Marks that are farther from it than the largest spacing.
     pub marks_off: u64,
     /// What was taken from the image: `level`, `wall`, `edge`, `none`.
-    pub image_model: &'static str,
+    pub image_model: Cow<'static, str>,
     /// Weight of the pull towards the marks.
     pub theta: f64,
     /// Weight of the image.
@@ -41,7 +45,7 @@ pub struct ObjectReport {
 }
 
 /// What leaving out each outline in turn tells.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossValidation {
     /// Mean distance of the marks that were left out.
     pub mean: f64,
@@ -52,7 +56,7 @@ pub struct CrossValidation {
 }
 
 /// An object that could not be solved.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refused {
     /// Its number.
     pub label: u32,

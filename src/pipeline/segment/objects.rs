@@ -8,12 +8,14 @@ use super::object_report::ObjectReport;
 use super::object_report::Refused;
 use super::outlined::cross_validate::cross_validate;
 use super::outlined::outlines::scatter_of;
-use super::outlined::survey::{Looking, Outlined, Trust, left_out_of, trust};
+use super::outlined::survey::{Looking, Outlined, Told, Trust, left_out_of, trust};
 use super::picture::Picture;
+use super::ranks::parts::own_objects;
+use super::ranks::solved::{in_order, of_all_ranks};
 use super::settings::{Guides, ImageModel, SegmentSettings, Start};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
-use crate::grid::{Geometry, digits};
+use crate::grid::{Box3, Geometry, digits};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::Hausdorff;
@@ -23,16 +25,28 @@ use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::output::viewer_mesh::{Segments, for_viewers};
 use crate::pipeline::surface::{self, Drawn};
-use crate::store::{Element, ElementType};
+use crate::store::{BrickArray, Element, ElementType};
 
 /// What was solved, in order of the labels, and what was not.
 pub(super) struct Objects {
-    pub solved: Vec<(Solution, ObjectReport)>,
+    pub solved: Vec<Solved>,
     pub refused: Vec<Refused>,
 }
 
-/// Solves all objects. They are solved on a grid whose first voxel is the origin, so that where the image lies in the world
-/// changes nothing but their place.
+/// A solved object whose surface is drawn.
+pub(super) struct Solved {
+    /// Its box in voxels of the image; may reach past it.
+    pub window: Box3,
+    /// The grid of its box.
+    pub geometry: Geometry,
+    /// The segmentation function.
+    pub u: BrickArray<f32>,
+    /// What is told of it.
+    pub report: ObjectReport,
+}
+
+/// Solves all objects, of several ranks each some; all ranks then have all. They are solved on a grid whose first voxel is the
+/// origin, so that where the image lies in the world changes nothing but their place.
 ///
 /// # Errors
 /// When none can be solved, scratch runs out, the output cannot be written or the run is interrupted.
@@ -50,28 +64,33 @@ pub(super) fn solve_all<T: Element>(
     let grid = Geometry { origin: [0.0; 3], ..picture.geometry.clone() };
     let picture = Picture { geometry: &grid, ..*picture };
     let local: Vec<ObjectMarks> = objects.iter().map(|marks| marks.moved(origin.map(|v| -v))).collect();
-    let most = at_once(engine, &local, &grid);
-    let (outlined, trusts) = survey(engine, &picture, &local, settings, most)?;
-    let all: Vec<usize> = (0..objects.len()).collect();
-    let found = engine.side_by_side(&all, most, |engine, &n| {
-        let outlined = outlined[n].as_ref();
-        let solved = solve(engine, &picture, &local[n], outlined.zip(trusts[n]), settings).and_then(|solution| {
+    let own = own_objects(engine.comm(), objects, picture.geometry);
+    let most = at_once(engine, own.iter().map(|&n| &local[n]), &grid);
+    let seen = survey(engine, &picture, (&local, &own), settings, most)?;
+    let items: Vec<(usize, &Seen)> = own.iter().copied().zip(&seen).collect();
+    let work = |engine: &Engine, &(n, seen): &(usize, &Seen)| {
+        let outlined = seen.as_ref().map(|(outlined, _)| outlined);
+        let by = seen.as_ref().map(|(outlined, trust)| (outlined, *trust));
+        let solved = solve(engine, &picture, &local[n], by, settings).and_then(|solution| {
             let solution = solution.moved(origin);
             let mut report = draw(engine, &solution, &objects[n], settings, (store, meshes), several)?;
             early.map_or(Ok(()), |early| early.rest(engine, n, report.label, &solution))?;
             if let Some(outlined) = outlined.filter(|_| settings.cross_validate) {
                 report.cross_validation = cross_validate(engine, outlined, &grid)?;
             }
-            Ok((solution, report))
+            let Solution { window, geometry, u, .. } = solution;
+            Ok(Solved { window, geometry, u, report })
         });
         match solved {
             // One object that cannot be solved does not stop the others.
             Err(error) if matches!(error.kind(), ErrorKind::Input | ErrorKind::Vanished) && several => {
-                Ok(Err(Refused { label: objects[n].object, reason: error.to_string() }))
+                Ok((n, Err(Refused { label: objects[n].object, reason: error.to_string() })))
             }
-            other => other.map(Ok),
+            other => other.map(|solved| (n, Ok(solved))),
         }
-    })?;
+    };
+    let found = engine.by_itself().side_by_side(&items, most, work)?;
+    let found = told_to_all(engine, found)?;
     let mut solved = Vec::new();
     for object in found {
         match object {
@@ -90,15 +109,29 @@ pub(super) fn solve_all<T: Element>(
 /// Voxels of the largest box around an object that is small: larger ones keep all cores busy.
 const SMALL: u64 = 2 << 20;
 
+/// What became of the objects of all ranks.
+fn told_to_all(
+    engine: &Engine,
+    own: Vec<(usize, std::result::Result<Solved, Refused>)>,
+) -> Result<Vec<std::result::Result<Solved, Refused>>> {
+    if engine.comm().ranks() == 1 {
+        return Ok(own.into_iter().map(|(_, object)| object).collect());
+    }
+    let stage = engine.stage("exchange of objects", 0);
+    let all = of_all_ranks(&stage, own)?;
+    stage.finish();
+    Ok(all)
+}
+
 /// How many objects are solved at a time: as many as there are threads where all are small and half of the window holds
 /// what they take.
-fn at_once(engine: &Engine, objects: &[ObjectMarks], grid: &Geometry) -> usize {
+fn at_once<'a>(engine: &Engine, objects: impl Iterator<Item = &'a ObjectMarks>, grid: &Geometry) -> usize {
     let all = grid.domain().volume();
     let volume = |marks: &ObjectMarks| match marks.seed {
         Some(_) => all,
         None => voxel_bounds(&marks.contours.concat(), grid).volume(),
     };
-    let largest = objects.iter().map(volume).max().unwrap_or(0);
+    let largest = objects.map(volume).max().unwrap_or(0);
     if largest > SMALL {
         return 1;
     }
@@ -107,33 +140,37 @@ fn at_once(engine: &Engine, objects: &[ObjectMarks], grid: &Geometry) -> usize {
     (room as usize).clamp(1, engine.threads())
 }
 
-/// Each object's outlines and how far they are trusted; none where its marks are none.
-type Surveyed = (Vec<Option<Outlined>>, Vec<Option<Trust>>);
+/// An object's outlines and how far they are trusted; none where its marks are none.
+type Seen = Option<(Outlined, Trust)>;
 
-/// Looks at all objects that are marked by outlines, unless the papers' start was asked for.
+/// Looks at this rank's `own` of the objects, as far as they are marked by outlines, unless the papers' start was asked for. How far
+/// outlines are trusted all objects tell together.
 fn survey<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
-    objects: &[ObjectMarks],
+    (objects, own): (&[ObjectMarks], &[usize]),
     settings: &SegmentSettings,
     most: usize,
-) -> Result<Surveyed> {
+) -> Result<Vec<Seen>> {
     let stage = engine.stage("scatter of marks", 0);
     let scatter = scatter_of(&stage, objects, picture.geometry)?;
     stage.finish();
     let looks = settings.uses_image() && settings.image != ImageModel::Edge;
     let left_out = left_out_of(objects.len());
-    let numbered: Vec<(usize, &ObjectMarks)> = objects.iter().enumerate().collect();
-    let outlined = engine.side_by_side(&numbered, most, |engine, &(number, marks)| match settings.start {
-        Start::Auto if marks.seed.is_none() => {
-            Outlined::new(engine, picture, marks, Looking { scatter, looks, left_out: left_out(number) })
+    let look = |engine: &Engine, &number: &usize| match settings.start {
+        Start::Auto if objects[number].seed.is_none() => {
+            let by = Looking { scatter, looks, left_out: left_out(number) };
+            Outlined::new(engine, picture, &objects[number], by)
         }
         _ => Ok(None),
-    })?;
+    };
+    let outlined = engine.by_itself().side_by_side(own, most, look)?;
+    let told = own.iter().zip(&outlined).filter_map(|(&n, seen)| Some((n, seen.as_ref()?.told(picture.geometry))));
+    let told = Told::joined(in_order(engine.comm(), told.collect())?);
     let stage = engine.stage("image model", 0);
-    let trusts = trust(&stage, &outlined, picture.geometry, scatter, settings.image)?;
+    let trusts = trust(&stage, &outlined, &told, (picture.geometry, scatter), settings.image)?;
     stage.finish();
-    Ok((outlined, trusts))
+    Ok(outlined.into_iter().zip(trusts).map(|(outlined, trust)| outlined.zip(trust)).collect())
 }
 
 /// Extracts, measures and writes an object's surface, and writes its segmentation function.
@@ -176,7 +213,7 @@ fn draw(
         hausdorff,
         spread,
         marks_off: lost_points,
-        image_model: solution.image_model,
+        image_model: solution.image_model.into(),
         theta: solution.theta,
         rho: solution.rho,
         cross_validation: None,
@@ -192,7 +229,7 @@ fn write_fields(engine: &Engine, solution: &Solution, label: u32, store: &StoreW
         let group = if several { format!("{name}/object-{label}") } else { name.into() };
         let spec = ImageSpec { name, geometry, element, content, window: Some([0.0, high]), extremes: None };
         let stage = engine.resumable_stage(&format!("write {name} {label}"), 0);
-        write_levels::<f32>(&stage, engine, store.image(&group, &spec)?, field, Reduce::Mean)?;
+        write_levels::<f32>(&stage, engine, store.image_of_one(&group, &spec)?, field, Reduce::Mean)?;
         stage.finish();
     }
     Ok(())

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::begun::Solution;
 use super::estimate::estimate;
 use super::kept::{Kept, labels_of, objects_of};
 use super::label_image::early::begin_early;
@@ -11,10 +10,10 @@ use super::labels::Placed;
 use super::marks_table::write_marks;
 use super::meshes::ObjectMeshes;
 use super::neighbours::Found;
-use super::object_report::ObjectReport;
-use super::object_report::Refused;
-use super::objects::{Objects, solve_all};
+use super::object_report::{ObjectReport, Refused};
+use super::objects::{Objects, Solved, solve_all};
 use super::picture::{Picture, World};
+use super::ranks::parts::kept_parts;
 use super::settings::{Guides, SegmentSettings};
 use super::tissue::{join_objects, write_faces};
 use crate::error::{Error, Result};
@@ -23,9 +22,9 @@ use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::Contact;
 use crate::pipeline::image::as_read::AsRead;
-use crate::pipeline::image::ingest::{Image, ingest};
+use crate::pipeline::image::ingest::{Image, Ingest, ingest};
 use crate::pipeline::output::pyramid::{Reduce, held, write_levels};
-use crate::store::{ElementType, Sample, SampleWork, VolumeSource};
+use crate::store::{BoxSource, Element, ElementType, Sample, SampleWork, VolumeSource};
 
 /// What a segmentation found.
 #[derive(Clone, Debug)]
@@ -117,9 +116,9 @@ impl SampleWork for Alone<'_> {
         let needs = estimate(stack, crop, &nobody, settings, engine.threads() as u64, true);
         let _held = engine.reserve(needs.footprint)?;
         let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
-        let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles, None)?;
+        let image = ingest::<T>(&stage, engine, &ingest_of(stack, crop, settings))?;
         stage.finish();
-        write_image(engine, geometry, &image, store)
+        write_image(engine, geometry, (&image, &image.bricks), store)
     }
 }
 
@@ -149,9 +148,13 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let needs = estimate(stack, crop, guides, settings, engine.threads() as u64, store.is_some());
     let _held = engine.reserve(needs.footprint)?;
     let stage = engine.stage("read stack", stack.natural_boxes(crop).len() as u64);
-    let shown_in = store.filter(|store| store.live().is_some());
+    let comm = engine.comm();
+    // Of several ranks none sees all of the image, or of the objects, before the end.
+    let shown_in = store.filter(|store| store.live().is_some() && comm.ranks() == 1);
     let as_read = shown_in.map(|store| begin_image::<T>(engine, guides.geometry, store)).transpose()?.flatten();
-    let image = ingest::<T>(&stage, engine, stack, crop, settings.brick, settings.percentiles, as_read.as_ref())?;
+    let parts = kept_parts(engine, guides, settings, (T::TYPE, store))?;
+    let read = Ingest { parts: parts.as_deref(), as_read: as_read.as_ref(), ..ingest_of(stack, crop, settings) };
+    let image = ingest::<T>(&stage, engine, &read)?;
     stage.finish();
     if settings.uses_image() && image.extremes[0] == image.extremes[1] {
         let value = image.extremes[0];
@@ -181,26 +184,32 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
     let origin = guides.geometry.position(crop.lo.map(|v| -v));
     let whole = Geometry { shape: stack.shape(), origin, ..guides.geometry.clone() };
     let world = World { whole: &whole, origin: guides.geometry.origin };
-    let picture = Picture { voxels: &image.bricks, range: image.range, geometry: guides.geometry, world, shown_in };
+    let voxels = image.whole(stack, crop);
+    let picture = Picture { voxels: &voxels, range: image.range, geometry: guides.geometry, world, shown_in };
     let early = shown_in.map(|store| begin_early(engine, guides, settings, store)).transpose()?;
     let early = early.as_deref();
     let Objects { solved, refused } = solve_all(engine, &picture, guides, settings, (store, meshes), early)?;
     let marked = guides.objects.iter().map(|marks| marks.object);
     let highest = marked.chain(refused.iter().map(|refused| refused.label)).max().unwrap_or(0);
-    let joined = join_objects(engine, guides.geometry, &image, placed(&solved), settings)?;
-    let label_voxels = write_labels(engine, guides.geometry, (&joined, highest), &solved, (store, early))?;
+    let joined = join_objects(&engine.by_itself(), guides.geometry, (&image, &voxels), placed(&solved), settings)?;
+    let labels: Vec<u32> = solved.iter().map(|object| object.report.label).collect();
+    let label_voxels = write_labels(engine, guides.geometry, (&joined, highest), &labels, (store, early))?;
+    // The first rank draws and tells for all.
+    let is_first = comm.rank() == 0;
     let contacts = match solved.len() {
-        0 | 1 => Vec::new(),
-        _ => write_faces(engine, guides.geometry, &joined, settings, store)?,
+        2.. if is_first => write_faces(&engine.by_itself(), guides.geometry, &joined, settings, store)?,
+        _ => Vec::new(),
     };
     let neighbours = joined.found.clone();
     let labels = keeps.then(|| labels_of(engine, guides.geometry, &joined)).transpose()?;
     drop(joined);
     if let Some(store) = store {
         if !is_written {
-            write_image(engine, guides.geometry, &image, store)?;
+            write_image(engine, guides.geometry, (&image, &voxels), store)?;
         }
-        write_marks(store, guides.objects)?;
+        if is_first {
+            write_marks(store, guides.objects)?;
+        }
     }
     let (objects, reports) = objects_of(solved);
     let kept = labels.map(|labels| Kept { objects, labels });
@@ -212,11 +221,21 @@ fn run<T: Sample>(job: &Job<'_>) -> Result<(Outcome, Option<Kept>)> {
 }
 
 /// The objects on the image's grid.
-fn placed(solved: &[(Solution, ObjectReport)]) -> Vec<Placed<'_>> {
+fn placed(solved: &[Solved]) -> Vec<Placed<'_>> {
     solved
         .iter()
-        .map(|(s, report)| Placed { label: report.label, window: s.window, u: &s.u, volume: report.measures.volume })
+        .map(|s| Placed { label: s.report.label, window: s.window, u: &s.u, volume: s.report.measures.volume })
         .collect()
+}
+
+/// The whole of a part of a stack, as the settings want it.
+fn ingest_of<'a, T: Element>(
+    volume: &'a dyn VolumeSource,
+    crop: &'a Box3,
+    settings: &SegmentSettings,
+) -> Ingest<'a, T> {
+    let (edge, percentiles) = (settings.brick, settings.percentiles);
+    Ingest { volume, crop, edge, percentiles, parts: None, as_read: None }
 }
 
 fn image_spec<'a, T: Sample>(geometry: &'a Geometry, image: &Image<T>) -> ImageSpec<'a> {
@@ -233,11 +252,16 @@ fn begin_image<T: Sample>(engine: &Engine, geometry: &Geometry, store: &StoreWri
     AsRead::new(engine, store.image("", &spec)?, geometry, held).map(Some)
 }
 
-fn write_image<T: Sample>(engine: &Engine, geometry: &Geometry, image: &Image<T>, store: &StoreWriter) -> Result<()> {
+fn write_image<T: Sample>(
+    engine: &Engine,
+    geometry: &Geometry,
+    (image, voxels): (&Image<T>, &dyn BoxSource<T>),
+    store: &StoreWriter,
+) -> Result<()> {
     let stage = engine.resumable_stage("write image", 0);
     stage.voxels(geometry.domain().volume());
     let written = store.image("", &image_spec(geometry, image))?;
-    write_levels::<T>(&stage, engine, written, &image.bricks, Reduce::Mean)?;
+    write_levels::<T>(&stage, engine, written, voxels, Reduce::Mean)?;
     stage.finish();
     Ok(())
 }

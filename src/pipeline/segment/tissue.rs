@@ -12,17 +12,17 @@ use crate::kernel::surface::Contact;
 use crate::pipeline::image::ingest::Image;
 use crate::pipeline::image::intensity::Normalised;
 use crate::pipeline::output::viewer_mesh::{Segments, for_viewers};
-use crate::store::{Element, NoMesh};
+use crate::store::{BoxSource, Element, NoMesh};
 
 /// Joins objects; walls between them are looked for in the image where that has a say in them.
 pub(super) fn join_objects<'a, T: Element>(
     engine: &Engine,
     geometry: &Geometry,
-    image: &Image<T>,
+    (image, voxels): (&Image<T>, &dyn BoxSource<T>),
     objects: Vec<Placed<'a>>,
     settings: &SegmentSettings,
 ) -> Result<Joined<'a>> {
-    let normalised = Normalised::new(&image.bricks, image.range, geometry.domain());
+    let normalised = Normalised::new(voxels, image.range, geometry.domain());
     let joining = Joining {
         geometry,
         image: settings.uses_image().then_some(&normalised),

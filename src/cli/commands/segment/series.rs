@@ -28,7 +28,7 @@ use crate::cli::report::table;
 use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals;
 use crate::error::{Error, ErrorKind, Result};
-use crate::exec::{Cancel, Progress};
+use crate::exec::{Cancel, Progress, SelfComm};
 use crate::grid::Geometry;
 use crate::io::ome_zarr::{StoreWriter, TimeAxis};
 use crate::io::stack::formats;
@@ -111,7 +111,14 @@ impl<'a> Series<'a> {
         let console = Console::after(Voice::of_run(&args.output), said);
         let names = Names::of(&args);
         let mut marking = |_: &OpenStack, console: &Console| marking(console);
-        let job = Job::of_time(names, args, self.typed, (self.cancel.clone(), console), time, &mut marking)?;
+        let job = Job::of_time(
+            names,
+            args,
+            self.typed,
+            (self.cancel.clone(), console, Arc::new(SelfComm)),
+            time,
+            &mut marking,
+        )?;
         Ok(Job { prints: false, ..job })
     }
 

@@ -1,4 +1,5 @@
 //! Grey values along the normals of an outline: what the image shows where a border was marked.
+use serde::{Deserialize, Serialize};
 
 use crate::grid::Box3;
 
@@ -10,7 +11,7 @@ pub const LEN: usize = 2 * REACH + 1;
 pub const STEP: f64 = 0.5;
 
 /// Grey values from the inside to the outside; the border is in the middle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Profile(pub [f32; LEN]);
 
 /// Places of a profile that count as inside and as outside: 3 to 6 spacings from the border.

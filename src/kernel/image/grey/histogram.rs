@@ -4,6 +4,8 @@
 //! A value is counted under the upper bits of its f32 pattern, which are ordered as the numbers are. Integers up to 2^8
 //! have bins of their own; counts add up the same in any order.
 
+use serde::{Deserialize, Serialize};
+
 use super::grey_range::GreyRange;
 use crate::store::Element;
 
@@ -71,6 +73,35 @@ impl Histogram {
     }
 }
 
+/// A histogram in few bytes: of values that occur in it alone.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Told {
+    bins: Vec<(u32, u64)>,
+    low: f64,
+    high: f64,
+}
+
+impl Histogram {
+    /// What others need to count the same.
+    #[must_use]
+    pub fn told(&self) -> Told {
+        let bins = (0..).zip(&self.bins).filter(|(_, count)| **count > 0).map(|(bin, &count)| (bin, count));
+        Told { bins: bins.collect(), low: self.low, high: self.high }
+    }
+
+    /// Adds what another one tells.
+    #[must_use]
+    pub fn and_told(mut self, other: &Told) -> Self {
+        for &(bin, count) in &other.bins {
+            if let Some(own) = self.bins.get_mut(bin as usize) {
+                *own += count;
+            }
+        }
+        (self.low, self.high) = (self.low.min(other.low), self.high.max(other.high));
+        self
+    }
+}
+
 /// The bin of a value; bins are ordered as values are.
 fn bin_of(value: f64) -> u32 {
     let bits = (value as f32).to_bits();
@@ -103,6 +134,15 @@ mod tests {
         let constant = of(&[5.0f32; 8]).range([1.0, 99.0]);
         assert_eq!(constant.low, constant.high);
         assert_eq!(Histogram::default().add(&[1.0, f32::NAN, 2.0]), Err(1));
+    }
+
+    #[test]
+    fn told_counts_are_those_of_all_values() {
+        let values: Vec<f32> = (0..5000u16).map(|n| f32::from(n * 7 % 1999) - 700.5).collect();
+        let (one, other) = values.split_at(1234);
+        let joined = Histogram::default().and_told(&of(one).told()).and_told(&of(other).told());
+        let all = of(&values);
+        assert!(joined.bins == all.bins && joined.extremes() == all.extremes());
     }
 
     #[test]

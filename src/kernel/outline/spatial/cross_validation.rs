@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use rstar::RTree;
+use serde::{Deserialize, Serialize};
 
 use super::fitted::Fitted;
 use crate::kernel::outline::planar::section::Section;
@@ -13,7 +14,7 @@ const NEAREST: usize = 6;
 const SAMPLES: usize = 200;
 
 /// A mark of a section that was left out.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Where it is.
     pub mark: [f64; 3],

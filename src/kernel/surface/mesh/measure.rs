@@ -1,6 +1,7 @@
 //! `SurfaceMeasure`: volume, area, closedness and pieces of a mesh, summed while its triangles pass.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::growing::Growing;
 use crate::kernel::surface::{Components, EdgeTally};
@@ -21,7 +22,7 @@ pub struct SurfaceMeasure {
 }
 
 /// What a mesh measures, in the physical unit of its positions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
     /// Enclosed volume, positive for outward triangles; has a meaning only for a closed mesh.
     pub volume: f64,

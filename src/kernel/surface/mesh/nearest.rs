@@ -3,6 +3,7 @@
 //! Each triangle lies in the one cell that holds the centre of its bounding box; triangles far larger than the cells
 //! go into coarser grids, each twice as wide as the one before. Cells are searched in shells of growing Chebyshev
 //! distance around the query until no triangle of the next shell can be nearer than the one found.
+use serde::{Deserialize, Serialize};
 
 use crate::kernel::geometry::triangle::Triangle;
 
@@ -24,7 +25,7 @@ pub struct Nearest {
 }
 
 /// Directed Hausdorff distances from a set of points to a surface: over each point's nearest distance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hausdorff {
     /// Mean distance.
     pub mean: f64,

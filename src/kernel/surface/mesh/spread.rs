@@ -1,11 +1,13 @@
 //! How distances of points from a surface are spread: a histogram of bins of one width.
 
+use serde::{Deserialize, Serialize};
+
 /// Bins between 0 and the largest distance.
 const BINS: usize = 24;
 
 /// How many distances fall into each bin; bin `n` holds those from `n * width` up to `(n + 1) * width`, the last one its upper end
 /// too.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// The width of a bin, a length.
     pub width: f64,

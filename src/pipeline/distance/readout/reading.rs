@@ -22,7 +22,7 @@ use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::schedule::passing::Passed;
 use crate::pipeline::output::pyramid::{visits, visits_of};
 use crate::pipeline::output::saved::in_batches;
-use crate::pipeline::output::share::{Share, largest_shard};
+use crate::pipeline::output::share::{Share, all_threads, largest_shard};
 
 /// Edges of the boxes that voxels are looked at in where nothing is written: as if something was.
 const LOOK_EDGES: [[i64; 3]; 2] = [[128; 3], [64; 3]];
@@ -63,7 +63,7 @@ impl<'a, P: Precision> Reading<'a, P> {
     pub(crate) fn new(what: ReadOut<'a, P>, engine: &'a Engine, store: Option<&'a StoreWriter>) -> Result<Self> {
         let (geometry, sets) = (what.geometry, what.sets);
         let images = store.map(|store| Images::<P>::new(engine, geometry, sets, what.wanted, store)).transpose()?;
-        let threads = all_threads(engine)?;
+        let threads = all_threads(engine.comm(), engine.threads())?;
         let finest = images.as_ref().map(Images::finest);
         let visits = match &finest {
             Some(finest) => visits(finest.iter().copied(), threads),
@@ -211,11 +211,6 @@ impl Found {
         let (fixed, triangles) = (self.fixed + other.fixed, self.triangles + other.triangles);
         Self { measured: self.measured.and(other.measured), fixed, triangles }
     }
-}
-
-/// The threads of all ranks: whatever each has, all cut the volume alike.
-fn all_threads(engine: &Engine) -> Result<usize> {
-    Ok(gather_records(engine.comm(), &engine.threads())?.into_iter().sum())
 }
 
 impl<P: Precision> Early<P> for Reading<'_, P> {

@@ -5,14 +5,12 @@ use std::collections::BTreeMap;
 use super::early::Early;
 use super::image::{begin_image, type_for};
 use crate::error::Result;
-use crate::exec::{Engine, Stage, Workers};
+use crate::exec::{Comm, Engine, Stage, Workers, gather_records};
 use crate::grid::{Box3, BrickGrid, Geometry};
 use crate::io::ome_zarr::{ImageWriter, StoreWriter};
 use crate::kernel::image::labels;
 use crate::pipeline::output::pyramid::{Reduce, write_levels};
-use crate::pipeline::segment::begun::Solution;
 use crate::pipeline::segment::neighbours::Joined;
-use crate::pipeline::segment::object_report::ObjectReport;
 use crate::store::{BoxSource, Element, ElementType};
 
 /// Writes what is not written of the labels, and counts their voxels. The type of the image is that for the highest label of all
@@ -21,7 +19,7 @@ pub(crate) fn write_labels(
     engine: &Engine,
     geometry: &Geometry,
     (volume, highest): (&Joined<'_>, u32),
-    solved: &[(Solution, ObjectReport)],
+    solved: &[u32],
     (store, early): (Option<&StoreWriter>, Option<&dyn Early>),
 ) -> Result<BTreeMap<u32, u64>> {
     let stage = engine.resumable_stage("write labels", 0);
@@ -29,7 +27,7 @@ pub(crate) fn write_labels(
     match (store, early) {
         (_, Some(early)) => early.finish(&stage, engine, volume)?,
         (Some(store), None) => {
-            let labels = || solved.iter().map(|(_, report)| report.label);
+            let labels = || solved.iter().copied();
             match type_for(highest) {
                 ElementType::U8 => {
                     write_as::<u8>(&stage, engine, begin_image::<u8>(store, geometry, labels())?, volume)
@@ -42,7 +40,7 @@ pub(crate) fn write_labels(
         }
         (None, None) => {}
     }
-    let counts = count_labels(&stage, geometry, volume)?;
+    let counts = count_labels(&stage, engine.comm(), geometry, volume)?;
     stage.finish();
     Ok(counts)
 }
@@ -51,10 +49,16 @@ fn write_as<T: Element>(stage: &Stage<'_>, engine: &Engine, image: ImageWriter, 
     write_levels::<T>(stage, engine, image, volume, Reduce::Mode)
 }
 
-/// Voxels of each label.
-fn count_labels(stage: &Stage<'_>, geometry: &Geometry, volume: &Joined<'_>) -> Result<BTreeMap<u32, u64>> {
+/// Voxels of each label; each rank counts in its share of the grid.
+fn count_labels(
+    stage: &Stage<'_>,
+    comm: &dyn Comm,
+    geometry: &Geometry,
+    volume: &Joined<'_>,
+) -> Result<BTreeMap<u32, u64>> {
     let grid = BrickGrid::new(geometry.shape, 64);
-    let parts: Vec<Box3> = (0..grid.len()).map(|id| grid.brick_box(id)).collect();
+    let share = |rank: usize| grid.len() * rank as u64 / comm.ranks() as u64;
+    let parts: Vec<Box3> = (share(comm.rank())..share(comm.rank() + 1)).map(|id| grid.brick_box(id)).collect();
     let counts = stage.run(&parts, &Workers::new(Vec::new), |labels, part| {
         if BoxSource::<u32>::constant_in(volume, part) == Some(0) {
             return Ok(BTreeMap::new());
@@ -63,8 +67,16 @@ fn count_labels(stage: &Stage<'_>, geometry: &Geometry, volume: &Joined<'_>) -> 
         volume.read_box(part, labels)?;
         Ok(labels::count(labels))
     })?;
-    Ok(counts.into_iter().flatten().fold(BTreeMap::new(), |mut all, (label, n)| {
+    let own = summed(counts.into_iter().flatten());
+    if comm.ranks() == 1 {
+        return Ok(own);
+    }
+    Ok(summed(gather_records(comm, &own)?.into_iter().flatten()))
+}
+
+fn summed(counts: impl Iterator<Item = (u32, u64)>) -> BTreeMap<u32, u64> {
+    counts.fold(BTreeMap::new(), |mut all, (label, n)| {
         *all.entry(label).or_default() += n;
         all
-    }))
+    })
 }

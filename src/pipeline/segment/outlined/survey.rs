@@ -1,6 +1,8 @@
 //! What the outlines and the image say before anything is solved: which border the image shows under the marks, how
 //! well it tells where that is, and how sure the shape is between the outlines.
 
+use serde::{Deserialize, Serialize};
+
 use super::outlines;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
@@ -121,6 +123,13 @@ impl Outlined {
         self.fitted.ends().is_some_and(|ends| 0.5 * ends.extent() < most) || !self.sections.iter().any(is_deep)
     }
 
+    /// What it tells of others.
+    pub(crate) fn told(&self, image: &Geometry) -> Told {
+        let is_thin = self.is_thinner(THIN * image.min_spacing());
+        let profiles = if is_thin { Vec::new() } else { self.profiles.iter().map(|s| s.profile).collect() };
+        Told { profiles, held_out: self.held_out.clone() }
+    }
+
     fn deviation(&self) -> f64 {
         let curves = || self.sections.iter().flat_map(|section| &section.curves);
         curves().map(|curve| curve.deviation).sum::<f64>() / curves().count().max(1) as f64
@@ -187,23 +196,41 @@ fn profile_at(
 /// border from another.
 const THIN: f64 = 3.5;
 
-/// How far each object's image and shape are trusted.
+/// What objects tell of each other.
+#[derive(Default, Serialize, Deserialize)]
+pub(crate) struct Told {
+    /// The profiles of thick bodies.
+    profiles: Vec<Profile>,
+    /// Marks of sections that were left out.
+    held_out: Vec<HeldOut>,
+}
+
+impl Told {
+    /// What all objects tell together, by their numbers, in order of these.
+    pub(crate) fn joined(objects: Vec<(usize, Self)>) -> Self {
+        objects.into_iter().fold(Self::default(), |mut all, (_, told)| {
+            all.profiles.extend(told.profiles);
+            all.held_out.extend(told.held_out);
+            all
+        })
+    }
+}
+
+/// How far the image and the shape of each of some objects are trusted, where all tell of each other what is `told`.
 pub(crate) fn trust(
     stage: &Stage<'_>,
     objects: &[Option<Outlined>],
-    image: &Geometry,
-    scatter: Scatter,
+    told: &Told,
+    (image, scatter): (&Geometry, Scatter),
     model: ImageModel,
 ) -> Result<Vec<Option<Trust>>> {
     let h = image.min_spacing();
     let is_thin = |object: &Outlined| object.is_thinner(THIN * h);
-    let thick = objects.iter().flatten().filter(|object| !is_thin(object));
-    let all: Vec<Profile> = thick.flat_map(|o| &o.profiles).map(|s| s.profile).collect();
-    let held_out = objects.iter().flatten().flat_map(|object| &object.held_out);
-    let growth = growth(held_out, scatter, h).unwrap_or(DEFAULT_GROWTH);
+    let all = &told.profiles;
+    let growth = growth(told.held_out.iter(), scatter, h).unwrap_or(DEFAULT_GROWTH);
     let trust = |object: &Outlined| {
         let own: Vec<Profile> = object.profiles.iter().map(|s| s.profile).collect();
-        let profiles = if own.len() < ENOUGH_PROFILES && !all.is_empty() { &all } else { &own };
+        let profiles = if own.len() < ENOUGH_PROFILES && !all.is_empty() { all } else { &own };
         let reading = match model {
             ImageModel::Level if !profiles.is_empty() => Reading::forced(profiles, false),
             ImageModel::Wall if !profiles.is_empty() => Reading::forced(profiles, true),

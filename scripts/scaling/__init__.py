@@ -1,0 +1,1 @@
+"""How distances scale over ranks."""

@@ -1,0 +1,29 @@
+//! The engine of a rank for what it does without the others.
+
+use std::ops::Deref;
+
+use super::engine::Engine;
+
+/// An engine of one rank alone, which shares all else with that of a rank of several. Its stages are counted as those of that one when
+/// it goes.
+pub(crate) struct ByItself<'a> {
+    pub(super) of: &'a Engine,
+    /// None where the rank is alone anyway.
+    pub(super) own: Option<Engine>,
+}
+
+impl Deref for ByItself<'_> {
+    type Target = Engine;
+
+    fn deref(&self) -> &Engine {
+        self.own.as_ref().unwrap_or(self.of)
+    }
+}
+
+impl Drop for ByItself<'_> {
+    fn drop(&mut self) {
+        if let Some(own) = &self.own {
+            self.of.take_reports(own.reports());
+        }
+    }
+}

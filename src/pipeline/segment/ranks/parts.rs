@@ -1,0 +1,104 @@
+//! Which objects a rank solves, and which parts of the image it keeps for that.
+
+use crate::error::Result;
+use crate::exec::{Comm, Engine};
+use crate::grid::{Box3, Geometry};
+use crate::io::ome_zarr::StoreWriter;
+use crate::pipeline::enclosure::region::voxel_bounds;
+use crate::pipeline::marks::ObjectMarks;
+use crate::pipeline::output::pyramid::written_by_this_rank;
+use crate::pipeline::segment::settings::{Guides, SegmentSettings};
+use crate::store::ElementType;
+
+/// Voxels that an object reaches farther than half of its extents, about.
+const MARGIN: i64 = 16;
+
+/// The numbers of the objects that this rank solves, in order: the largest come first, each to the rank that has least to do
+/// (Graham 1969), so all ranks find the same without a word.
+pub(in crate::pipeline::segment) fn own_objects(
+    comm: &dyn Comm,
+    objects: &[ObjectMarks],
+    grid: &Geometry,
+) -> Vec<usize> {
+    if comm.ranks() == 1 {
+        return (0..objects.len()).collect();
+    }
+    let takes: Vec<f64> = objects.iter().map(|marks| work(marks, grid)).collect();
+    let owners = shared_out(&takes, comm.ranks());
+    (0..objects.len()).filter(|&n| owners[n] == comm.rank()).collect()
+}
+
+/// The rank of each of several jobs, of which is known what they take.
+fn shared_out(takes: &[f64], ranks: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..takes.len()).collect();
+    order.sort_by(|&a, &b| takes[b].total_cmp(&takes[a]).then(a.cmp(&b)));
+    let (mut owners, mut busy) = (vec![0; takes.len()], vec![0.0_f64; ranks]);
+    for n in order {
+        let rank = (0..ranks).min_by(|&a, &b| busy[a].total_cmp(&busy[b])).unwrap_or(0);
+        owners[n] = rank;
+        busy[rank] += takes[n];
+    }
+    owners
+}
+
+/// What an object takes, compared with others: its band, which goes with its surface.
+fn work(marks: &ObjectMarks, grid: &Geometry) -> f64 {
+    let part = match marks.seed {
+        Some(_) => grid.domain(),
+        None => voxel_bounds(&marks.contours.concat(), grid),
+    };
+    libm::pow(part.volume().max(1) as f64, 2.0 / 3.0)
+}
+
+/// The parts of the image that this rank looks at often: around the objects that it solves, and what it writes. What else it
+/// looks at it reads once more from where the image is stored. None where it keeps all.
+///
+/// # Errors
+/// When another rank is gone.
+pub(in crate::pipeline::segment) fn kept_parts(
+    engine: &Engine,
+    guides: &Guides<'_>,
+    settings: &SegmentSettings,
+    (element, store): (ElementType, Option<&StoreWriter>),
+) -> Result<Option<Vec<Box3>>> {
+    let (comm, geometry) = (engine.comm(), guides.geometry);
+    // Walls between objects are looked for anywhere.
+    if comm.ranks() == 1 || settings.fill_gaps.is_some() {
+        return Ok(None);
+    }
+    let mut parts = match store {
+        Some(store) => written_by_this_rank(engine, geometry, store.finest_edges(geometry.shape, element))?,
+        None => Vec::new(),
+    };
+    let grid = Geometry { origin: [0.0; 3], ..geometry.clone() };
+    for n in own_objects(comm, guides.objects, geometry) {
+        let marks = guides.objects[n].moved(geometry.origin.map(|v| -v));
+        if marks.seed.is_some() {
+            return Ok(None);
+        }
+        let bounds = voxel_bounds(&marks.contours.concat(), &grid);
+        let farther = bounds.shape().map(|n| n / 2 + MARGIN);
+        let lo = std::array::from_fn(|a| bounds.lo[a] - farther[a]);
+        let hi = std::array::from_fn(|a| bounds.hi[a] + farther[a]);
+        parts.push(Box3::new(lo, hi).intersect(&geometry.domain()));
+    }
+    Ok(Some(parts))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_rank_has_much_more_to_do_than_another() {
+        let takes: Vec<f64> = (0..40).map(|n| f64::from(n * n % 37 + 1)).collect();
+        for ranks in [1, 2, 3, 8, 60] {
+            let owners = shared_out(&takes, ranks);
+            let of = |rank| (0..takes.len()).filter(|&n| owners[n] == rank).map(|n| takes[n]).sum::<f64>();
+            let sums: Vec<f64> = (0..ranks).map(of).collect();
+            let (most, mean) = (sums.iter().copied().fold(0.0, f64::max), takes.iter().sum::<f64>() / ranks as f64);
+            // Of any number of jobs this way leaves the busiest with four thirds of the least that is possible, at most.
+            assert!(most <= 4.0 / 3.0 * mean.max(37.0), "{ranks} ranks: {sums:?}");
+        }
+    }
+}
