@@ -133,7 +133,7 @@ mod tests {
         (0..grid.len()).filter(|&id| set.slot(id).is_none()).for_each(|id| field.set_absent(id, (id / 20) as f32));
         for slot in set.owned() {
             field.write(slot, |brick| {
-                (0..).zip(brick).for_each(|(n, v)| *v = (number * 1000 + n + slot as usize) as f32)
+                (0..).zip(brick).for_each(|(n, v)| *v = (number * 1000 + n + slot as usize) as f32);
             });
         }
         field

@@ -16,7 +16,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, save_points, told_of_room};
+use crate::cli::outputs::survival::{finished_before, no_save_points, save_points, told_of_room};
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
@@ -162,10 +162,11 @@ impl Job {
         self.console.say(&plan);
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
         let engine = engine.as_rank(self.comm.clone());
-        let saving = if self.comm.ranks() == 1 {
-            save_points(&self.args.job.output, &self.typed, self.console.as_ref())?
-        } else {
+        let (output, console) = (&self.args.job.output, self.console.as_ref());
+        let saving = if no_save_points(self.comm.as_ref(), output, console) {
             None
+        } else {
+            save_points(output, &self.typed, console)?
         };
         let engine = engine.with_save_points(saving);
         engine.outlook().expect(with_page(self.stages::<P>(threads), self.args.job.output.store().is_some()));

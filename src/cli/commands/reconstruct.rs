@@ -15,7 +15,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile, distance_to_marks};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, save_points, told_of_room};
+use crate::cli::outputs::survival::{finished_before, no_save_points, save_points, told_of_room};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -231,10 +231,11 @@ impl Job {
     }
 
     fn run(&self, seconds: f64, most: u64) -> Result<()> {
-        let saving = if self.comm.ranks() == 1 {
-            save_points(&self.args.output, &self.typed, self.console.as_ref())?
-        } else {
+        let (output, console) = (&self.args.output, self.console.as_ref());
+        let saving = if no_save_points(self.comm.as_ref(), output, console) {
             None
+        } else {
+            save_points(output, &self.typed, console)?
         };
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
         let engine = engine.with_save_points(saving);

@@ -12,7 +12,7 @@ use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals::wish;
 use crate::cli::terminal::text::bytes;
 use crate::error::{Error, Result, one_line};
-use crate::exec::{Progress, SavePoints};
+use crate::exec::{Comm, Progress, SavePoints};
 use crate::io::ome_zarr::{LiveState, is_store, live};
 use crate::store::checkpoint::{Checkpoints, Identity, difference};
 
@@ -123,6 +123,15 @@ pub(crate) fn save_points(
 ) -> Result<Option<Arc<SavePoints>>> {
     let found = checkpoints(output, || identity(typed), console)?;
     Ok(found.map(|checkpoints| Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish()))))
+}
+
+/// The same on several ranks: these take none, which is told who asked for them.
+pub(crate) fn no_save_points(comm: &dyn Comm, output: &OutputArgs, console: &dyn Progress) -> bool {
+    let asked = output.survive.resume || matches!(output.survive.checkpoint, Some(Checkpoint::Folder(_)));
+    if comm.ranks() > 1 && asked {
+        console.note("runs on several ranks take no checkpoints, and go on from none: this one begins anew");
+    }
+    comm.ranks() > 1
 }
 
 /// The same of a run whose inputs have been looked at before.

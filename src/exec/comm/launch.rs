@@ -15,7 +15,7 @@ pub struct Launched {
 const VARIABLES: [[&str; 2]; 2] =
     [["OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_LOCAL_SIZE"], ["PMI_SIZE", "MPI_LOCALNRANKS"]];
 
-/// The same of SLURM's `srun`, which counts where it starts ranks of an MPI by PMIx, as this other variable says.
+/// The same of SLURM's `srun`, which counts where it starts ranks of an MPI by `PMIx`, as this other variable says.
 const OF_SLURM: [&str; 3] = ["SLURM_STEP_NUM_TASKS", "SLURM_STEP_TASKS_PER_NODE", "PMIX_RANK"];
 
 /// What a launcher says, where it has started several. `srun` without MPI says nothing: it is used to start programs that have nothing
