@@ -27,7 +27,6 @@ pub struct Engine {
     cancel: Cancel,
     progress: Arc<dyn Progress>,
     comm: Arc<dyn Comm>,
-    ranks: usize,
     scratch: Scratch,
     budget: Budget,
     account: Arc<Account>,
@@ -54,7 +53,7 @@ impl Engine {
         let account = Account::new(budget, scratch.clone());
         let (outlook, reports) = (Arc::default(), Reports::default());
         progress.look_out(&outlook);
-        Ok(Self { pool, cancel, progress, comm, ranks: 1, scratch, budget, account, outlook, saving: None, reports })
+        Ok(Self { pool, cancel, progress, comm, scratch, budget, account, outlook, saving: None, reports })
     }
 
     /// The engine of one rank of a run of which all ranks do the same, each on its own part.
@@ -63,16 +62,10 @@ impl Engine {
         Self { comm, ..self }
     }
 
-    /// The engine with so many ranks, 1 or more, for stages that can be shared out: see [`Stage::on_ranks`].
-    #[must_use]
-    pub fn with_ranks(self, ranks: usize) -> Self {
-        Self { ranks: ranks.max(1), ..self }
-    }
-
     /// The engine of a run that puts by what it has solved; one rank alone does.
     #[must_use]
     pub fn with_save_points(self, saving: Option<Arc<SavePoints>>) -> Self {
-        let is_alone = self.ranks == 1 && self.comm.ranks() == 1;
+        let is_alone = self.comm.ranks() == 1;
         Self { saving: saving.filter(|_| is_alone), ..self }
     }
 
@@ -91,12 +84,6 @@ impl Engine {
         }
     }
 
-    /// The engine of one of this engine's ranks: its share of the threads, at least one; the same window.
-    pub(super) fn of_rank(&self, comm: Arc<dyn Comm>) -> Result<Self> {
-        let pool = Arc::new(pool((self.threads() / self.ranks).max(1))?);
-        Ok(Self { pool, comm, ranks: 1, saving: None, ..self.beside() })
-    }
-
     /// An engine that shares this one's threads and window, for one of several jobs side by side: it keeps reports of
     /// its own, and says nothing of its stages.
     pub(crate) fn beside(&self) -> Self {
@@ -105,7 +92,6 @@ impl Engine {
             cancel: self.cancel.clone(),
             progress: Arc::new(OfRank(self.progress.clone())),
             comm: self.comm.clone(),
-            ranks: self.ranks,
             scratch: self.scratch.clone(),
             budget: self.budget,
             account: self.account.clone(),
@@ -159,12 +145,6 @@ impl Engine {
     #[must_use]
     pub fn comm(&self) -> &dyn Comm {
         self.comm.as_ref()
-    }
-
-    /// Number of ranks that stages are shared out to.
-    #[must_use]
-    pub fn ranks(&self) -> usize {
-        self.ranks
     }
 
     /// Leaves so many bytes of the budget to what a job keeps in memory, the rest to mapped pages, until the guard goes.
@@ -277,7 +257,9 @@ pub struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    pub(super) fn engine(&self) -> &'a Engine {
+    /// The engine that it is a stage of.
+    #[must_use]
+    pub fn engine(&self) -> &'a Engine {
         self.engine
     }
 
@@ -285,12 +267,6 @@ impl<'a> Stage<'a> {
     #[must_use]
     pub fn comm(&self) -> &'a dyn Comm {
         self.engine.comm()
-    }
-
-    /// Number of ranks that the stage can be shared out to: see [`Stage::on_ranks`].
-    #[must_use]
-    pub fn ranks(&self) -> usize {
-        self.engine.ranks
     }
 
     /// The one loop over bricks: `work` for each item of a wave, in parallel; results in the wave's order.
@@ -379,18 +355,6 @@ impl<'a> Stage<'a> {
         let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
         report.iterations += iterations;
         report.residual = residual;
-    }
-
-    /// Adds what ranks did in this stage, all of them as often. What they moved is counted by the window they share.
-    pub(super) fn add_ranks(&self, ranks: &[StageReport]) {
-        let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
-        for rank in ranks {
-            report.bricks += rank.bricks;
-        }
-        if let Some(rank) = ranks.first() {
-            report.iterations += rank.iterations;
-            report.residual = rank.residual;
-        }
     }
 
     /// Says how many steps the stage has, where that is known only later than its beginning.

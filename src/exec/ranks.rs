@@ -5,31 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::comm::messages::Comm;
 use super::comm::threads::ThreadComm;
 use super::comm::traffic::Counted;
-use super::engine::{Engine, Stage};
-use super::progress::report::StageReport;
 use crate::error::{Error, Result};
-
-impl Stage<'_> {
-    /// Runs `work` on each of the engine's ranks, and counts what they do as this stage's. Results are in order of
-    /// ranks.
-    ///
-    /// One rank is the engine itself. Of several, each has its share of the threads and its own files; they share the
-    /// window, because they share the memory of one process. What a rank gets from others it gets through its
-    /// engine's [`Comm`].
-    ///
-    /// # Errors
-    /// Of the rank that failed first; the others end when they wait for it.
-    pub fn on_ranks<R: Send>(&self, work: impl Fn(&Stage<'_>, &Engine) -> Result<R> + Sync) -> Result<Vec<R>> {
-        let engine = self.engine();
-        if engine.ranks() == 1 {
-            return Ok(vec![work(self, engine)?]);
-        }
-        let done = as_threads(engine.ranks(), |comm| run_rank(engine, &comm, &work))?;
-        let (results, reports): (Vec<R>, Vec<StageReport>) = done.into_iter().unzip();
-        self.add_ranks(&reports);
-        Ok(results)
-    }
-}
 
 /// Runs `work` on so many ranks that are threads of this process, each connected with all others. Results are in order of ranks.
 ///
@@ -65,48 +41,42 @@ pub fn as_threads<R: Send>(ranks: usize, work: impl Fn(Arc<dyn Comm>) -> Result<
     }
 }
 
-fn run_rank<R>(
-    engine: &Engine,
-    comm: &Arc<dyn Comm>,
-    work: &(impl Fn(&Stage<'_>, &Engine) -> Result<R> + Sync),
-) -> Result<(R, StageReport)> {
-    let engine = engine.of_rank(comm.clone())?;
-    let stage = engine.stage("rank", 0);
-    let result = work(&stage, &engine)?;
-    Ok((result, stage.finish()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::error::ErrorKind;
-    use crate::exec::{Budget, Cancel, Silent, Workers};
+    use crate::exec::{Budget, Cancel, Engine, Silent, Workers};
     use crate::store::Scratch;
 
-    fn engine(ranks: usize, cancel: Cancel) -> Engine {
+    fn engine(comm: Arc<dyn Comm>, cancel: Cancel) -> Engine {
         let scratch = Scratch::new(&std::env::temp_dir(), 1 << 30);
         let budget = Budget { total: 2 << 30 };
-        Engine::new(2, scratch, budget, cancel, Arc::new(Silent)).unwrap().with_ranks(ranks)
+        Engine::new(1, scratch, budget, cancel, Arc::new(Silent)).unwrap().as_rank(comm)
     }
 
+    /// What each rank has counted is joined by the names of stages, also of those that one alone had.
     #[test]
     fn what_ranks_do_is_counted_once() {
         for ranks in [1, 2, 3] {
-            let engine = engine(ranks, Cancel::default());
-            let stage = engine.stage("shared", 0);
-            let numbers = stage
-                .on_ranks(|stage, engine| {
-                    assert_eq!((engine.comm().ranks(), stage.comm().ranks()), (ranks, ranks));
-                    assert_eq!(engine.threads(), if ranks == 1 { 2 } else { 1 });
-                    stage.run(&[0; 5], &Workers::none(), |(), _| Ok(()))?;
-                    stage.iterated(4, 0.5);
-                    Ok(engine.comm().rank())
-                })
-                .unwrap();
-            assert_eq!(numbers, (0..ranks).collect::<Vec<_>>());
-            let report = stage.finish();
-            assert_eq!((report.bricks, report.iterations, report.residual), (5 * ranks as u64, 4, 0.5));
-            assert_eq!(engine.reports().len(), 1);
+            let reports = as_threads(ranks, |comm| {
+                let (rank, engine) = (comm.rank(), engine(comm, Cancel::default()));
+                let names = ["shared".to_owned(), format!("of {rank}"), "shared".to_owned()];
+                for (n, name) in names.iter().enumerate() {
+                    let stage = engine.stage(name, 0);
+                    stage.run(&vec![0; 5 + n], &Workers::none(), |(), _| Ok(()))?;
+                    stage.finish();
+                }
+                Ok((engine.reports(), engine))
+            })
+            .unwrap();
+            let (_, first) = &reports[0];
+            reports[1..].iter().for_each(|(reports, _)| first.count_rank(reports));
+            let found: Vec<(String, u64)> =
+                first.reports().into_iter().map(|stage| (stage.name, stage.bricks)).collect();
+            let many = ranks as u64;
+            let mut expected = vec![("shared".to_owned(), 5 * many), ("of 0".into(), 6), ("shared".into(), 7 * many)];
+            expected.extend((1..ranks).map(|rank| (format!("of {rank}"), 6)));
+            assert_eq!(found, expected);
         }
     }
 
@@ -114,28 +84,24 @@ mod tests {
     #[test]
     fn a_rank_that_fails_ends_all() {
         for failing in 0..3 {
-            let engine = engine(3, Cancel::default());
-            let stage = engine.stage("shared", 0);
-            let error = stage
-                .on_ranks(|_, engine| {
-                    engine.comm().any(true)?;
-                    if engine.comm().rank() == failing {
-                        return Err(Error::failed("no room"));
-                    }
-                    engine.comm().any(true)
-                })
-                .unwrap_err();
+            let error = as_threads(3, |comm| {
+                comm.any(true)?;
+                if comm.rank() == failing {
+                    return Err(Error::failed("no room"));
+                }
+                comm.any(true)
+            })
+            .unwrap_err();
             assert_eq!(error.to_string(), "no room");
         }
     }
 
     #[test]
     fn a_rank_that_panics_ends_all() {
-        let engine = engine(3, Cancel::default());
         let run = || {
-            engine.stage("shared", 0).on_ranks(|_, engine| {
-                assert!(engine.comm().rank() != 1, "an invariant of rank 1");
-                engine.comm().least(0.0)
+            as_threads(3, |comm| {
+                assert!(comm.rank() != 1, "an invariant of rank 1");
+                comm.least(0.0)
             })
         };
         let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_err();
@@ -146,17 +112,15 @@ mod tests {
     #[test]
     fn a_signal_ends_all() {
         let cancel = Cancel::default();
-        let engine = engine(3, cancel.clone());
-        let stage = engine.stage("shared", 0);
-        let error = stage
-            .on_ranks(|_, engine| {
-                if engine.comm().rank() == 2 {
-                    cancel.flag().store(15, std::sync::atomic::Ordering::Relaxed);
-                    engine.check()?;
-                }
-                engine.comm().sum(&[1.0])
-            })
-            .unwrap_err();
+        let error = as_threads(3, |comm| {
+            let engine = engine(comm.clone(), cancel.clone());
+            if comm.rank() == 2 {
+                cancel.flag().store(15, std::sync::atomic::Ordering::Relaxed);
+                engine.check()?;
+            }
+            comm.sum(&[1.0])
+        })
+        .unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Interrupted { signal: 15 });
     }
 }

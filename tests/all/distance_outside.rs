@@ -4,10 +4,11 @@
 
 use std::fs;
 
+use strandline::exec::as_threads;
 use strandline::grid::{DataSets, Geometry, TriangleMesh};
 use strandline::kernel::distance::features::source_trees::SourceTrees;
 use strandline::kernel::distance::state::neighbours::Neighbours;
-use strandline::pipeline::distance::{DistanceSettings, Init, Method, Schedule, solve_sets};
+use strandline::pipeline::distance::{DistanceSettings, Init, Method, Reads, Schedule, solve_sets_watched};
 
 use crate::common::around::{Around, Parent, Rest, to_triangle};
 use crate::common::ball::Bench;
@@ -87,17 +88,21 @@ pub(crate) fn solved_on(
     settings: &DistanceSettings,
     [threads, ranks]: [usize; 2],
 ) -> (Vec<f32>, Vec<u32>) {
-    let lab = Lab::new(threads);
-    let engine = lab.engine.with_ranks(ranks);
+    let part = grid.domain();
     let trees = SourceTrees::new(sets);
-    solve_sets::<f32, _>(&engine, grid, sets, Some(&trees), settings, |solved, _| {
-        let part = grid.domain();
-        let (mut values, mut sources) = (vec![0.0; part.len()], vec![0; part.len()]);
-        solved.values.read_box(&part, &mut values)?;
-        solved.sources.read_box(&part, &mut sources)?;
-        Ok((values, sources))
-    })
-    .unwrap()
+    let (all, none) = ([part], []);
+    let solved = as_threads(ranks, |comm| {
+        let Lab { engine, _folder } = Lab::new(threads);
+        let engine = engine.as_rank(comm);
+        let reads = Reads { early: None, boxes: if ranks > 1 { &all[..] } else { &none } };
+        solve_sets_watched::<f32, _>(&engine, grid, sets, Some(&trees), (settings, reads), |solved, _| {
+            let (mut values, mut sources) = (vec![0.0; part.len()], vec![0; part.len()]);
+            solved.values.read_box(&part, &mut values)?;
+            solved.sources.read_box(&part, &mut sources)?;
+            Ok((values, sources))
+        })
+    });
+    solved.unwrap().swap_remove(0)
 }
 
 /// Distances, and the label of the nearest source.

@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use half::f16;
 use proptest::prelude::*;
 use strandline::error::{Error, ErrorKind, Result};
-use strandline::exec::{Budget, Cancel, Engine, Progress, Silent, StageReport};
+use strandline::exec::{Budget, Cancel, Comm, Engine, Progress, Silent, StageReport, as_threads};
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use strandline::kernel::distance::state::neighbours::Neighbours;
 use strandline::kernel::distance::state::precision::Precision;
-use strandline::pipeline::distance::{Method, Options, Schedule, Solving, Sources, solve};
+use strandline::pipeline::distance::{Method, Options, Reads, Schedule, Solving, Sources, solve_watched};
 use strandline::store::{BoxSource, Element, Scratch};
 
 use crate::common::clouds::{grid_around, sponge};
@@ -33,11 +33,16 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    fn engine(&self, cancel: Cancel, progress: Arc<dyn Progress>) -> Engine {
+    fn engine(&self, comm: Arc<dyn Comm>, cancel: &Cancel, progress: &Arc<dyn Progress>) -> Engine {
         let scratch = Scratch::new(self.folder, self.window);
-        let engine = Engine::new(self.threads, scratch, Budget { total: 2 << 30 }, cancel, progress);
-        engine.expect("threads start").with_ranks(self.ranks)
+        let (threads, budget) = ((self.threads / self.ranks).max(1), Budget { total: 2 << 30 });
+        let engine = Engine::new(threads, scratch, budget, cancel.clone(), progress.clone());
+        engine.expect("threads start").as_rank(comm)
     }
+}
+
+fn silent() -> Arc<dyn Progress> {
+    Arc::new(Silent)
 }
 
 /// A cloud on a grid, cut into bricks.
@@ -50,12 +55,11 @@ struct Case {
     neighbours: Neighbours,
 }
 
-/// A solved field: distances, sources, which voxels are fixed and how many; what it took.
+/// A solved field: distances, sources, how many voxels are fixed; what it took.
 #[derive(Debug, PartialEq)]
 struct Field<P> {
     distances: Vec<P>,
     sources: Vec<u32>,
-    fixed: Vec<u8>,
     fixed_voxels: u64,
     bricks: u64,
     rounds: u64,
@@ -69,7 +73,30 @@ fn whole<T: Element>(source: &dyn BoxSource<T>) -> Vec<T> {
 }
 
 impl Case {
+    /// Solves on all ranks of a place, each of which reads the whole field in the end; what they did is summed.
     fn solve<P: Precision>(
+        &self,
+        place: &Place<'_>,
+        (method, schedule): (Method, Schedule),
+        (cancel, progress): (&Cancel, &Arc<dyn Progress>),
+    ) -> Result<(Field<P>, StageReport)> {
+        let mut done = as_threads(place.ranks, |comm| {
+            self.solve_rank::<P>(&place.engine(comm, cancel, progress), method, schedule)
+        })?
+        .into_iter();
+        let (mut field, mut report) = done.next().expect("a rank");
+        for (other, did) in done {
+            assert!(other.distances == field.distances && other.sources == field.sources, "ranks read the same");
+            field.bricks += other.bricks;
+            field.fixed_voxels += other.fixed_voxels;
+            report.brick_loads += did.brick_loads;
+            report.bytes_read += did.bytes_read;
+            report.bytes_written += did.bytes_written;
+        }
+        Ok((field, report))
+    }
+
+    fn solve_rank<P: Precision>(
         &self,
         engine: &Engine,
         method: Method,
@@ -79,12 +106,14 @@ impl Case {
         let bins = PointBins::new(grid, &self.geometry, &self.cloud);
         let sources = Sources::cloud(&self.geometry, &self.cloud, &bins);
         let stage = engine.stage("distance", 0);
-        let solved = solve::<P>(&stage, &sources, &BrickSet::dense(grid), method, schedule, self.options())?;
+        let all = [self.geometry.domain()];
+        let reads = Reads { early: None, boxes: if engine.comm().ranks() > 1 { &all } else { &[] } };
+        let by = (method, schedule);
+        let solved = solve_watched::<P>(&stage, &sources, &BrickSet::dense(grid), by, self.options(), reads)?;
         let report = stage.finish();
         let field = Field {
             distances: whole(&*solved.values),
             sources: whole(&*solved.sources),
-            fixed: whole(&*solved.fixed),
             fixed_voxels: solved.fixed_voxels,
             bricks: report.bricks,
             rounds: report.iterations,
@@ -99,8 +128,7 @@ impl Case {
     fn on<P: Precision>(&self, ranks: usize, threads: usize, method: Method, schedule: Schedule) -> Field<P> {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let place = Place { folder: folder.path(), window: 1 << 30, threads, ranks };
-        let engine = place.engine(Cancel::default(), Arc::new(Silent));
-        self.solve(&engine, method, schedule).expect("room in scratch").0
+        self.solve(&place, (method, schedule), (&Cancel::default(), &silent())).expect("room in scratch").0
     }
 
     /// All methods, schedules and neighbours on these ranks give what they give on one.
@@ -205,8 +233,8 @@ fn ranks_share_a_window_that_holds_little() {
     let expected = case.on::<f32>(1, 1, Method::VDT, Schedule::Front);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let place = Place { folder: folder.path(), window: 1, threads: 2, ranks: 3 };
-    let engine = place.engine(Cancel::default(), Arc::new(Silent));
-    let (found, report) = case.solve::<f32>(&engine, Method::VDT, Schedule::Front).expect("room in scratch");
+    let (quiet, by) = (silent(), (Method::VDT, Schedule::Front));
+    let (found, report) = case.solve::<f32>(&place, by, (&Cancel::default(), &quiet)).expect("room in scratch");
     assert!(found == expected);
     assert!(report.brick_loads >= 3 && report.bytes_read > 0 && report.bytes_written > 0, "{report:?}");
 }
@@ -236,10 +264,11 @@ fn a_signal_ends_all_ranks() {
     for schedule in SCHEDULES {
         for at in [1, 20, 60, 130] {
             let cancel = Cancel::default();
-            let progress = SignalAt { steps: AtomicU64::new(0), at, cancel: cancel.clone() };
+            let progress: Arc<dyn Progress> =
+                Arc::new(SignalAt { steps: AtomicU64::new(0), at, cancel: cancel.clone() });
             let place = Place { folder: folder.path(), window: 1 << 30, threads: 3, ranks: 3 };
-            let engine = place.engine(cancel, Arc::new(progress));
-            let error = case.solve::<f32>(&engine, Method::FSM, schedule).expect_err("a signal came");
+            let error = case.solve::<f32>(&place, (Method::FSM, schedule), (&cancel, &progress));
+            let error = error.expect_err("a signal came");
             assert_eq!(error.kind(), ErrorKind::Interrupted { signal: 2 }, "{schedule:?} after {at} bricks: {error}");
         }
     }
@@ -249,8 +278,8 @@ fn a_signal_ends_all_ranks() {
 fn scratch_that_cannot_be_made_ends_all_ranks() {
     let case = case([40, 40, 40], [0.4; 3], 8, 5, 1);
     let place = Place { folder: Path::new("/nowhere/at/all"), window: 0, threads: 1, ranks: 3 };
-    let engine = place.engine(Cancel::default(), Arc::new(Silent));
-    let error = case.solve::<f32>(&engine, Method::VDT, Schedule::Front).expect_err("there is no such folder");
+    let by = (Method::VDT, Schedule::Front);
+    let error = case.solve::<f32>(&place, by, (&Cancel::default(), &silent())).expect_err("there is no such folder");
     assert_eq!(error.exit_code(), 1);
     assert!(error.to_string().contains("--scratch"), "{error}");
 }
@@ -264,17 +293,17 @@ fn one_rank_that_fails_ends_those_that_solve() {
     let sources = Sources::cloud(&case.geometry, &case.cloud, &bins);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let place = Place { folder: folder.path(), window: 1 << 30, threads: 1, ranks: 3 };
-    let engine = place.engine(Cancel::default(), Arc::new(Silent));
-    let stage = engine.stage("distance", 0);
     let solver = Method::FSM.solver::<f32>();
-    let failed = stage.on_ranks(|stage, engine| {
+    let failed = as_threads(place.ranks, |comm| {
+        let engine = place.engine(comm, &Cancel::default(), &silent());
+        let stage = engine.stage("distance", 0);
         if engine.comm().rank() == 1 {
             return Err(Error::failed("the disk of rank 1 is full"));
         }
         let plan = strandline::exec::HaloPlan::new(grid, strandline::exec::Reach::Faces);
         let ownership = strandline::exec::Ownership::balanced(&BrickSet::dense(grid), 3);
         let own = Arc::new(ownership.part(&BrickSet::dense(grid), engine.comm().rank(), &plan));
-        (solver.solve)(&Solving::new(stage, engine, &sources, &own, case.options()), Schedule::Front)
+        (solver.solve)(&Solving::new(&stage, &engine, &sources, &own, case.options()), Schedule::Front)
             .map(|solved| solved.fixed_voxels)
     });
     assert_eq!(failed.expect_err("rank 1 failed").to_string(), "the disk of rank 1 is full");

@@ -358,7 +358,7 @@ impl Job {
             resources: &self.resources,
             console: &self.console,
             engine,
-            ranks: engine.ranks().max(self.comm.ranks()),
+            ranks: self.comm.ranks(),
             rank_reports,
             started: self.started,
         };

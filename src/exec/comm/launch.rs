@@ -51,8 +51,7 @@ mod tests {
         let open = found(&[("OMPI_COMM_WORLD_SIZE", "8"), ("OMPI_COMM_WORLD_LOCAL_SIZE", "4")]);
         assert_eq!(open, Some(Launched { processes: 8, on_this_machine: 4, variable: "OMPI_COMM_WORLD_SIZE" }));
         assert_eq!(found(&[("PMI_SIZE", "2")]).map(|launched| launched.processes), Some(2));
-        let slurm =
-            found(&[("SLURM_STEP_NUM_TASKS", "6"), ("SLURM_STEP_TASKS_PER_NODE", "3(x2)"), ("PMIX_RANK", "0")]);
+        let slurm = found(&[("SLURM_STEP_NUM_TASKS", "6"), ("SLURM_STEP_TASKS_PER_NODE", "3(x2)"), ("PMIX_RANK", "0")]);
         assert_eq!(slurm, Some(Launched { processes: 6, on_this_machine: 3, variable: "SLURM_STEP_NUM_TASKS" }));
         // Started by srun, but not as ranks.
         assert_eq!(found(&[("SLURM_STEP_NUM_TASKS", "6")]), None);

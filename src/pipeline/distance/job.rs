@@ -145,7 +145,7 @@ pub fn solve_sets<P: Precision, R>(
 ///
 /// # Errors
 /// As [`solve_sets`], and when the output cannot be written.
-pub(crate) fn solve_sets_watched<P: Precision, R>(
+pub fn solve_sets_watched<P: Precision, R>(
     engine: &Engine,
     geometry: &Geometry,
     sets: &DataSets,

@@ -18,8 +18,7 @@ mod solving;
 use std::sync::Arc;
 
 pub use checks::{check_iterations, outside_note, without_inside};
-pub(crate) use job::solve_sets_watched;
-pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets};
+pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets, solve_sets_watched};
 pub(crate) use needs::tree_bytes;
 pub use needs::{Needs, Writes};
 pub use ranks::{Reads, solve, solve_watched};
@@ -75,7 +74,7 @@ impl Options {
 }
 
 /// Distance to the nearest point in f32, physical units, on the bricks of `set`, no value above `farthest`; on all
-/// ranks of the stage's engine. No bit depends on threads or ranks.
+/// ranks of the stage's engine, each of which gets all of it. No bit depends on threads or ranks.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
@@ -88,7 +87,6 @@ pub fn cloud_distance(
     farthest: f32,
 ) -> Result<BrickArray<f32>> {
     let options = Options::up_to(f64::from(farthest));
-    // Of several ranks each has all of it in the end.
     let all =
         |ranks: usize| if ranks == 1 { Vec::new() } else { set.ids().map(|id| set.grid().brick_box(id)).collect() };
     let reads = Reads { early: None, boxes: &all(stage.comm().ranks()) };

@@ -1,5 +1,4 @@
-//! A distance solved by the ranks of a run, each on its own bricks, and read as one field: whoever reads a brick reads
-//! it from the rank that owns it.
+//! A distance solved by the ranks of a run, each on its own bricks; of those of others each gets what it reads.
 
 use std::sync::Arc;
 
@@ -7,15 +6,13 @@ use super::readout::early::Early;
 use super::readout::repair::looked_over;
 use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
-use crate::error::{Error, Result};
-use crate::exec::{HaloPlan, Ownership, Reach, Stage, read_by_bricks};
+use crate::error::Result;
+use crate::exec::{HaloPlan, Ownership, Reach, Stage};
 use crate::grid::{Box3, BrickGrid, BrickId, BrickSet};
 use crate::kernel::distance::state::precision::Precision;
-use crate::store::{BoxSource, Element};
 
-/// Computes the distance to `sources` on the bricks of `set`, by a schedule; on all ranks of the stage's engine, of
-/// which the first alone keeps the one heap of a method that has one. Distances and sources do not depend on how many
-/// these are.
+/// Computes the distance to `sources` on this rank's part of the bricks of `set`, by a schedule; of the ranks of the stage's engine the
+/// first alone keeps the one heap of a method that has one. Distances and sources do not depend on how many these are.
 ///
 /// # Errors
 /// When scratch runs out, the run is interrupted, or a rank ends early.
@@ -56,35 +53,18 @@ pub(super) fn solve_once<'a, P: Precision>(
     options: Options,
     reads: Reads<'_, P>,
 ) -> Result<Solved<'a, P>> {
-    // Those that share a process, or are processes of their own.
-    let ranks = stage.ranks().max(stage.comm().ranks());
+    let (comm, engine) = (stage.comm(), stage.engine());
     // Others' bricks are read when all ranks are done.
-    let early = reads.early.filter(|_| ranks == 1);
+    let early = reads.early.filter(|_| comm.ranks() == 1);
     let solver = method.solver::<P>();
     let one_heap = schedule != Schedule::Front && solver.textbook != Textbook::Sweeps;
-    let ownership = if one_heap { Ownership::first(set, ranks) } else { Ownership::balanced(set, ranks) };
+    let ownership = if one_heap { Ownership::first(set, comm.ranks()) } else { Ownership::balanced(set, comm.ranks()) };
     // Sources are found by all 26 neighbours even where distances are not.
     let plan = HaloPlan::new(*set.grid(), Reach::All);
-    let mut parts = stage.on_ranks(|stage, engine| {
-        let rank = engine.comm().rank();
-        let own = Arc::new(ownership.part(set, rank, &plan));
-        let borrows = reads.of_others(set.grid(), |id| ownership.owner(id) == rank);
-        (solver.solve)(&Solving { stage, engine, sources, set: &own, options, early, borrows: &borrows }, schedule)
-    })?;
-    if stage.comm().ranks() > 1 {
-        // What this rank reads is its own part and what it has borrowed.
-        return parts.pop().ok_or_else(|| Error::failed("a rank has solved nothing"));
-    }
-    let joined = Cut { grid: *set.grid(), ownership };
-    let sum = |of: fn(&Solved<'a, P>) -> u64| parts.iter().map(of).sum();
-    Ok(Solved {
-        values: joined.join(parts.iter().map(|part| part.values.clone()).collect()),
-        sources: joined.join(parts.iter().map(|part| part.sources.clone()).collect()),
-        with_source: None,
-        fixed: joined.join(parts.iter().map(|part| part.fixed.clone()).collect()),
-        fixed_voxels: sum(|part| part.fixed_voxels),
-        triangle_distances: sum(|part| part.triangle_distances),
-    })
+    let own = Arc::new(ownership.part(set, comm.rank(), &plan));
+    let borrows = reads.of_others(set.grid(), |id| ownership.owner(id) == comm.rank());
+    // What this rank reads is its own part and what it has borrowed.
+    (solver.solve)(&Solving { stage, engine, sources, set: &own, options, early, borrows: &borrows }, schedule)
 }
 
 /// What is read of a solved distance by the rank that asks for it.
@@ -110,43 +90,5 @@ impl<P> Reads<'_, P> {
         bricks.dedup();
         bricks.retain(|&id| !is_own(id));
         bricks
-    }
-}
-
-/// How a field is cut.
-#[derive(Clone)]
-struct Cut {
-    grid: BrickGrid,
-    ownership: Ownership,
-}
-
-impl Cut {
-    fn join<'a, T: Element>(&self, parts: Vec<Part<'a, T>>) -> Part<'a, T> {
-        Arc::new(Joined { cut: self.clone(), parts })
-    }
-}
-
-/// What one rank has of a field.
-type Part<'a, T> = Arc<dyn BoxSource<T> + Send + 'a>;
-
-/// A field of which each rank has its own bricks.
-struct Joined<'a, T> {
-    cut: Cut,
-    parts: Vec<Part<'a, T>>,
-}
-
-impl<T: Element> BoxSource<T> for Joined<'_, T> {
-    fn shape(&self) -> [i64; 3] {
-        self.cut.grid.shape()
-    }
-
-    fn read_box(&self, part: &Box3, out: &mut [T]) -> Result<()> {
-        let Cut { grid, ownership } = &self.cut;
-        let mut owners = grid.bricks_in(part).map(|id| ownership.owner(id));
-        let first = owners.next().unwrap_or(0);
-        if owners.all(|owner| owner == first) {
-            return self.parts[first].read_box(part, out);
-        }
-        read_by_bricks(grid, part, out, |id, shared, values| self.parts[ownership.owner(id)].read_box(shared, values))
     }
 }
