@@ -32,6 +32,7 @@ pub struct Engine {
     account: Arc<Account>,
     outlook: Arc<Outlook>,
     saving: Option<Arc<SavePoints>>,
+    identity: Option<Arc<Identity>>,
     reports: Reports,
 }
 
@@ -53,7 +54,19 @@ impl Engine {
         let account = Account::new(budget, scratch.clone());
         let (outlook, reports) = (Arc::default(), Reports::default());
         progress.look_out(&outlook);
-        Ok(Self { pool, cancel, progress, comm, scratch, budget, account, outlook, saving: None, reports })
+        Ok(Self {
+            pool,
+            cancel,
+            progress,
+            comm,
+            scratch,
+            budget,
+            account,
+            outlook,
+            saving: None,
+            identity: None,
+            reports,
+        })
     }
 
     /// The engine of one rank of a run of which all ranks do the same, each on its own part.
@@ -69,10 +82,16 @@ impl Engine {
         Self { saving: saving.filter(|_| is_alone), ..self }
     }
 
-    /// What a run that puts by what it has solved was asked for, and what its inputs hold.
+    /// The engine of a run of which is known what it was asked for and what its inputs hold, though it puts nothing by.
+    #[must_use]
+    pub fn known_as(self, identity: Option<Identity>) -> Self {
+        Self { identity: identity.map(Arc::new), ..self }
+    }
+
+    /// What the run was asked for, and what its inputs hold, where somebody has looked.
     #[must_use]
     pub fn identity(&self) -> Option<&Identity> {
-        self.saving.as_ref().map(|saving| saving.identity())
+        self.saving.as_ref().map(|saving| saving.identity()).or(self.identity.as_deref())
     }
 
     /// The run is over: what was put by goes, unless the run ended by something that can be mended: a signal, a
@@ -97,6 +116,7 @@ impl Engine {
             account: self.account.clone(),
             outlook: self.outlook.clone(),
             saving: self.saving.clone(),
+            identity: self.identity.clone(),
             reports: Reports::default(),
         }
     }

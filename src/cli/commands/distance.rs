@@ -16,7 +16,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, no_save_points, save_points, told_of_room};
+use crate::cli::outputs::survival::{finished_before, save_points, told_of_room, without_save_points};
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
@@ -160,15 +160,13 @@ impl Job {
             return Ok(());
         }
         self.console.say(&plan);
-        let engine = self.resources.engine(&self.cancel, self.console.clone())?;
-        let engine = engine.as_rank(self.comm.clone());
         let (output, console) = (&self.args.job.output, self.console.as_ref());
-        let saving = if no_save_points(self.comm.as_ref(), output, console) {
-            None
+        let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
+        let engine = if self.comm.ranks() == 1 {
+            engine.with_save_points(save_points(output, &self.typed, console)?)
         } else {
-            save_points(output, &self.typed, console)?
+            without_save_points(engine, (output, &self.typed), console)?
         };
-        let engine = engine.with_save_points(saving);
         engine.outlook().expect(with_page(self.stages::<P>(threads), self.args.job.output.store().is_some()));
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();

@@ -15,7 +15,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile, distance_to_marks};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, no_save_points, save_points, told_of_room};
+use crate::cli::outputs::survival::{finished_before, save_points, told_of_room, without_save_points};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -232,13 +232,12 @@ impl Job {
 
     fn run(&self, seconds: f64, most: u64) -> Result<()> {
         let (output, console) = (&self.args.output, self.console.as_ref());
-        let saving = if no_save_points(self.comm.as_ref(), output, console) {
-            None
-        } else {
-            save_points(output, &self.typed, console)?
-        };
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
-        let engine = engine.with_save_points(saving);
+        let engine = if self.comm.ranks() == 1 {
+            engine.with_save_points(save_points(output, &self.typed, console)?)
+        } else {
+            without_save_points(engine, (output, &self.typed), console)?
+        };
         engine.outlook().expect(with_page(plan(seconds, self.writes_fields()), self.writes_fields()));
         let result = self.solve_and_write(&engine);
         self.console.clear();

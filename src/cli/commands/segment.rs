@@ -20,7 +20,7 @@ use crate::cli::outputs::checks::{Outputs, numbered};
 use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, no_save_points, save_points, save_points_of, told_of_room};
+use crate::cli::outputs::survival::{finished_before, save_points, save_points_of, told_of_room, without_save_points};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -289,13 +289,13 @@ impl Job {
         if self.console.is_verbose() {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
-        let saving = match &self.identity {
-            _ if no_save_points(self.comm.as_ref(), &self.args.output, self.console.as_ref()) => None,
-            Some(known) => save_points_of(&self.args.output, known, self.console.as_ref())?,
-            None => save_points(&self.args.output, &self.typed, self.console.as_ref())?,
-        };
+        let (output, console) = (&self.args.output, self.console.as_ref());
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
-        let engine = engine.with_save_points(saving);
+        let engine = match &self.identity {
+            _ if self.comm.ranks() > 1 => without_save_points(engine, (output, &self.typed), console)?,
+            Some(known) => engine.with_save_points(save_points_of(output, known, console)?),
+            None => engine.with_save_points(save_points(output, &self.typed, console)?),
+        };
         let (voxels, threads, writes) = (self.crop.volume(), self.resources.threads, self.needs_store());
         engine.outlook().expect(with_page(
             plan(estimate, &self.guides(), self.comm.as_ref(), (voxels, threads, writes)),

@@ -12,7 +12,7 @@ use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals::wish;
 use crate::cli::terminal::text::bytes;
 use crate::error::{Error, Result, one_line};
-use crate::exec::{Comm, Progress, SavePoints};
+use crate::exec::{Engine, Progress, SavePoints};
 use crate::io::ome_zarr::{LiveState, is_store, live};
 use crate::store::checkpoint::{Checkpoints, Identity, difference};
 
@@ -125,13 +125,22 @@ pub(crate) fn save_points(
     Ok(found.map(|checkpoints| Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish()))))
 }
 
-/// The same on several ranks: these take none, which is told who asked for them.
-pub(crate) fn no_save_points(comm: &dyn Comm, output: &OutputArgs, console: &dyn Progress) -> bool {
-    let asked = output.survive.resume || matches!(output.survive.checkpoint, Some(Checkpoint::Folder(_)));
-    if comm.ranks() > 1 && asked {
+/// The engine of one of several ranks. These take no checkpoints, which is told who asked for them; the first one looks at the inputs for
+/// what the store tells of them.
+///
+/// # Errors
+/// When an input cannot be read.
+pub(crate) fn without_save_points(
+    engine: Engine,
+    (output, typed): (&OutputArgs, &[String]),
+    console: &dyn Progress,
+) -> Result<Engine> {
+    if output.survive.resume || matches!(output.survive.checkpoint, Some(Checkpoint::Folder(_))) {
         console.note("runs on several ranks take no checkpoints, and go on from none: this one begins anew");
     }
-    comm.ranks() > 1
+    let is_told = engine.comm().rank() == 0 && output.store().is_some();
+    let known = if is_told && output.survive.checkpoint != Some(Checkpoint::Off) { identity(typed)? } else { None };
+    Ok(engine.known_as(known))
 }
 
 /// The same of a run whose inputs have been looked at before.
