@@ -7,9 +7,16 @@ use super::engine::Engine;
 /// An engine of one rank alone, which shares all else with that of a rank of several. Its stages are counted as those of that one when
 /// it goes.
 pub(crate) struct ByItself<'a> {
-    pub(super) of: &'a Engine,
+    of: &'a Engine,
     /// None where the rank is alone anyway.
-    pub(super) own: Option<Engine>,
+    own: Option<Engine>,
+}
+
+impl Engine {
+    /// This engine for what a rank does by itself, without the others.
+    pub(crate) fn by_itself(&self) -> ByItself<'_> {
+        ByItself { of: self, own: (self.comm().ranks() > 1).then(|| self.without_others()) }
+    }
 }
 
 impl Deref for ByItself<'_> {

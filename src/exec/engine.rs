@@ -7,7 +7,6 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::by_itself::ByItself;
 use super::cancel::Cancel;
 use super::comm::messages::{Comm, SelfComm};
 use super::memory::budget::{Budget, machine_memory, peak_resident};
@@ -121,11 +120,10 @@ impl Engine {
         }
     }
 
-    /// This engine for what a rank does by itself, without the others.
-    pub(crate) fn by_itself(&self) -> ByItself<'_> {
+    /// The same without the other ranks, whose stages are told as those of this one.
+    pub(super) fn without_others(&self) -> Self {
         let (progress, comm) = (self.progress.clone(), Arc::new(SelfComm));
-        let own = (self.comm.ranks() > 1).then(|| Self { progress, comm, saving: None, ..self.beside() });
-        ByItself { of: self, own }
+        Self { progress, comm, saving: None, ..self.beside() }
     }
 
     /// Runs on this engine's threads.

@@ -1,10 +1,10 @@
 //! Which tiles are computed, when and where: the halo, the schedules, the one loop over bricks, the memory budget.
 //! The only threads of the crate.
 
-mod borrow;
 mod by_itself;
 mod cancel;
 mod comm;
+mod copies;
 #[cfg(test)]
 pub(crate) mod ending;
 mod engine;
@@ -19,10 +19,8 @@ mod relax;
 mod save_points;
 mod schedule;
 mod side_by_side;
-mod spread;
 mod workers;
 
-pub use borrow::{ROUND_BYTES, borrow_bricks, read_by_bricks, read_with_borrowed};
 pub use cancel::Cancel;
 pub use comm::launch::{Launched, launched};
 pub use comm::messages::{Comm, Message, RankTraffic, SelfComm};
@@ -31,6 +29,8 @@ pub use comm::mpi::MpiComm;
 pub use comm::records::{gather_records, pack_message, unpack_message};
 pub use comm::threads::ThreadComm;
 pub use comm::traffic::Counted;
+pub use copies::borrow::{ROUND_BYTES, borrow_bricks, read_by_bricks, read_with_borrowed};
+pub use copies::spread::spread_fields;
 pub use engine::{Engine, Stage};
 pub use exchange::{Exchange, Note};
 pub use fixed_point::{FixedPoint, relax_to_fixed_point};
@@ -45,5 +45,4 @@ pub use ranks::as_threads;
 pub use relax::{Place, Relax, Until, Waves};
 pub use save_points::{SavePoint, SavePoints, Saved};
 pub use schedule::{checkerboard, corner_colours, one_wave, sweep_waves};
-pub use spread::spread_fields;
 pub use workers::Workers;

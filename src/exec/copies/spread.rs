@@ -10,10 +10,11 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::comm::messages::{Message, damaged};
-use super::comm::records::gather_records;
-use super::{ROUND_BYTES, Stage};
+use super::borrow::ROUND_BYTES;
 use crate::error::Result;
+use crate::exec::comm::messages::{Message, damaged};
+use crate::exec::comm::records::gather_records;
+use crate::exec::engine::Stage;
 use crate::grid::{BrickGrid, BrickId, BrickSet, Slot};
 use crate::store::{BrickArray, Element};
 

@@ -9,10 +9,10 @@
 
 use std::sync::Arc;
 
-use super::comm::messages::{Message, damaged};
-use super::engine::Stage;
-use super::ownership::Ownership;
 use crate::error::{Error, Result};
+use crate::exec::comm::messages::{Message, damaged};
+use crate::exec::engine::Stage;
+use crate::exec::ownership::Ownership;
 use crate::grid::{Box3, BrickGrid, BrickId, BrickSet, Slot};
 use crate::store::{BoxSource, BrickArray, Element};
 

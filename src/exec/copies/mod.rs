@@ -1,0 +1,4 @@
+//! Copies of what other ranks have: bricks that one asks for, and fields that go to all.
+
+pub(super) mod borrow;
+pub(super) mod spread;
