@@ -22,6 +22,8 @@ const CHANGES = [
   // A shard that was not there may be there when it is asked for again: a store that lives fills while it is looked at. What is found
   // missing is therefore not remembered.
   ["codec/sharding_indexed/decode.js", "if (shardIndex === void 0) {", (words) => `${words} this.indexCache.chunks.get(this.indexCache.encodeKeyFunction(key.base))?.freeSystemMemory();`],
+  // What is of a unit that is not known is drawn without one; the state says what is known of others' spellings.
+  ["datasource/zarr/ome.js", "throw new Error(`Unsupported unit: ${JSON.stringify(unit)}`);", () => 'return { unit: "", scale: 1 };'],
   // The page's title tells whose page it is.
   ["ui/title.js", "${value} - neuroglancer", () => "${value} - strandline"],
   ["ui/title.js", 'document.title = "neuroglancer"', () => 'document.title = "strandline"'],
@@ -87,7 +89,7 @@ const licences = [...packages].sort().map((name) => {
   const folder = join(here, "node_modules", name);
   const { version, license } = JSON.parse(readFileSync(join(folder, "package.json"), "utf8"));
   const file = ["LICENSE", "LICENSE.md", "LICENSE.txt"].map((file) => join(folder, file)).find(existsSync);
-  const changed = name === "neuroglancer" ? "Changed here: shards that are not there are asked for again, modules lie in one folder, titles end in strandline.\n\n" : "";
+  const changed = name === "neuroglancer" ? "Changed here: shards that are not there are asked for again, units that are not known are none, modules lie in one folder, titles end in strandline.\n\n" : "";
   return `${name} ${version}, ${license}\n\n${changed}${readFileSync(file, "utf8").trim()}\n`;
 });
 writeFileSync(join(out, "LICENSES"), licences.join(`\n${"-".repeat(80)}\n\n`));

@@ -99,10 +99,11 @@ const arriving = async (browser, url) => {
     window.step = 0;
     window.fetch = async (name, how) => {
       const answer = await ask(name, how);
-      if (name !== "state.json" && name !== "live.json") return answer;
+      const [asked] = String(name).split("?");
+      if (asked !== "state.json" && asked !== "live.json") return answer;
       const told = await answer.json();
       const [image, labels] = told.layers ?? [];
-      if (name === "live.json") Object.assign(told, { running: true, shown: String(window.step) });
+      if (asked === "live.json") Object.assign(told, { running: true, shown: String(window.step) });
       else told.layers = [[{ ...image, shaderControls: {} }], [labels], [], told.layers][window.step];
       return new Response(JSON.stringify(told));
     };
@@ -192,7 +193,7 @@ const look = async (browser, store, wanted) => {
     }
     console.log(`${store}: ${(bytes / 1e6).toFixed(2)} MB loaded`);
     const about = await page.evaluate(() => [document.title, document.getElementById("name").textContent, document.querySelector("#reports a")?.href]);
-    const report = `${url}data/${encodeURIComponent(basename(store)).replaceAll(".", "%2E")}/report.html`;
+    const report = `${url}data/${encodeURIComponent(basename(store))}/report.html`;
     if (about.join() !== [`${basename(store)} - strandline`, basename(store), report].join()) faults.push(`the page calls itself ${about}`);
     if (stayed === undefined) faults.push(...(await arriving(browser, url)), ...(await vanishing(page, store, server)));
     await page.close();
