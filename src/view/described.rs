@@ -9,6 +9,9 @@ use super::documents::json;
 use crate::io::stack::interval::{Interval, seconds};
 use crate::io::stack::units;
 
+/// Types that the page draws, as Zarr 3 names them; those of version 2 without their byte order.
+const DRAWN: [&str; 10] = ["bool", "uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32"];
+const DRAWN_OLDER: [&str; 10] = ["b1", "u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4"];
 /// Versions that the page does not draw, of those that OME-Zarr had.
 const OLDER: [&str; 3] = ["0.1", "0.2", "0.3"];
 
@@ -129,6 +132,11 @@ fn axes(folder: &Path, found: &Multiscale) -> Said<(Vec<Axis>, Value)> {
     let array = json(&folder.join(level).join(document))
         .filter(|array| array["shape"].is_array())
         .ok_or_else(|| format!("names the level {level}, and {level}/{document} is no array of Zarr"))?;
+    let (drawn, key) = if found.is_version_2 { (DRAWN_OLDER, "dtype") } else { (DRAWN, "data_type") };
+    let of_type = array[key].as_str().unwrap_or("a type of its own");
+    if !drawn.contains(&of_type.trim_start_matches(['<', '>', '|'])) {
+        return Err(format!("is of {of_type}, which the page does not draw"));
+    }
     let named = described["axes"].as_array().filter(|axes| !axes.is_empty()).ok_or("names no axes")?;
     let rank = array["shape"].as_array().map_or(0, Vec::len);
     if named.len() != rank {

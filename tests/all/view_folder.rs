@@ -169,6 +169,87 @@ fn stores_that_cannot_be_shown_are_named_with_the_reason() {
     assert!(told.contains("has a scale of 0 along y"), "{told}");
 }
 
+#[test]
+fn types_and_versions_that_the_page_does_not_draw_are_named() {
+    let bench = Bench::bare();
+    let axes = ["z", "y", "x"];
+    foreign(&bench, "double.zarr", &multiscale(&axes, &json!([1, 1, 1])), &json!([4, 4, 4]));
+    let array = json!({ "node_type": "array", "shape": [4, 4, 4], "data_type": "float64" });
+    bench.write("out/double.zarr/0/zarr.json", &array.to_string());
+    fs::create_dir_all(bench.path("out/old.zarr/0")).unwrap();
+    let level = json!({ "path": "0" });
+    let old = json!({ "multiscales": [{ "version": "0.3", "axes": axes, "datasets": [level] }] });
+    bench.write("out/old.zarr/.zattrs", &old.to_string());
+    bench.write("out/old.zarr/0/.zarray", &json!({ "shape": [4, 4, 4], "dtype": "|u1" }).to_string());
+    let told = bench.fail("view out --no-open", 2);
+    assert!(told.contains("double.zarr is of float64, which the page does not draw"), "{told}");
+    assert!(told.contains("old.zarr is of OME-Zarr 0.3"), "{told}");
+    for (name, text, says) in [
+        ("cloud.xyz", "0 0 0\n1 0 0\n0 1 0\n", "strandline reconstruct makes one of them"),
+        (
+            "a.vtp",
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">",
+            "is no mesh that can be shown (PLY, OBJ, STL, OFF)",
+        ),
+    ] {
+        bench.write(name, text);
+        let told = bench.fail(&format!("view {name} --no-open"), 2);
+        assert!(told.contains(says), "{told}");
+    }
+    // A mesh is one by what is in it.
+    bench.write("mesh.txt", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    assert!(bench.succeed("view mesh.txt --no-open --for 1s --print-links").contains("neuroglancer mesh"));
+}
+
+/// Channels, units and grey ranges as other programs tell them, or do not; the voxels are there.
+#[test]
+fn images_of_other_programs_have_channels_units_and_grey_ranges() {
+    let bench = Bench::bare();
+    let folder = bench.path("out/two.zarr");
+    fs::create_dir_all(folder.join("0/0/0/0")).unwrap();
+    let axis = |name: &str, kind: &str, unit: Value| json!({ "name": name, "type": kind, "unit": unit });
+    let axes = [
+        json!({ "name": "c", "type": "channel" }),
+        axis("z", "space", json!("um")),
+        axis("y", "space", json!("Micron")),
+        axis("x", "space", json!("furlong")),
+    ];
+    let scale = json!([{ "type": "scale", "scale": [1, 2, 0.5, 0.5] }]);
+    let said = json!({ "label": "GFP", "color": "00FF00", "window": { "start": 5, "end": 9 } });
+    let attributes = json!({
+        "multiscales": [{ "version": "0.4", "name": "two", "axes": axes, "datasets": [{ "path": "0", "coordinateTransformations": scale }] }],
+        "omero": { "channels": [said, { "label": "DAPI", "color": "000000", "active": false }] },
+    });
+    bench.write("out/two.zarr/.zattrs", &attributes.to_string());
+    bench.write("out/two.zarr/.zgroup", r#"{"zarr_format":2}"#);
+    let array = json!({
+        "zarr_format": 2, "shape": [2, 2, 10, 10], "chunks": [1, 2, 10, 10], "dtype": "<u2", "compressor": null,
+        "fill_value": 0, "filters": null, "order": "C", "dimension_separator": "/",
+    });
+    bench.write("out/two.zarr/0/.zarray", &array.to_string());
+    // The second channel goes from 1000 to 1199.
+    let voxels: Vec<u8> = (1000..1200_u16).flat_map(u16::to_le_bytes).collect();
+    for c in 0..2 {
+        fs::create_dir_all(folder.join(format!("0/{c}/0/0"))).unwrap();
+        fs::write(folder.join(format!("0/{c}/0/0/0")), &voxels).unwrap();
+    }
+    let state = Served::new(&bench, "out/two.zarr").json("/state.json");
+    assert_eq!((names(&state), seen(&state)), (vec!["two GFP", "two DAPI"], vec!["two GFP"]));
+    let layers = &state["layers"];
+    assert_eq!(layers[0]["shaderControls"]["normalized"]["range"], json!([5.0, 9.0]));
+    assert_eq!(layers[1]["shaderControls"]["normalized"]["range"], json!([1002.0, 1199.0]), "1 % and 99.8 %");
+    assert!(layers[0]["shader"].as_str().unwrap().contains("#00ff00"));
+    assert!(!layers[1]["shader"].as_str().unwrap().contains("#000000"), "black would not be seen");
+    assert_eq!(
+        (&layers[1]["localDimensions"], &layers[1]["localPosition"]),
+        (&json!({ "c'": [1.0, ""] }), &json!([1.5]))
+    );
+    let dimensions = json!({ "c'": [1.0, ""], "z": [2e-6, "m"], "y": [5e-7, "m"], "x": [0.5, ""] });
+    assert_eq!(layers[0]["source"]["transform"]["outputDimensions"], dimensions);
+    assert_eq!(layers[0]["source"]["transform"]["inputDimensions"], dimensions);
+    assert_eq!(state["dimensions"], json!({ "x": [0.5, ""], "y": [5e-7, "m"], "z": [2e-6, "m"] }));
+}
+
 /// Several images in a store whose root is none, as bioformats2raw writes them.
 #[test]
 fn images_below_a_root_that_is_none_are_shown() {

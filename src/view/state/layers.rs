@@ -101,7 +101,8 @@ fn source(image: &Image) -> Value {
         let name = |axis: &Axis| if axis.is_channel { format!("{}'", axis.name) } else { axis.name.clone() };
         let of = |axis: &Axis| if axis.is_channel { json!([1.0, ""]) } else { dimension(axis) };
         let dimensions: Map<String, Value> = image.axes.iter().map(|axis| (name(axis), of(axis))).collect();
-        source["transform"] = json!({ "outputDimensions": dimensions });
+        // Lengths of the one are those of the other.
+        source["transform"] = json!({ "inputDimensions": dimensions.clone(), "outputDimensions": dimensions });
     }
     source
 }

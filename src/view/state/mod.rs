@@ -5,6 +5,8 @@ mod layers;
 mod placing;
 mod window;
 
+use std::collections::BTreeSet;
+
 use serde_json::{Value, json};
 
 pub(super) use self::layers::address;
@@ -23,6 +25,7 @@ pub(super) fn state(chosen: &Chosen<'_>) -> Value {
         let image = shown.images.iter().find(|image| root_of(&image.path) == of.root)?;
         Some(layers::marks(chosen, image, of))
     }));
+    tell_apart(&mut layers);
     let own = || shown.meshes.iter().filter(|mesh| chosen.has(&mesh.path)).chain(chosen.growing());
     let image = chosen.images().next();
     let is_flat = image.is_some_and(|image| !image.axes.iter().any(|axis| axis.name == "z"));
@@ -55,4 +58,15 @@ pub(super) fn state(chosen: &Chosen<'_>) -> Value {
         }
     }
     state
+}
+
+/// Gives layers of one name others, by which the page knows them.
+fn tell_apart(layers: &mut [Value]) {
+    let mut taken = BTreeSet::new();
+    for layer in layers {
+        let name = layer["name"].as_str().unwrap_or_default().to_owned();
+        let others = (2..).map(|n| format!("{name} ({n})"));
+        let free = std::iter::once(name.clone()).chain(others).find(|name| taken.insert(name.clone()));
+        layer["name"] = free.unwrap_or(name).into();
+    }
 }

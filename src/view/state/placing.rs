@@ -42,8 +42,8 @@ pub(super) fn place(image: &Image, state: &mut Map<String, Value>) {
     let unit = space.first().map_or(1.0, |axis| axis.spacing);
     state.insert("dimensions".into(), Value::Object(dimensions));
     state.insert("position".into(), middle.chain(whole).collect());
-    // A panel is some 500 pixels wide.
-    state.insert("crossSectionScale".into(), json!(longest / unit / 450.0));
+    // A panel is some 375 pixels high.
+    state.insert("crossSectionScale".into(), json!(longest / unit / 360.0));
     state.insert("projectionScale".into(), json!(1.6 * longest / unit));
 }
 
