@@ -186,11 +186,8 @@ fn types_and_versions_that_the_page_does_not_draw_are_named() {
     assert!(told.contains("old.zarr is of OME-Zarr 0.3"), "{told}");
     for (name, text, says) in [
         ("cloud.xyz", "0 0 0\n1 0 0\n0 1 0\n", "strandline reconstruct makes one of them"),
-        (
-            "a.vtp",
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">",
-            "is no mesh that can be shown (PLY, OBJ, STL, OFF)",
-        ),
+        ("a.vtp", "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">", "which ParaView opens and a page does not"),
+        ("a.txt", "nothing of this kind", "is no mesh that can be shown (PLY, OBJ, STL, OFF)"),
     ] {
         bench.write(name, text);
         let told = bench.fail(&format!("view {name} --no-open"), 2);

@@ -221,6 +221,10 @@ fn check_content(path: &Path) -> Result<()> {
                 "is an image that a page cannot read from one file; strandline convert makes an OME-Zarr store of it";
             Err(Error::input(what).at(path))
         }
+        Err(_) if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("vtp")) => {
+            let what = "is VTP, which ParaView opens and a page does not; --mesh and strandline convert write PLY too";
+            Err(Error::input(what).at(path))
+        }
         Err(error) => {
             let what = "is no mesh that can be shown (PLY, OBJ, STL, OFF); give an OME-Zarr store, a folder of some, or a mesh";
             Err(Error::input(what).caused_by(error).at(path))
