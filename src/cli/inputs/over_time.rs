@@ -38,12 +38,12 @@ pub(crate) struct Origin {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asked {
     pub(crate) object: u32,
-    pub(crate) origin: MarksFrom,
+    pub(crate) origin: KnownOrigin,
 }
 
 /// As [`Origin`], where it may not have been looked at how far marks moved.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub(crate) struct MarksFrom {
+pub(crate) struct KnownOrigin {
     #[serde(skip_serializing_if = "Option::is_none")]
     marks_from: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -114,7 +114,7 @@ impl MarksOverTime {
         let origins = self.origins(time);
         let of = |object: u32| {
             let moved = moved.and_then(|moved| moved.get(&object));
-            let origin = MarksFrom {
+            let origin = KnownOrigin {
                 marks_from: origins.get(&object).copied(),
                 shift_xyz: moved.map(|origin| origin.shift_xyz),
                 shift_is_told: moved.map(|origin| origin.shift_is_told),
