@@ -111,7 +111,7 @@ pub(super) fn choices(shown: &Shown) -> Vec<&str> {
 /// The store that a request asks for, as it was sent.
 pub(super) fn asked(query: Option<&str>) -> Option<String> {
     let sent = query?.split('&').find_map(|part| part.strip_prefix("store="))?;
-    percent_decode_str(sent).decode_utf8().ok().map(|name| name.into_owned())
+    percent_decode_str(sent).decode_utf8().ok().map(std::borrow::Cow::into_owned)
 }
 
 /// The store that a path on the server leads into.

@@ -8,7 +8,7 @@ use super::shown::{MeshFile, Shown};
 use super::state::address;
 use super::told;
 
-/// Endings of meshes that ParaView reads; the others MeshLab does.
+/// Endings of meshes that `ParaView` reads; the others `MeshLab` does.
 const OF_PARAVIEW: [&str; 3] = ["ply", "obj", "stl"];
 
 /// Links and commands for the server at `origin`, such as `http://127.0.0.1:8000`, a line each.
@@ -35,9 +35,10 @@ pub fn links(shown: &Shown, origin: &str) -> String {
 fn of_store(shown: &Shown, name: &str, folder: &Folder) -> String {
     let images = || shown.images.iter().filter(|image| root_of(&image.path) == name);
     let first = images().map(|image| image.kind).min();
-    let opened = images().filter(|image| match images().any(|image| image.path == name) {
-        true => image.path == name,
-        false => Some(image.kind) == first || image.kind == Kind::Labels,
+    let has_root = images().any(|image| image.path == name);
+    let opened = images().filter(|image| {
+        let is_picture = Some(image.kind) == first || image.kind == Kind::Labels;
+        if has_root { image.path == name } else { is_picture }
     });
     let lines = opened.map(|image| {
         let inside = image.path.strip_prefix(name).unwrap_or_default().trim_start_matches('/');

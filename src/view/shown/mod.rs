@@ -137,7 +137,7 @@ impl Shown {
         let why = match self.faults.as_slice() {
             [] if is_meant_as_store(&self.path) => format!(": {}", unshown(&self.path)),
             [] => String::new(),
-            [few @ .., last] if few.len() < MOST_TOLD => format!(": {}", [few, &[last.clone()]].concat().join("; ")),
+            few if few.len() <= MOST_TOLD => format!(": {}", few.join("; ")),
             several => format!(": {}; and {} more", several[..MOST_TOLD].join("; "), several.len() - MOST_TOLD),
         };
         let what = "holds nothing that can be shown";
