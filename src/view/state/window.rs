@@ -8,6 +8,8 @@ use crate::view::described::Image;
 
 /// Voxels that are looked at, at most: those of the coarsest level, or its middle.
 const MOST: i64 = 1 << 20;
+/// Bytes that reading may take beside that: a server has little memory.
+const MOST_BYTES: u64 = 32 << 20;
 /// Shares of the voxels that are darker than black, and not brighter than white.
 const DARK: f64 = 0.01;
 const BRIGHT: f64 = 0.998;
@@ -18,8 +20,10 @@ pub(super) fn window(image: &Image, channel: u32) -> Option<[f64; 2]> {
     let time = u32::try_from(times.saturating_sub(1) / 2).ok()?;
     let select = Select { channel, time, level: image.levels.saturating_sub(1), ..Select::default() };
     let stack = open_stack(&image.folder, select).ok()?;
-    let shape = stack.shape();
-    let part = middle(shape);
+    if stack.decoding_bytes() > MOST_BYTES {
+        return None;
+    }
+    let part = middle(stack.shape());
     let length = part.len();
     let mut values: Vec<f64> = match stack.element() {
         ElementType::U8 => read(length, |out| stack.read_box(&part, SamplesMut::U8(out)).is_ok())?,
