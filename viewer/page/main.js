@@ -152,13 +152,17 @@ const follow = async (viewer, before) => {
   } else {
     try {
       if (isReplaced(live, before)) return startAnew();
-      // The one that was shown is not there any more.
-      if (live.store !== before.store && !live.gone) return show(live.store);
-      introduce(live);
-      if (live.shown !== before.shown) await followLayers(viewer);
-      const isOther = live.written !== before.written || JSON.stringify(live.stores) !== JSON.stringify(before.stores);
-      if (isOther || live.gone !== before.gone) readAgain(viewer);
-      known = live;
+      if (live.store !== before.store && !live.gone) {
+        // The one that is shown is not there any more: it may come back, and others are there to be chosen.
+        offer(live.choices.length > 0 ? live.choices : [live.store], "");
+        element("status").textContent = `${before.store} is gone`;
+      } else {
+        introduce(live);
+        if (live.shown !== before.shown) await followLayers(viewer);
+        const isOther = live.written !== before.written || JSON.stringify(live.stores) !== JSON.stringify(before.stores);
+        if (isOther || live.gone !== before.gone) readAgain(viewer);
+        known = live;
+      }
     } catch (error) {
       // It is tried again at the next look.
       console.warn(error);
