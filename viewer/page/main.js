@@ -137,7 +137,7 @@ const isReplaced = (live, before) => {
 };
 
 const startAnew = () => {
-  history.replaceState(null, "", location.pathname + location.search);
+  history.replaceState(null, "", location.pathname + (element("choice").hidden ? location.search : asking(store)));
   location.reload();
 };
 
