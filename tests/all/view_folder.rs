@@ -23,7 +23,11 @@ fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap().map(|entry| entry.unwrap().path()) {
         let other = to.join(entry.file_name().unwrap());
-        if entry.is_dir() { copy(&entry, &other) } else { drop(fs::copy(&entry, &other).unwrap()) }
+        if entry.is_dir() {
+            copy(&entry, &other);
+        } else {
+            fs::copy(&entry, &other).unwrap();
+        }
     }
 }
 
@@ -79,7 +83,8 @@ fn layers_of_a_few_stores_lie_beside_each_other() {
     assert_eq!(names(&near).len(), 7);
     let (mut these, mut those) = (names(&near), names(&far));
     assert_eq!(those[0], "far distance", "what is seen lies first");
-    (these.sort_unstable(), those.sort_unstable());
+    these.sort_unstable();
+    those.sort_unstable();
     assert_eq!(these, those);
     assert_eq!(seen(&far), ["far distance"]);
     assert_eq!(near["dimensions"]["x"][1], "m");
