@@ -8,12 +8,10 @@
 // of a store that is still written does not stay where it was moved to, or where one of another does not say that the store was taken away,
 // that it is there again, or that the server has ended.
 
-import { spawn } from "node:child_process";
 import { renameSync } from "node:fs";
 import { basename, join } from "node:path";
-import { createInterface } from "node:readline";
 import { PNG } from "pngjs";
-import puppeteer from "puppeteer-core";
+import { launch, serve } from "./browser.mjs";
 
 const WIDTH = 1280;
 const HEIGHT = 800;
@@ -45,13 +43,6 @@ const LOOKS = {
 const pixelsOf = (picture) => {
   const { width, data } = PNG.sync.read(Buffer.from(picture));
   return Array.from({ length: data.length / 4 }, (_, n) => [n % width, Math.floor(n / width), data.subarray(4 * n, 4 * n + 3)]);
-};
-
-const serve = async (store) => {
-  const server = spawn(process.env.STRANDLINE, ["view", store, "--no-open", "--for", "10min"], { stdio: ["ignore", "pipe", "inherit"] });
-  const lines = createInterface({ input: server.stdout });
-  for await (const line of lines) return { server, url: line.trim() };
-  throw new Error(`strandline view ${store} said nothing`);
 };
 
 // Bytes that were loaded when the middle of the section in the upper left was first to be seen: no colour, such as
@@ -204,11 +195,7 @@ const look = async (browser, store, wanted) => {
   return faults.length === 0;
 };
 
-const browser = await puppeteer.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
-  defaultViewport: { width: WIDTH, height: HEIGHT },
-});
+const browser = await launch({ width: WIDTH, height: HEIGHT });
 let good = true;
 const given = process.argv.slice(2);
 for (let n = 0; n + 1 < given.length; n += 2) good = (await look(browser, given[n], given[n + 1])) && good;
