@@ -22,6 +22,16 @@ const CHANGES = [
   // A shard that was not there may be there when it is asked for again: a store that lives fills while it is looked at. What is found
   // missing is therefore not remembered.
   ["codec/sharding_indexed/decode.js", "if (shardIndex === void 0) {", (words) => `${words} this.indexCache.chunks.get(this.indexCache.encodeKeyFunction(key.base))?.freeSystemMemory();`],
+  // What is of a unit that is not known is drawn without one; the state says what is known of others' spellings.
+  ["datasource/zarr/ome.js", "throw new Error(`Unsupported unit: ${JSON.stringify(unit)}`);", () => 'return { unit: "", scale: 1 };'],
+  // Labels are often of 64 bits with a sign, as Zarr 2 may have them here, and masks of truth values, which take a byte.
+  [
+    "zarr/metadata/parse.js",
+    "verifyEnumString(x, DataType, /^[a-z0-9]+$/)",
+    () => 'verifyEnumString({ int64: "uint64", bool: "uint8" }[x] ?? x, DataType, /^[a-z0-9]+$/)',
+  ],
+  ["zarr/metadata/parse.js", "function parseFillValue(dataType, value) {", (words) => `${words} if (typeof value === "boolean") value = Number(value);`],
+  ["util/numpy_dtype.js", 'supportedDataTypes.set("|i1", {', (words) => `supportedDataTypes.set("|b1", { endianness: Endianness.LITTLE, dataType: DataType.UINT8 });\n${words}`],
   // The page's title tells whose page it is.
   ["ui/title.js", "${value} - neuroglancer", () => "${value} - strandline"],
   ["ui/title.js", 'document.title = "neuroglancer"', () => 'document.title = "strandline"'],
@@ -87,7 +97,7 @@ const licences = [...packages].sort().map((name) => {
   const folder = join(here, "node_modules", name);
   const { version, license } = JSON.parse(readFileSync(join(folder, "package.json"), "utf8"));
   const file = ["LICENSE", "LICENSE.md", "LICENSE.txt"].map((file) => join(folder, file)).find(existsSync);
-  const changed = name === "neuroglancer" ? "Changed here: shards that are not there are asked for again, modules lie in one folder, titles end in strandline.\n\n" : "";
+  const changed = name === "neuroglancer" ? "Changed here: shards that are not there are asked for again, units that are not known are none, truth values and signed numbers of 64 bits are read, modules lie in one folder, titles end in strandline.\n\n" : "";
   return `${name} ${version}, ${license}\n\n${changed}${readFileSync(file, "utf8").trim()}\n`;
 });
 writeFileSync(join(out, "LICENSES"), licences.join(`\n${"-".repeat(80)}\n\n`));

@@ -8,12 +8,10 @@
 // of a store that is still written does not stay where it was moved to, or where one of another does not say that the store was taken away,
 // that it is there again, or that the server has ended.
 
-import { spawn } from "node:child_process";
 import { renameSync } from "node:fs";
 import { basename, join } from "node:path";
-import { createInterface } from "node:readline";
 import { PNG } from "pngjs";
-import puppeteer from "puppeteer-core";
+import { launch, serve } from "./browser.mjs";
 
 const WIDTH = 1280;
 const HEIGHT = 800;
@@ -45,13 +43,6 @@ const LOOKS = {
 const pixelsOf = (picture) => {
   const { width, data } = PNG.sync.read(Buffer.from(picture));
   return Array.from({ length: data.length / 4 }, (_, n) => [n % width, Math.floor(n / width), data.subarray(4 * n, 4 * n + 3)]);
-};
-
-const serve = async (store) => {
-  const server = spawn(process.env.STRANDLINE, ["view", store, "--no-open", "--for", "10min"], { stdio: ["ignore", "pipe", "inherit"] });
-  const lines = createInterface({ input: server.stdout });
-  for await (const line of lines) return { server, url: line.trim() };
-  throw new Error(`strandline view ${store} said nothing`);
 };
 
 // Bytes that were loaded when the middle of the section in the upper left was first to be seen: no colour, such as
@@ -99,10 +90,11 @@ const arriving = async (browser, url) => {
     window.step = 0;
     window.fetch = async (name, how) => {
       const answer = await ask(name, how);
-      if (name !== "state.json" && name !== "live.json") return answer;
+      const [asked] = String(name).split("?");
+      if (asked !== "state.json" && asked !== "live.json") return answer;
       const told = await answer.json();
       const [image, labels] = told.layers ?? [];
-      if (name === "live.json") Object.assign(told, { running: true, shown: String(window.step) });
+      if (asked === "live.json") Object.assign(told, { running: true, shown: String(window.step) });
       else told.layers = [[{ ...image, shaderControls: {} }], [labels], [], told.layers][window.step];
       return new Response(JSON.stringify(told));
     };
@@ -192,7 +184,7 @@ const look = async (browser, store, wanted) => {
     }
     console.log(`${store}: ${(bytes / 1e6).toFixed(2)} MB loaded`);
     const about = await page.evaluate(() => [document.title, document.getElementById("name").textContent, document.querySelector("#reports a")?.href]);
-    const report = `${url}data/${encodeURIComponent(basename(store)).replaceAll(".", "%2E")}/report.html`;
+    const report = `${url}data/${encodeURIComponent(basename(store))}/report.html`;
     if (about.join() !== [`${basename(store)} - strandline`, basename(store), report].join()) faults.push(`the page calls itself ${about}`);
     if (stayed === undefined) faults.push(...(await arriving(browser, url)), ...(await vanishing(page, store, server)));
     await page.close();
@@ -203,11 +195,7 @@ const look = async (browser, store, wanted) => {
   return faults.length === 0;
 };
 
-const browser = await puppeteer.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
-  defaultViewport: { width: WIDTH, height: HEIGHT },
-});
+const browser = await launch({ width: WIDTH, height: HEIGHT });
 let good = true;
 const given = process.argv.slice(2);
 for (let n = 0; n + 1 < given.length; n += 2) good = (await look(browser, given[n], given[n + 1])) && good;

@@ -3,13 +3,11 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{Read, Seek, SeekFrom};
-use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
-use std::time::{Duration, Instant};
+use std::sync::Arc;
 
 use axum::Router;
 use axum::body::Body;
-use axum::extract::{Path, Request, State};
+use axum::extract::{Path, RawQuery, Request, State};
 use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
 use axum::http::{Method, StatusCode};
 use axum::middleware::{self, Next};
@@ -20,11 +18,12 @@ use serde_json::{Map, Value, json};
 use tokio::io::AsyncReadExt;
 use tokio_util::io::ReaderStream;
 
+use super::choice::{Chosen, asked, choices};
 use super::folder::Opened;
-use super::present::Present;
 use super::ranges::{Asked, Part, part};
 use super::shown::{Drawn, MeshFile, Shown};
-use super::{mesh, page, state, told};
+use super::site::{Now, Site};
+use super::{mesh, page, told};
 use crate::io::geometry::write::precomputed;
 use crate::io::ome_zarr::{Live, LiveState};
 
@@ -35,83 +34,9 @@ const PAGE_POLICY: &str = "sandbox; default-src 'none'; img-src data:; style-src
 /// Metres where nobody says what a unit of length is: the page takes the numbers as they are.
 const NO_UNIT: f64 = 1.0;
 
-/// What all answers are made of.
-struct Site {
-    now: RwLock<Arc<Now>>,
-}
-
-/// What is shown at a moment.
-struct Now {
-    shown: Shown,
-    state: String,
-    /// Whether it was live when it was looked at.
-    is_live: bool,
-    /// Whether nothing of it is there any more.
-    is_gone: bool,
-    /// Whether it was taken away while it was written.
-    is_cut_short: bool,
-    /// The stores that were there, and what lay beside them.
-    present: Vec<Present>,
-    listed: Vec<PathBuf>,
-    looked: Mutex<Instant>,
-}
-
-/// Time after which it is looked again what there is.
-const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
-
-impl Now {
-    fn new(shown: Shown) -> Self {
-        let (state, present) = (state::state(&shown).to_string(), shown.present());
-        let (is_live, listed, looked) = (shown.is_live(), shown.listed(), Mutex::new(Instant::now()));
-        Self { shown, state, is_live, is_gone: false, is_cut_short: false, present, listed, looked }
-    }
-
-    /// What there is a moment later. What cannot be looked at any more stays as it was seen, and nobody writes it.
-    fn next(&self) -> Self {
-        self.shown.again().map_or_else(
-            |_| {
-                let (shown, state) = (self.shown.clone(), self.state.clone());
-                // What an interrupted run has left before there was anything to show is there.
-                let is_gone = shown.live().next().is_none();
-                let is_cut_short = is_gone && (self.is_live || self.is_cut_short);
-                let (is_live, looked) = (shown.is_live(), Mutex::new(Instant::now()));
-                let (present, listed) = (self.present.clone(), self.listed.clone());
-                Self { shown, state, is_live, is_gone, is_cut_short, present, listed, looked }
-            },
-            Self::new,
-        )
-    }
-
-    /// Whether it is time to look again, which this is then.
-    fn is_due(&self) -> bool {
-        let mut looked = self.looked.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_due = looked.elapsed() > BETWEEN_LOOKS;
-        if is_due {
-            *looked = Instant::now();
-        }
-        is_due
-    }
-}
-
-impl Site {
-    fn now(&self) -> Arc<Now> {
-        self.now.read().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
-    /// What is shown, looked at lately. Reads folders.
-    fn looked_at(&self) -> Arc<Now> {
-        let now = self.now();
-        let is_other = || now.shown.present() != now.present || now.shown.listed() != now.listed;
-        if now.is_due() && (now.is_live || now.is_gone || is_other()) {
-            *self.now.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(now.next());
-        }
-        self.now()
-    }
-}
-
 /// The answers for what is shown.
 pub(super) fn router(shown: Shown) -> Router {
-    let site = Arc::new(Site { now: RwLock::new(Arc::new(Now::new(shown))) });
+    let site = Arc::new(Site::new(shown));
     Router::new()
         .route("/", get(|headers: HeaderMap| async move { page_file("", &headers) }))
         .route("/state.json", get(page_state))
@@ -131,8 +56,25 @@ async fn looked_at(site: Arc<Site>) -> Arc<Now> {
     tokio::task::spawn_blocking(move || site.looked_at()).await.unwrap_or(before)
 }
 
-async fn page_state(State(site): State<Arc<Site>>) -> Response {
-    of_type("application/json", looked_at(site).await.state.clone())
+/// What is told of what is shown, seen from the store that a request asks for.
+async fn told_of(site: Arc<Site>, query: Option<String>, tell: fn(&Now, &Chosen<'_>) -> String) -> Response {
+    let told = move || {
+        let now = site.looked_at();
+        let asked = asked(query.as_deref());
+        tell(&now, &Chosen::new(&now.shown, asked.as_deref()))
+    };
+    match tokio::task::spawn_blocking(told).await {
+        Ok(told) => of_type("application/json", told),
+        Err(_) => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
+    }
+}
+
+async fn page_state(State(site): State<Arc<Site>>, RawQuery(query): RawQuery) -> Response {
+    told_of(site, query, |now, chosen| now.state(chosen).to_string()).await
+}
+
+async fn live(State(site): State<Arc<Site>>, RawQuery(query): RawQuery) -> Response {
+    told_of(site, query, live_state).await
 }
 
 /// Pages of other origins may read what is shown, as a neuroglancer elsewhere does; nothing can be changed here.
@@ -176,10 +118,9 @@ fn text<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     headers.get(name).and_then(|value| value.to_str().ok())
 }
 
-/// What the page is of and what there is to say of it, how far the stores are that are still written, a number that grows with what is
+/// What the page is of, which store it shows of which, and what there is to say of it, how far the stores are that are still written, a number that grows with what is
 /// written, one that is another when there is something else to show, and one for each store that is another when that is.
-async fn live(State(site): State<Arc<Site>>) -> Response {
-    let now = looked_at(site).await;
+fn live_state(now: &Now, chosen: &Chosen<'_>) -> String {
     let states: Vec<Live> = now.shown.live().collect();
     let running = states.iter().filter(|live| live.state == LiveState::Running);
     let share = running.clone().map(|live| live.done).fold(1.0, f64::min);
@@ -195,16 +136,17 @@ async fn live(State(site): State<Arc<Site>>) -> Response {
     };
     let written: u64 = states.iter().map(|live| live.written).sum();
     let mut hasher = DefaultHasher::new();
-    now.state.hash(&mut hasher);
+    now.state(chosen).hash(&mut hasher);
     let shown = format!("{:x}", hasher.finish());
     let stores: Map<String, Value> =
         now.present.iter().map(|store| (store.name.clone(), format!("{:x}", store.number).into())).collect();
     let answer = json!({
-        "name": now.shown.name, "reports": told::links(&now.shown), "notes": told::notes(&now.shown),
+        "name": now.shown.name, "store": chosen.root, "choices": choices(&now.shown),
+        "reports": told::links(chosen), "notes": told::notes(chosen),
         "running": now.is_live, "gone": now.is_gone, "text": words,
         "written": written, "shown": shown, "stores": stores,
     });
-    of_type("application/json", answer.to_string())
+    answer.to_string()
 }
 
 async fn mesh_part(State(site): State<Arc<Site>>, Path(name): Path<String>) -> Response {
@@ -229,7 +171,7 @@ async fn part_of_mesh(shown: &Shown, meshes: &[MeshFile], name: &str) -> Respons
         return of_type("application/json", json!({ "fragments": [mesh.segment.to_string()] }).to_string());
     }
     let Some(mesh_file) = numbered(name) else { return StatusCode::NOT_FOUND.into_response() };
-    let metres = shown.images.iter().flat_map(|image| &image.axes).find_map(|axis| axis.metres).unwrap_or(NO_UNIT);
+    let metres = shown.axes_at(&mesh_file.path).iter().find_map(|axis| axis.metres).unwrap_or(NO_UNIT);
     let drawn = mesh_file.drawn.clone();
     let read = move || match drawn {
         Drawn::Fragment(file) => std::fs::read(file).ok(),

@@ -1,14 +1,22 @@
-//! What OME-Zarr says of an image (versions 0.4 and 0.5): its axes, grey range, colours of labels.
+//! What OME-Zarr says of an image (versions 0.4 and 0.5): its axes, grey range, colours of labels; or what it does not say, without which
+//! the image cannot be shown.
 
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::io::geometry::read::points::LengthUnit;
-use crate::io::stack::interval::seconds;
+use super::documents::json;
+use crate::io::stack::interval::{Interval, seconds};
+use crate::io::stack::units;
 
-/// A file of metadata is shorter than this.
-const MOST_BYTES: u64 = 16 << 20;
+/// Types that the page draws, as Zarr 3 names them; those of version 2 without their byte order.
+const DRAWN: [&str; 10] = ["bool", "uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32"];
+const DRAWN_OLDER: [&str; 10] = ["b1", "u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4"];
+/// Versions that the page does not draw, of those that OME-Zarr had.
+const OLDER: [&str; 3] = ["0.1", "0.2", "0.3"];
+
+/// What a document says, or what is missing in it.
+type Said<T> = std::result::Result<T, String>;
 
 /// What an image's values are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -26,6 +34,8 @@ pub(super) enum Kind {
 pub(super) struct Image {
     /// Its path on the server, without a slash at its ends.
     pub(super) path: String,
+    /// Where it lies.
+    pub(super) folder: PathBuf,
     pub(super) name: String,
     pub(super) kind: Kind,
     /// Whether it is a Zarr of version 2, as OME-Zarr 0.4 is.
@@ -33,8 +43,9 @@ pub(super) struct Image {
     /// Whether a voxel has four bytes or more.
     pub(super) is_wide: bool,
     pub(super) axes: Vec<Axis>,
-    /// The values from black to white.
-    pub(super) window: Option<[f64; 2]>,
+    pub(super) levels: u32,
+    /// What is said of its channels, as far as anything is.
+    pub(super) channels: Vec<Channel>,
     /// What stands where nothing was solved.
     pub(super) unsolved: Unsolved,
     /// Colours of labels: number, red, green, blue.
@@ -50,10 +61,26 @@ pub(super) struct Unsolved {
     pub(super) beyond: Option<f64>,
 }
 
+/// What is said of a channel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Channel {
+    pub(super) name: Option<String>,
+    pub(super) color: Option<[u8; 3]>,
+    /// The values from black to white.
+    pub(super) window: Option<[f64; 2]>,
+    /// Whether it is not to be seen at first.
+    pub(super) is_off: bool,
+}
+
 /// An axis of an image.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     pub(super) name: String,
+    /// Whether it counts channels.
+    pub(super) is_channel: bool,
+    /// Whether its unit is spelled in a way of its own, or is none that is known, or whether it does not say that it counts channels: the
+    /// page has to be told.
+    pub(super) is_odd: bool,
     /// Metres of a unit; none where the axis has no length.
     pub(super) metres: Option<f64>,
     /// Seconds of a unit, where it is one of time.
@@ -87,60 +114,88 @@ pub(super) fn multiscale(folder: &Path) -> Option<Multiscale> {
     }
 }
 
-/// The document of a folder that cannot be understood, and why.
-pub(super) fn fault(folder: &Path) -> Option<(PathBuf, String)> {
-    let path = ["zarr.json", ".zattrs"].map(|name| folder.join(name)).into_iter().find(|path| path.exists())?;
-    let why = match std::fs::metadata(&path).and_then(|found| Ok((found.len(), std::fs::read(&path)?))) {
-        Ok((length, _)) if length > MOST_BYTES => format!("is larger than {} MiB", MOST_BYTES >> 20),
-        Ok((_, text)) => format!("is no JSON: {}", serde_json::from_slice::<Value>(&text).err()?),
-        Err(error) => format!("cannot be read: {error}"),
-    };
-    Some((path, why))
-}
-
-fn json(path: &Path) -> Option<Value> {
-    let is_short = std::fs::metadata(path).ok()?.len() <= MOST_BYTES;
-    serde_json::from_slice(&std::fs::read(path).ok().filter(|_| is_short)?).ok()
-}
-
-pub(super) fn image(path: &str, folder: &Path, found: &Multiscale) -> Option<Image> {
+/// The axes of an image, and the document of its finest level.
+///
+/// # Errors
+/// What is missing, or cannot be drawn.
+fn axes(folder: &Path, found: &Multiscale) -> Said<(Vec<Axis>, Value)> {
     let described = &found.attributes["multiscales"][0];
+    let version = found.attributes["version"].as_str().or(described["version"].as_str());
+    if let Some(older) = version.filter(|version| OLDER.contains(version)) {
+        return Err(format!(
+            "is of OME-Zarr {older}, which the page does not draw; strandline convert makes one of 0.5"
+        ));
+    }
     let finest = &described["datasets"][0];
-    let array = folder.join(finest["path"].as_str()?);
-    let array = json(&array.join(if found.is_version_2 { ".zarray" } else { "zarr.json" }))?;
+    let level = finest["path"].as_str().ok_or("names no level (no datasets)")?;
+    let document = if found.is_version_2 { ".zarray" } else { "zarr.json" };
+    let array = json(&folder.join(level).join(document))
+        .filter(|array| array["shape"].is_array())
+        .ok_or_else(|| format!("names the level {level}, and {level}/{document} is no array of Zarr"))?;
+    let (drawn, key) = if found.is_version_2 { (DRAWN_OLDER, "dtype") } else { (DRAWN, "data_type") };
+    let of_type = array[key].as_str().unwrap_or("a type of its own");
+    if !drawn.contains(&of_type.trim_start_matches(['<', '>', '|'])) {
+        return Err(format!("is of {of_type}, which the page does not draw"));
+    }
+    let named = described["axes"].as_array().filter(|axes| !axes.is_empty()).ok_or("names no axes")?;
+    let rank = array["shape"].as_array().map_or(0, Vec::len);
+    if named.len() != rank {
+        return Err(format!("names {} axes, and its level {level} has {rank}", named.len()));
+    }
     let transforms = [&finest["coordinateTransformations"], &described["coordinateTransformations"]];
-    let vector = |kind: &str, n: usize, neutral: f64, joined: fn(f64, f64) -> f64| {
+    let axes: Said<Vec<Axis>> = named
+        .iter()
+        .enumerate()
+        .map(|(n, axis)| self::axis(axis, array["shape"][n].as_u64(), (transforms, n)))
+        .collect();
+    Ok((axes?, array))
+}
+
+/// The n-th axis, with the transformations of the level and of the image.
+fn axis(axis: &Value, voxels: Option<u64>, (transforms, n): ([&Value; 2], usize)) -> Said<Axis> {
+    let vector = |kind: &str, neutral: f64, joined: fn(f64, f64) -> f64| {
         let all = transforms.iter().flat_map(|list| list.as_array().into_iter().flatten());
         all.filter_map(|t| t[kind][n].as_f64()).fold(neutral, joined)
     };
-    let axis = |(n, axis): (usize, &Value)| {
-        // Version 0.3 named axes by words alone.
-        let name = axis["name"].as_str().or(axis.as_str())?;
-        let unit = axis["unit"].as_str().map(LengthUnit::named);
-        let seconds = axis["unit"].as_str().and_then(seconds).filter(|_| axis["type"] == "time");
-        let is_space = axis["type"].as_str().map_or(["x", "y", "z"].contains(&name), |kind| kind == "space");
-        Some(Axis {
-            name: name.to_owned(),
-            metres: unit.flatten().map(|unit| unit.metres).filter(|_| is_space),
-            seconds,
-            voxels: array["shape"][n].as_u64()?,
-            spacing: vector("scale", n, 1.0, |a, b| a * b),
-            origin: vector("translation", n, 0.0, |a, b| a + b),
-        })
+    // Version 0.3 named axes by words alone.
+    let name = axis["name"].as_str().or(axis.as_str()).ok_or_else(|| format!("gives axis {} no name", n + 1))?;
+    let kind = axis["type"].as_str();
+    let is_channel = kind.map_or(["c", "channel"].contains(&name), |kind| kind == "channel");
+    let is_space = kind.map_or(["x", "y", "z"].contains(&name), |kind| kind == "space");
+    let spelled = axis["unit"].as_str().unwrap_or_default();
+    let length = match units::parse(spelled) {
+        units::Unit::Length(name, metres) if is_space => Some((name, metres)),
+        _ => None,
     };
-    let axes: Vec<Axis> = described["axes"].as_array()?.iter().enumerate().map(axis).collect::<Option<_>>()?;
-    // Nothing could be placed on such axes.
-    if axes.iter().any(|axis| axis.voxels == 0 || axis.spacing == 0.0) {
-        return None;
+    let interval = Interval::told(1.0, spelled).filter(|_| kind == Some("time"));
+    let known = length.map(|(name, _)| name).or(interval.as_ref().map(|interval| interval.unit.as_str()));
+    let is_odd = known.unwrap_or_default() != spelled || (is_channel && kind.is_none());
+    let voxels = voxels.filter(|voxels| *voxels > 0).ok_or_else(|| format!("has no voxels along {name}"))?;
+    let (spacing, origin) = (vector("scale", 1.0, |a, b| a * b), vector("translation", 0.0, |a, b| a + b));
+    // Nothing could be placed on such an axis.
+    if !(spacing > 0.0 && spacing.is_finite() && origin.is_finite()) {
+        return Err(format!("has a scale of {spacing} along {name}, with which nothing can be drawn"));
     }
-    let window = &found.attributes["omero"]["channels"][0]["window"];
+    let (metres, seconds) = (length.map(|(_, metres)| metres), interval.and_then(|interval| seconds(&interval.unit)));
+    Ok(Axis { name: name.to_owned(), is_channel, is_odd, metres, seconds, voxels, spacing, origin })
+}
+
+/// What an image is, in a store whose root is an image or not.
+///
+/// # Errors
+/// Why it cannot be shown.
+pub(super) fn image(path: &str, folder: &Path, found: &Multiscale, is_beside_one: bool) -> Said<Image> {
+    let described = &found.attributes["multiscales"][0];
+    let (axes, array) = axes(folder, found)?;
+    let said = found.attributes["omero"]["channels"].as_array();
+    let channels: Vec<Channel> = said.into_iter().flatten().map(channel).collect();
     let is_labels = found.attributes["image-label"].is_object() || path.contains("/labels/");
-    let kind = match (is_labels, path.contains('/')) {
+    let kind = match (is_labels, is_beside_one) {
         (true, _) => Kind::Labels,
         (_, true) => Kind::Field,
         _ => Kind::Picture,
     };
-    let window = window["start"].as_f64().zip(window["end"].as_f64()).map(|(low, high)| [low, high]);
+    let window = channels.first().and_then(|channel| channel.window);
     let name = described["name"].as_str().filter(|name| !name.is_empty()).unwrap_or(path);
     let beyond = if name != "distance" {
         None
@@ -150,16 +205,20 @@ pub(super) fn image(path: &str, folder: &Path, found: &Multiscale) -> Option<Ima
     } else {
         json(&folder.join("report.json")).and_then(|report| report["settings"]["max_distance"].as_f64())
     };
+    // A zero of another program's image is a value like any other.
+    let is_ours = kind == Kind::Field || name == "distance" || folder.join("report.json").exists();
     let fill = array["fill_value"].as_f64();
-    let unsolved = if is_real(&array) { Unsolved { fill, beyond } } else { Unsolved::default() };
-    Some(Image {
+    let unsolved = if is_real(&array) && is_ours { Unsolved { fill, beyond } } else { Unsolved::default() };
+    Ok(Image {
         path: path.to_owned(),
+        folder: folder.to_path_buf(),
         name: name.to_owned(),
         kind,
         is_version_2: found.is_version_2,
         is_wide: is_wide(&array),
         axes,
-        window,
+        levels: described["datasets"].as_array().map_or(1, |levels| levels.len() as u32),
+        channels,
         unsolved,
         colors: colors(&found.attributes["image-label"]["colors"]),
     })
@@ -176,6 +235,21 @@ fn is_wide(array: &Value) -> bool {
     let name = array["data_type"].as_str().or(array["dtype"].as_str()).unwrap_or_default();
     let size = name.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(0);
     if array["dtype"].is_string() { size >= 4 } else { size >= 32 }
+}
+
+fn channel(said: &Value) -> Channel {
+    let window = &said["window"];
+    let hex = said["color"].as_str().map(|color| color.trim_start_matches('#')).filter(|color| color.is_ascii());
+    let part = |n: usize| u8::from_str_radix(hex?.get(2 * n..2 * n + 2)?, 16).ok();
+    let color = || Some([part(0)?, part(1)?, part(2)?]);
+    let ends = window["start"].as_f64().zip(window["end"].as_f64());
+    Channel {
+        name: said["label"].as_str().filter(|label| !label.is_empty()).map(ToOwned::to_owned),
+        // Black would not be seen.
+        color: color().filter(|color| *color != [0; 3]),
+        window: ends.filter(|(low, high)| low < high).map(|(low, high)| [low, high]),
+        is_off: said["active"] == false,
+    }
 }
 
 fn colors(list: &Value) -> Vec<(u64, [u8; 3])> {

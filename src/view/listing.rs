@@ -20,14 +20,10 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     entries
 }
 
-/// Folders in a folder that may be groups: those of chunks have numbers for names, and hidden ones are under way.
+/// Folders in a folder; hidden ones are under way.
 pub(super) fn folders(folder: &Path) -> Vec<PathBuf> {
-    let may_be_group = |path: &PathBuf| {
-        let name = file_name(path);
-        let is_chunks = name == "c" || name.bytes().all(|byte| byte.is_ascii_digit());
-        path.is_dir() && !path.is_symlink() && !is_chunks && !name.starts_with('.')
-    };
-    entries(folder).into_iter().filter(may_be_group).collect()
+    let is_folder = |path: &PathBuf| path.is_dir() && !path.is_symlink() && !file_name(path).starts_with('.');
+    entries(folder).into_iter().filter(is_folder).collect()
 }
 
 pub(super) fn files(folder: &Path) -> Vec<PathBuf> {

@@ -1,43 +1,62 @@
 //! What the page's line says beside the state of a run: whose page it is, where the reports are, and what cannot be shown.
 
-use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 
+use super::choice::{Chosen, name_in_address};
 use super::listing::{file_name, quoted};
 use super::shown::{Series, Shown};
 
 /// The page of a run, in its store, and that of a batch, beside its stores.
 const REPORT: &str = "report.html";
 pub(super) const BATCH: &str = "summary.html";
-/// Reports that are linked, at most.
-const MOST: usize = 4;
-/// Notes that a line has room for.
-const MOST_NOTES: usize = 3;
 /// Times that are named, at most.
 const MOST_TIMES: usize = 12;
 
-/// The addresses of reports on the server, and what each is called. Of a batch its own comes first.
-pub(super) fn reports(shown: &Shown) -> Vec<(String, String)> {
+/// A report.
+pub(super) struct Report {
+    /// The store that it is of; none of that of a batch.
+    root: Option<String>,
+    title: String,
+    /// Its address on the server.
+    pub(super) address: String,
+}
+
+/// All reports. Of a batch its own comes first.
+pub(super) fn reports(shown: &Shown) -> Vec<Report> {
     let own = shown.beside.as_ref().filter(|folder| folder.root().join(BATCH).is_file());
-    let own = own.map(|_| ("summary".to_owned(), format!("/data/{BATCH}")));
+    let own = own.map(|_| Report { root: None, title: "summary".into(), address: format!("/data/{BATCH}") });
     let holding = shown.roots.iter().filter(|(_, folder)| folder.root().join(REPORT).is_file());
-    let of_stores = holding.map(|(name, _)| {
-        let title = if shown.roots.len() == 1 { "report".into() } else { format!("report of {name}") };
-        (title, format!("/data/{}/{REPORT}", utf8_percent_encode(name, NON_ALPHANUMERIC)))
+    let of_stores = holding.map(|(name, _)| Report {
+        root: Some(name.clone()),
+        title: if shown.roots.len() == 1 { "report".into() } else { format!("report of {name}") },
+        address: format!("/data/{}/{REPORT}", name_in_address(name)),
     });
     own.into_iter().chain(of_stores).collect()
 }
 
-/// The links of the page.
-pub(super) fn links(shown: &Shown) -> Value {
-    let link = |(title, address): (String, String)| json!({ "title": title, "address": address });
-    reports(shown).into_iter().take(MOST).map(link).collect()
+/// The links of the page: the report of its store, and that of the batch.
+pub(super) fn links(chosen: &Chosen<'_>) -> Value {
+    let is_of_it = |report: &Report| report.root.as_deref().is_none_or(|root| root == chosen.root);
+    let link = |report: Report| json!({ "title": report.title, "address": report.address });
+    reports(chosen.shown).into_iter().filter(is_of_it).map(link).collect()
 }
 
 /// What is there and not to be seen.
-pub(super) fn notes(shown: &Shown) -> Vec<String> {
-    let faults = shown.faults.iter().cloned();
-    faults.chain(shown.series.iter().map(|series| of_series(shown, series))).take(MOST_NOTES).collect()
+pub(super) fn notes(chosen: &Chosen<'_>) -> Vec<String> {
+    let shown = chosen.shown;
+    let series = shown.series.iter().filter(|series| chosen.has(&series.root));
+    let fields = match chosen.fields_aside() {
+        0 => None,
+        1 => Some("1 more field is in the list of layers (upper right)".to_owned()),
+        n => Some(format!("{n} more fields are in the list of layers (upper right)")),
+    };
+    let others = chosen.leaves_others_out().then(|| {
+        format!("layers are those of {} alone; the other {} stores are chosen here", chosen.root, shown.roots.len() - 1)
+    });
+    let marks = shown.marks.iter().find(|marks| chosen.has(&marks.root) && marks.places.len() < marks.of);
+    let marks = marks.map(|marks| format!("{} of {} marks are drawn", marks.places.len(), marks.of));
+    let of_store = fields.into_iter().chain(marks).chain(series.map(|series| of_series(shown, series)));
+    others.into_iter().chain(of_store).chain(shown.faults.iter().cloned()).collect()
 }
 
 /// Surfaces of single times, which the page cannot tell from each other.

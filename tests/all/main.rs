@@ -76,6 +76,7 @@ mod tiff_hostile;
 mod tiff_levels;
 mod told;
 mod view;
+mod view_folder;
 mod view_page;
 mod viewer_meshes;
 mod zarr_input;

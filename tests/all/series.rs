@@ -353,6 +353,24 @@ fn an_object_leaves_the_part(bench: &Bench) {
     let of_part = ImageReader::open(&bench.path("out/c.zarr")).unwrap().at(5);
     assert_eq!(of_part.read_box(0, &part).unwrap(), whole.read_box(0, &part).unwrap());
     bench.succeed("verify out/c.zarr");
+    refused_times_tell_their_object(bench);
+}
+
+/// A time that was refused tells which object it is, from which marks, moved by how much, and why.
+fn refused_times_tell_their_object(bench: &Bench) {
+    let table = fs::read_to_string(bench.path("out/c.zarr/volumes.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.splitn(15, ',').collect()).collect();
+    assert_eq!((rows[0][10], rows[0][14]), ("marks_from", "reason"));
+    let whole = bench.json("out/x.zarr/report.json");
+    let refused = bench.json("out/c.zarr/report.json")["result"]["times"][5]["refused"][0].clone();
+    let moved = &whole["result"]["times"][5]["objects"][0]["shift_xyz"];
+    assert_eq!((&refused["label"], &refused["marks_from"], &refused["shift_xyz"]), (&1.into(), &0.into(), moved));
+    let last = &rows[6];
+    assert_eq!((last[0], last[2], last[3], last[10]), ("5", "1", "refused", "0"));
+    assert_eq!(last[11].parse::<f64>().unwrap(), moved[0].as_f64().unwrap());
+    let reason = refused["reason"].as_str().unwrap();
+    assert!(!reason.is_empty() && last[14].contains(reason), "{last:?}");
+    assert_eq!((rows[1][3], rows[1][14]), ("done", ""));
 }
 
 #[test]
@@ -435,4 +453,14 @@ fn what_is_odd_is_noted_and_parts_that_fail_are_told() {
     assert_eq!(report["result"]["times"][1]["state"], "partly");
     assert_eq!(volumes(&report, 1).len(), 3);
     bench.succeed("verify out/two.zarr");
+    // The second one's marks are those of time 5 at all times.
+    let table = fs::read_to_string(bench.path("out/two.zarr/volumes.csv")).unwrap();
+    let refused: Vec<Vec<&str>> = table
+        .lines()
+        .map(|line| line.splitn(15, ',').collect())
+        .filter(|row: &Vec<&str>| row[3] == "refused")
+        .collect();
+    let origins: Vec<_> = refused.iter().map(|row| (row[0], row[2], row[10])).collect();
+    assert_eq!(origins, [("4", "2", "5"), ("5", "2", "5"), ("6", "2", "5")]);
+    assert!(refused.iter().all(|row| row[14].contains("object 2")), "{table}");
 }

@@ -385,7 +385,7 @@ fn the_report_of_a_run_is_served_and_asks_for_nothing() {
     let bench = store();
     let told = bench.succeed("view out/ball.zarr --no-open --for 1s --print-links");
     assert!(
-        told.lines().any(|line| line.starts_with("report") && line.ends_with("/data/ball%2Ezarr/report.html")),
+        told.lines().any(|line| line.starts_with("report") && line.ends_with("/data/ball.zarr/report.html")),
         "{told}"
     );
     let served = Served::new(&bench, "out/ball.zarr");

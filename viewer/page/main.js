@@ -1,7 +1,7 @@
 // The page of `strandline view`: neuroglancer laid out as the server's state says, and kept up with what lies on the disk.
 //
-// `state.json` is a state of neuroglancer; sources in it that begin with a slash lie on this server. `live.json` says what the page is of
-// and where its reports are, what is running and how far it is, a number that grows with every shard (when it does, what was read of
+// `state.json` is a state of neuroglancer; sources in it that begin with a slash lie on this server. `live.json` says what the page is of,
+// which store of which it shows, where its reports are, what is running and how far it is, a number that grows with every shard (when it does, what was read of
 // the store is read again), one that is another when there are other layers, and one for each store that is another when another store
 // lies in its place.
 
@@ -32,7 +32,11 @@ const withSources = (state) => ({
 
 const withUrl = (source) => (source && source.url ? { ...source, url: onThisServer(source.url) } : onThisServer(source));
 
-const load = async (name) => (await fetch(name, { cache: "no-store" })).json();
+// The store that the page shows: what its address asks for, then what the server gave, also where others come before that later.
+let store = new URLSearchParams(location.search).get("store");
+const asking = (name) => `?store=${encodeURIComponent(name)}`;
+
+const load = async (name) => (await fetch(store === null ? name : name + asking(store), { cache: "no-store" })).json();
 
 const element = (id) => document.getElementById(id);
 
@@ -83,13 +87,47 @@ const update = (there, before, layer) => {
   initializeLayerFromSpec(there, { ...there.toJSON(), ...Object.fromEntries(changed), visible });
 };
 
-// What the page is of, links to its reports, and what is to be said of it.
-const introduce = ({ name, reports, notes, text }) => {
-  const linkTo = ({ title, address }) => Object.assign(document.createElement("a"), { href: address, textContent: title, target: "_blank", rel: "noopener" });
+// Notes that the line has room for; the others are a click away.
+const MOST_NOTES = 3;
+
+// What the page is of, the stores that there are, links to reports, and what is to be said of it.
+const introduce = ({ name, store, choices, reports, notes, text }) => {
+  const linkTo = ({ title, address }) => make("a", { href: address, textContent: title, target: "_blank", rel: "noopener" });
   element("name").textContent = name;
+  offer(choices, store);
   element("reports").replaceChildren(...reports.map(linkTo));
   element("status").textContent = text;
-  element("notes").textContent = notes.join("; ");
+  tell(notes);
+};
+
+const make = (kind, properties) => Object.assign(document.createElement(kind), properties);
+
+// A choice that somebody has open stays as it is while it says the same.
+const offer = (choices, store) => {
+  const select = element("choice");
+  const told = JSON.stringify(choices);
+  if (select.dataset.told !== told) {
+    select.dataset.told = told;
+    select.replaceChildren(...choices.map((name, n) => make("option", { value: name, textContent: `${n + 1} of ${choices.length}: ${name}` })));
+  }
+  select.hidden = choices.length === 0;
+  select.value = store;
+};
+
+const tell = (notes) => {
+  const place = element("notes");
+  const told = JSON.stringify(notes);
+  if (place.dataset.told === told) return;
+  place.dataset.told = told;
+  const few = notes.length > MOST_NOTES ? notes.slice(0, MOST_NOTES - 1) : notes;
+  const rest = notes.slice(few.length);
+  place.replaceChildren(few.join("; "));
+  if (rest.length === 0) return;
+  const more = make("details", { id: "more" });
+  const list = make("ul", {});
+  list.append(...rest.map((note) => make("li", { textContent: note })));
+  more.append(make("summary", { textContent: `${rest.length} more notes` }), list);
+  place.append("; ", more);
 };
 
 // Whether another store lies in the place of one that was shown, of which the page may know shapes that are not those any more.
@@ -99,9 +137,12 @@ const isReplaced = (live, before) => {
 };
 
 const startAnew = () => {
-  history.replaceState(null, "", location.pathname);
+  history.replaceState(null, "", location.pathname + (element("choice").hidden ? location.search : asking(store)));
   location.reload();
 };
+
+// Another store is another page: nothing of what was set on this one stays.
+const show = (name) => location.assign(location.pathname + asking(name));
 
 const follow = async (viewer, before) => {
   let known = before;
@@ -111,11 +152,17 @@ const follow = async (viewer, before) => {
   } else {
     try {
       if (isReplaced(live, before)) return startAnew();
-      introduce(live);
-      if (live.shown !== before.shown) await followLayers(viewer);
-      const isOther = live.written !== before.written || JSON.stringify(live.stores) !== JSON.stringify(before.stores);
-      if (isOther || live.gone !== before.gone) readAgain(viewer);
-      known = live;
+      if (live.store !== before.store && !live.gone) {
+        // The one that is shown is not there any more: it may come back, and others are there to be chosen.
+        offer(live.choices.length > 0 ? live.choices : [live.store], "");
+        element("status").textContent = `${before.store} is gone`;
+      } else {
+        introduce(live);
+        if (live.shown !== before.shown) await followLayers(viewer);
+        const isOther = live.written !== before.written || JSON.stringify(live.stores) !== JSON.stringify(before.stores);
+        if (isOther || live.gone !== before.gone) readAgain(viewer);
+        known = live;
+      }
     } catch (error) {
       // It is tried again at the next look.
       console.warn(error);
@@ -137,6 +184,9 @@ const byName = (state) => new Map(state.layers.map((layer) => [layer.name, layer
 // What is said before it is looked for: what comes in between is seen at the next look.
 const begun = await load("live.json");
 introduce(begun);
+element("choice").addEventListener("change", (event) => show(event.target.value));
+// A store that has no images yet may be another one's turn.
+if (begun.store !== "") store = begun.store;
 // A store that was just begun has nothing to show yet, and nobody is to be asked for a layer then.
 const viewer = setupDefaultViewer({ showLayerDialog: false, resetStateWhenEmpty: false });
 viewer.title.value = begun.name;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::state::{Object, Stage, State};
+use crate::cli::report::csv::quoted;
 
 /// A row. Volume, area and distances physical.
 #[derive(Clone, Debug, Serialize)]
@@ -98,21 +99,12 @@ fn cell<T: ToString>(value: Option<T>) -> String {
     value.map_or(String::new(), |value| value.to_string())
 }
 
-/// A text as a cell, in quotation marks where it needs them (RFC 4180). What a spreadsheet would compute begins with an
-/// apostrophe, which tells it that this is a text.
-fn quoted(text: &str) -> String {
-    let text = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}") } else { text.into() };
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn cells_keep_what_is_in_them() {
-        assert_eq!((quoted("a b"), quoted("a, \"b\"")), ("a b".into(), "\"a, \"\"b\"\"\"".into()));
-        assert_eq!((quoted("=SUM(1)"), quoted("a=1")), ("'=SUM(1)".into(), "a=1".into()));
         let mut row = rows("x,y", None).remove(0);
         row.volume = Some(0.1);
         assert!(csv(&[row]).ends_with("\n\"x,y\",,,skipped,,,0.1,,,,,\n"));

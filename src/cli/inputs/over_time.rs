@@ -34,6 +34,24 @@ pub(crate) struct Origin {
     pub(crate) shift_is_told: bool,
 }
 
+/// An object at a time, and where its marks are from as far as that is known; seeds have none.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Asked {
+    pub(crate) object: u32,
+    pub(crate) origin: KnownOrigin,
+}
+
+/// As [`Origin`], where it may not have been looked at how far marks moved.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct KnownOrigin {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    marks_from: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shift_xyz: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shift_is_told: Option<bool>,
+}
+
 /// The marks of one time, and where each object's are from.
 pub(crate) struct MarksAt {
     pub(crate) marks: Marks,
@@ -89,6 +107,21 @@ impl MarksOverTime {
     pub(crate) fn objects(&self, seeds: usize) -> Vec<u32> {
         let last = self.marked.keys().last().copied().unwrap_or(0);
         self.marked.keys().copied().chain((1..=seeds as u32).map(|n| last.saturating_add(n))).collect()
+    }
+
+    /// All objects at a time with so many seeds, and where their marks are from; `moved` tells how far, where that was looked at.
+    pub(crate) fn asked(&self, time: u32, seeds: usize, moved: Option<&BTreeMap<u32, Origin>>) -> Vec<Asked> {
+        let origins = self.origins(time);
+        let of = |object: u32| {
+            let moved = moved.and_then(|moved| moved.get(&object));
+            let origin = KnownOrigin {
+                marks_from: origins.get(&object).copied(),
+                shift_xyz: moved.map(|origin| origin.shift_xyz),
+                shift_is_told: moved.map(|origin| origin.shift_is_told),
+            };
+            Asked { object, origin }
+        };
+        self.objects(seeds).into_iter().map(of).collect()
     }
 
     /// The time that each object's marks are taken from at a time.

@@ -1,5 +1,6 @@
 //! What is told after a run: report, tables, pictures.
 
+pub(crate) mod csv;
 pub(crate) mod distance;
 pub(crate) mod lines;
 pub(crate) mod neighbours;

@@ -133,6 +133,9 @@ impl From<crate::pipeline::segment::CrossValidation> for CrossValidation {
 struct Refused {
     label: u32,
     reason: String,
+    /// Where its marks are from, of a series.
+    #[serde(flatten)]
+    origin: Option<Origin>,
 }
 
 /// Distances of the marks from the surface.
@@ -264,7 +267,11 @@ impl Found {
         let single = if let [only] = objects.as_slice() { Some(only.clone()) } else { None };
         let label_voxels = outcome.objects.iter().map(|o| (o.label.to_string(), voxels(o.label))).collect();
         let contacts = outcome.contacts.iter().map(Contact::new).collect();
-        let refused = outcome.refused.iter().map(|r| Refused { label: r.label, reason: r.reason.clone() }).collect();
+        let refused = outcome.refused.iter().map(|r| {
+            let origin = origins.get(&r.label).copied();
+            Refused { label: r.label, reason: r.reason.clone(), origin }
+        });
+        let refused = refused.collect();
         Self { single, label_voxels, objects, refused, neighbours: Neighbours::new(&outcome.neighbours), contacts }
     }
 }

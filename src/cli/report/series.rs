@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use serde_json::{Map, Value, json};
 
+use crate::cli::inputs::over_time::Asked;
+use crate::cli::report::csv;
 use crate::cli::report::table::aligned;
 use crate::cli::terminal::text::number;
 use crate::io::ome_zarr::TimeAxis;
@@ -22,6 +24,8 @@ pub(crate) struct TimeReport {
     pub(crate) report: Option<Value>,
     /// Why nothing of it could be.
     pub(crate) reason: Option<String>,
+    /// Where nothing could be, the objects that were asked for, and where their marks are from.
+    pub(crate) asked: Vec<Asked>,
 }
 
 /// An object at a time.
@@ -32,31 +36,52 @@ pub(crate) struct Row {
     /// What was found of it; none where it was refused.
     pub(crate) found: Option<Value>,
     pub(crate) reason: Option<String>,
+    /// Where its marks are from, as reports tell that.
+    pub(crate) origin: Value,
 }
 
 impl TimeReport {
+    /// A time with the report of its run.
+    pub(crate) fn solved(time: u32, report: Value) -> Self {
+        Self { time, report: Some(report), reason: None, asked: Vec::new() }
+    }
+
     /// What came of all objects, in order of their labels.
     pub(crate) fn rows(&self) -> Vec<Row> {
         let time = self.time;
-        let Some(report) = &self.report else {
-            return vec![Row { time, object: None, found: None, reason: self.reason.clone() }];
+        let (found, refused) = match &self.report {
+            Some(report) => (list(&report["result"]["objects"]), list(&report["result"]["refused"])),
+            None => (Vec::new(), self.refused()),
         };
-        let list = |name: &str| report["result"][name].as_array().cloned().unwrap_or_default();
-        let found = list("objects").into_iter().map(|object| Row {
+        let found = found.into_iter().map(|object| Row {
             time,
             object: object["label"].as_u64(),
-            found: Some(object),
             reason: None,
+            origin: object.clone(),
+            found: Some(object),
         });
-        let refused = list("refused").into_iter().map(|object| Row {
+        let refused = refused.into_iter().map(|object| Row {
             time,
             object: object["label"].as_u64(),
             found: None,
             reason: object["reason"].as_str().map(ToOwned::to_owned),
+            origin: object,
         });
         let mut rows: Vec<Row> = found.chain(refused).collect();
         rows.sort_by_key(|row| row.object);
         rows
+    }
+
+    /// The objects of a time of which nothing could be solved, as reports list those that were refused.
+    fn refused(&self) -> Vec<Value> {
+        let told = |from: &Asked| {
+            let mut told = json!({ "label": from.object, "reason": self.reason });
+            if let (Value::Object(told), Ok(Value::Object(origin))) = (&mut told, serde_json::to_value(from.origin)) {
+                told.extend(origin);
+            }
+            told
+        };
+        self.asked.iter().map(told).collect()
     }
 
     /// The time as the report of the series lists it.
@@ -72,6 +97,8 @@ impl TimeReport {
             // Of one object everything stands in the list, too.
             let lists = ["objects", "refused", "label_voxels", "neighbours", "contacts"];
             told.extend(lists.map(|key| (key.to_owned(), report["result"][key].clone())));
+        } else {
+            told.insert("refused".into(), self.refused().into());
         }
         let state = match (&self.report, self.rows().iter().any(|row| row.reason.is_some())) {
             (None, _) => "refused",
@@ -81,6 +108,10 @@ impl TimeReport {
         told.insert("state".into(), json!(state));
         told.into()
     }
+}
+
+fn list(value: &Value) -> Vec<Value> {
+    value.as_array().cloned().unwrap_or_default()
 }
 
 /// The time in the unit of the axis, where it has one.
@@ -123,16 +154,17 @@ impl Whole<'_> {
     /// `volumes.csv`: a row for each object at each time; physical, times in the unit of the axis where it has one.
     pub(crate) fn table(&self) -> String {
         let mut text = String::from(
-            "t,time,object,state,volume,area,voxels,centroid_x,centroid_y,centroid_z,marks_from,shift_x,shift_y,shift_z\n",
+            "t,time,object,state,volume,area,voxels,centroid_x,centroid_y,centroid_z,marks_from,shift_x,shift_y,shift_z,\
+             reason\n",
         );
         for row in self.times.iter().flat_map(TimeReport::rows) {
             let found = row.found.clone().unwrap_or_default();
             let cell = |value: &Value| if value.is_number() { value.to_string() } else { String::new() };
-            let triple = |name: &str| (0..3).map(|a| cell(&found[name][a])).collect::<Vec<_>>().join(",");
+            let triple = |of: &Value| (0..3).map(|a| cell(&of[a])).collect::<Vec<_>>().join(",");
             // A string takes whatever is written.
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{}",
                 row.time,
                 at(row.time, self.axis).map_or(String::new(), |at| at.to_string()),
                 row.object.map_or(String::new(), |object| object.to_string()),
@@ -140,9 +172,10 @@ impl Whole<'_> {
                 cell(&found["volume"]),
                 cell(&found["area"]),
                 cell(&found["voxels"]),
-                triple("centroid_xyz"),
-                cell(&found["marks_from"]),
-                triple("shift_xyz"),
+                triple(&found["centroid_xyz"]),
+                cell(&row.origin["marks_from"]),
+                triple(&row.origin["shift_xyz"]),
+                row.reason.as_deref().map_or(String::new(), csv::quoted),
             );
         }
         text
@@ -158,7 +191,7 @@ impl Whole<'_> {
         for row in all.iter().take(MOST_ROWS) {
             let found = row.found.clone().unwrap_or_default();
             let value = |value: &Value| value.as_f64().map_or("-".into(), number);
-            let shift: Vec<f64> = (0..3).filter_map(|a| found["shift_xyz"][a].as_f64()).collect();
+            let shift: Vec<f64> = (0..3).filter_map(|a| row.origin["shift_xyz"][a].as_f64()).collect();
             rows.push([
                 row.time.to_string(),
                 row.object.map_or("-".into(), |object| object.to_string()),
@@ -166,7 +199,7 @@ impl Whole<'_> {
                 value(&found["area"]),
                 value(&found["hausdorff"]["mean"]),
                 value(&found["hausdorff"]["max"]),
-                value(&found["marks_from"]),
+                value(&row.origin["marks_from"]),
                 if shift.len() == 3 { number(shift.iter().map(|v| v * v).sum::<f64>().sqrt()) } else { "-".into() },
             ]);
         }

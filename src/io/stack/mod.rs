@@ -7,7 +7,7 @@ mod number;
 pub mod page_axes;
 mod raw;
 pub mod tiff;
-pub(super) mod units;
+pub(crate) mod units;
 pub mod volume;
 pub mod write;
 pub mod zarr;

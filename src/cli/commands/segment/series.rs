@@ -182,12 +182,17 @@ impl<'a> Series<'a> {
         for time in self.times.clone() {
             self.cancel.check()?;
             if let Some(report) = work.done(time, &self.files_of(time)) {
-                done.push(TimeReport { time, report: Some(report), reason: None });
+                done.push(TimeReport::solved(time, report));
                 continue;
             }
             let (n, all) = (time - self.times.start + 1, self.times.len());
             self.console.say(&format!("time {time} ({n} of {all})"));
-            let mut marking = |console: &Console| self.marks.at(time, &self.geometry, &mut follower, console);
+            let mut moved = None;
+            let mut marking = |console: &Console| {
+                let marks = self.marks.at(time, &self.geometry, &mut follower, console)?;
+                moved = Some(marks.origins.clone());
+                Ok(marks)
+            };
             let job = self.job(self.args_of(time, work), time, said.clone(), &mut marking);
             let ran = job.and_then(|job| {
                 let job = Job { identity: work.identity().cloned(), has_page: self.has_page(time), ..job };
@@ -200,14 +205,15 @@ impl<'a> Series<'a> {
                 Err(error) if matches!(error.kind(), ErrorKind::Input | ErrorKind::Vanished) => {
                     self.console.note(&format!("time {time}: nothing of it could be solved: {error}"));
                     self.keep_image(time, work)?;
-                    done.push(TimeReport { time, report: None, reason: Some(error.to_string()) });
+                    let asked = self.marks.asked(time, self.args.seed.len(), moved.as_ref());
+                    done.push(TimeReport { time, report: None, reason: Some(error.to_string()), asked });
                     first_error.get_or_insert(error);
                     continue;
                 }
                 Err(error) if error.kind() != ErrorKind::Partly => return Err(error),
                 _ => {}
             }
-            done.push(TimeReport { time, report: Some(work.report(time)?), reason: None });
+            done.push(TimeReport::solved(time, work.report(time)?));
         }
         match first_error {
             Some(error) if done.iter().all(|time| time.report.is_none()) => Err(error),
@@ -310,11 +316,13 @@ impl<'a> Series<'a> {
 /// What to say where objects or whole times were refused.
 fn refusals(times: &[TimeReport], whole_in: &str) -> Option<Error> {
     let rows: Vec<_> = times.iter().flat_map(TimeReport::rows).collect();
-    let reasons: Vec<String> = rows
+    let mut reasons: Vec<String> = rows
         .iter()
         .filter_map(|row| row.reason.as_ref().map(|reason| format!("time {}: {reason}", row.time)))
         .collect();
     let refused = reasons.len();
+    // Of a time of which nothing could be solved all objects have the same.
+    reasons.dedup();
     (refused > 0).then(|| {
         let reasons = table::cut(reasons, "of them", whole_in).join("\n");
         Error::partly(format!("{refused} of {} objects at all times could not be solved: {reasons}", rows.len()))

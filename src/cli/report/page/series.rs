@@ -182,7 +182,7 @@ fn table(page: &mut Html, rows: Vec<Row>) {
     let mut lines = vec![HEAD.map(String::from).to_vec()];
     for row in rows.into_iter().take(MOST_ROWS) {
         let found = row.found.unwrap_or_default();
-        let shift: Vec<String> = found["shift_xyz"].as_array().into_iter().flatten().map(told).collect();
+        let shift: Vec<String> = row.origin["shift_xyz"].as_array().into_iter().flatten().map(told).collect();
         let or_dash = |value: &Value| if value.is_null() { "-".into() } else { told(value) };
         lines.push(vec![
             row.time.to_string(),
@@ -191,7 +191,7 @@ fn table(page: &mut Html, rows: Vec<Row>) {
             or_dash(&found["area"]),
             or_dash(&found["hausdorff"]["mean"]),
             or_dash(&found["hausdorff"]["max"]),
-            or_dash(&found["marks_from"]),
+            or_dash(&row.origin["marks_from"]),
             shift.join(", "),
             row.reason.map_or(String::new(), |reason| format!("refused: {reason}")),
         ]);
