@@ -45,6 +45,7 @@ mod wavefront;
 
 #[cfg(target_os = "linux")]
 mod batch;
+mod batch_told;
 mod builders;
 mod builders_refused;
 mod citations;
