@@ -21,6 +21,7 @@ mod gaussian;
 mod heat;
 mod level_set;
 mod live;
+mod live_series;
 mod maximum_principle;
 mod memory;
 mod mesh_dialects;
