@@ -160,6 +160,7 @@ impl Job {
         self.console.say(&plan);
         let engine = self.resources.engine(&self.cancel, self.console.clone())?;
         let engine = engine.as_rank(self.comm.clone());
+        self.note_without_checkpoints::<P>();
         let saving = if self.comm.ranks() == 1 {
             save_points(&self.args.job.output, &self.typed, self.console.as_ref())?
         } else {
@@ -179,6 +180,21 @@ impl Job {
             print(&format!("{}\n{told}", table::stages(&engine.reports())))?;
         }
         Ok(())
+    }
+
+    /// Says where there will be no checkpoints although somebody asked for them.
+    fn note_without_checkpoints<P: Precision>(&self) {
+        if !self.args.job.output.survive.asks() {
+            return;
+        }
+        if self.comm.ranks() > 1 {
+            self.console.note("a run on several ranks takes no checkpoints, and begins anew with --resume");
+        } else if self.settings.heap_bytes::<P>(&self.geometry) > 0 {
+            self.console.note(&format!(
+                "in the textbook's order {} solves in one heap and takes no checkpoint before it is solved; leave --schedule out where a run may be ended",
+                self.settings.method.name()
+            ));
+        }
     }
 
     fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {

@@ -82,6 +82,8 @@ pub(super) fn solve_once<'a, P: Precision>(
         sources: joined.join(parts.iter().map(|part| part.sources.clone()).collect()),
         with_source: None,
         fixed: joined.join(parts.iter().map(|part| part.fixed.clone()).collect()),
+        // Those of several are not put by.
+        state: if let [part] = parts.as_slice() { part.state.clone() } else { None },
         fixed_voxels: sum(|part| part.fixed_voxels),
         triangle_distances: sum(|part| part.triangle_distances),
     })
