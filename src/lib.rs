@@ -90,7 +90,8 @@
 //!
 //! Every builder has `memory` and `threads`. Fields that do not fit the memory lie in temporary files, in the folder that
 //! `scratch` names; a result keeps them until it goes. `store` writes an OME-Zarr store beside that, with a pyramid, as the
-//! program does; `cancel` and `progress` are for those who wait.
+//! program does; `cancel` and `progress` are for those who wait. A job that is ended begins anew: checkpoints, from which a run
+//! goes on, are the program's (`--checkpoint`, `--resume`).
 //!
 //! # Errors
 //!

@@ -2,7 +2,8 @@
 
 Five are broken in different ways and one needs more memory than is allowed: the others must have results, the exit
 code is 3, and each failure has its reason. Then the same again (nothing is computed, in less than two seconds), with
-one setting changed (that item alone), killed in the middle and run again (only what is left), each with what it took.
+one setting changed (that item alone), killed in the middle and run again (only what is left), each with what it took;
+and two shards at once, whose summaries joined must be that of one run.
 The memory of all processes together is sampled while the first run goes on. The time is told against the sum of the
 items' times alone with one thread, shared among the threads. Exit code 1 when something is not as it must be; times
 are told, and counted only with --strict: on a machine that others use two processes get less of it than one does.
@@ -68,7 +69,7 @@ class Batch:
             program, "batch", "jobs.toml", "-o", "out", "--log", "json",
             "--memory", f"{settings.memory}MiB", "--threads", str(settings.threads),
         ]  # fmt: skip
-        self.place = place
+        self.place, self.memory = place, settings.memory
 
     def run(self, *more, kill_after=None):
         """Runs it; returns exit code, events, seconds, and the most memory; killed when so many items have ended."""
@@ -96,9 +97,16 @@ class Batch:
         watcher.join()
         return code, events, time.monotonic() - began, peak
 
+    def rows(self):
+        return json.loads((self.place / "out/summary.json").read_text())["rows"]
+
     def states(self):
-        rows = json.loads((self.place / "out/summary.json").read_text())["rows"]
-        return {row["item"]: row for row in rows}
+        return {row["item"]: row for row in self.rows()}
+
+    def figures(self):
+        """All that is told but times and memory."""
+        varying = ("seconds", "peak_memory_bytes")
+        return [{name: value for name, value in row.items() if name not in varying} for row in self.rows()]
 
 
 def ended(events):
@@ -172,6 +180,7 @@ def main():
         )
         print(f"     {of_batch:.1f} s of processors; alone {of_single:.1f} s", flush=True)
         check_again(batch, place, whole, settings, found)
+        check_shards(batch, place, found)
     sys.exit(found.bad > 0)
 
 
@@ -207,6 +216,21 @@ def check_again(batch, place, whole, settings, found):
     after = {name for name, state in ended(events).items() if state == "done"}
     is_rest = code == 3 and not before & after and sorted(before | after) == whole
     found.told(is_rest, f"killed after {len(before)} items, run again: {len(after)} more, none twice, {seconds:.1f} s")
+
+
+def check_shards(batch, place, found):
+    one = batch.figures()
+    shutil.rmtree(place / "out")
+    quiet = {"cwd": place, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    # Each half of the memory and of the threads.
+    command = [*batch.command[:5], "--memory", f"{batch.memory // 2}MiB", "--threads", "1"]
+    both = [subprocess.Popen([*command, "--shard", f"{n}/2"], **quiet) for n in (1, 2)]
+    codes = [child.wait() for child in both]
+    joined = subprocess.run([*batch.command[:5], "--summary"], **quiet).returncode
+    is_same = batch.figures() == one
+    found.told(
+        is_same and joined == 3, f"two shards at once: exit {codes[0]} and {codes[1]}, joined {joined}, as one run"
+    )
 
 
 if __name__ == "__main__":

@@ -4,6 +4,9 @@ Of each command runs are ended by SIGKILL (kill), by SIGTERM (term), by a disk t
 SIGKILL with a bit of a checkpoint flipped or a file of it cut short afterwards (damage), once to three times, and gone on
 with by --resume. The result must have the same bits as that of a run that nobody ended, with nothing left behind; after
 damage a clear refusal will do. Exit code 1 when one had not.
+
+A full disk has a random share of the room that a run takes which nobody ends, as one of them shows. With ../shared/data
+there is one more command, embryo-like.
 """
 
 import argparse
@@ -12,6 +15,7 @@ import random
 import shutil
 import sys
 import tempfile
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -32,6 +36,7 @@ def arguments():
     parser.add_argument("--how", action="append", choices=HOWS, help="this way alone; repeatable")
     parser.add_argument("--folder", type=Path, help="where inputs and outputs are made, a few GB [default: $TMPDIR]")
     parser.add_argument("--large", action="store_true", help="a distance of 512^3 voxels instead of 192^3")
+    parser.add_argument("--pause-while", type=Path, metavar="FILE", help="no trial begins while there is such a file")
     return parser.parse_args()
 
 
@@ -47,7 +52,10 @@ def commands(root, place, large):
     data = root / "data"
     output = ["-o", "out.zarr"]
     sweep = ["--method", "fsm", "--schedule", "sweep"]
+    embryo = root.parent / "shared/data/embryo-like"
+    like = {"embryo-like": ["segment", f"{embryo}/stack.tif", "--points", f"{embryo}/marks.csv", *output]}
     return {
+        **(like if embryo.is_dir() else {}),
         "segment": ["segment", f"{data}/arabidopsis-embryo.tif", "--points", f"{data}/arabidopsis-marks.csv", *output],
         "distance": ["distance", f"{place}/ball.xyz", f"{place}/shifted.xyz", *grid, "--labels", *output],
         "fmm": ["distance", f"{place}/ball.xyz", *grid, "--method", "fmm", *output],
@@ -55,6 +63,12 @@ def commands(root, place, large):
         "reconstruct": ["reconstruct", f"{place}/few.xyz", "--mesh", "mesh.ply", *output],
         "middle": ["middle", *pair, "--spacing", "0.02", "--mesh", "mesh.ply", *output],
     }
+
+
+def wait_while(file):
+    """Waits while there is such a file: somebody measures."""
+    while file and file.exists():
+        time.sleep(2)
 
 
 def full(program, arguments_, place, numbers, wanted, needed):
@@ -97,13 +111,16 @@ def main():
         for name, command in commands(root, place, settings.large).items():
             if settings.only and name not in settings.only:
                 continue
+            wait_while(settings.pause_while)
             seconds, wanted = trials.whole(program, command, place)
             for how in settings.how or HOWS:
                 numbers = random.Random(f"{settings.seed} {name} {how}")
+                needed = trials.needed(program, command, place) if how == "disk" else 0
                 found = []
                 for _ in range(settings.times):
+                    wait_while(settings.pause_while)
                     if how == "disk":
-                        trial = full(program, command, place, numbers, wanted, 300 << 20)
+                        trial = full(program, command, place, numbers, wanted, needed)
                     else:
                         trial = trials.Trial(program, command, place, seconds, how, numbers).run(wanted)
                     found.append(trial)

@@ -1,6 +1,7 @@
 """One trial: a run that is ended, maybe several times, and gone on with until it is done."""
 
 import hashlib
+import os
 import shutil
 import signal
 import subprocess
@@ -149,6 +150,27 @@ def whole(program, arguments, place):
     found = digests(folder)
     shutil.rmtree(folder)
     return seconds, found
+
+
+def needed(program, arguments, place):
+    """Bytes of disk that a run takes at most, of its output, its checkpoints and its temporary fields."""
+    small = full_disk(place, 16 << 30)
+    try:
+        (small / "run").mkdir()
+        (small / "scratch").mkdir()
+        child = start(program, arguments, small / "run", small / "scratch", "100ms")
+        most = 0
+        while child.poll() is None:
+            free = os.statvfs(small)
+            most = max(most, (free.f_blocks - free.f_bfree) * free.f_frsize)
+            time.sleep(0.01)
+        child.communicate()
+        if child.returncode != 0:
+            raise SystemExit(f"a run that nobody ended failed ({child.returncode})")
+        return most
+    finally:
+        unmount(small)
+        small.rmdir()
 
 
 def full_disk(place, size):

@@ -51,6 +51,11 @@ impl Cancel {
         }
     }
 
+    /// Whether it was asked for by a signal after which a run says what it leaves.
+    pub(super) fn is_terminated(&self) -> bool {
+        self.flag.load(Relaxed) == libc::SIGTERM as usize
+    }
+
     pub(super) fn is_asked(&self) -> bool {
         self.flag.load(Relaxed) != 0
     }
@@ -59,7 +64,7 @@ impl Cancel {
     #[must_use]
     pub fn is_saving(&self) -> bool {
         // The time counts from when the signal is seen first, by whatever stage.
-        self.flag.load(Relaxed) == libc::SIGTERM as usize
+        self.is_terminated()
             && self.saving.since.get_or_init(Instant::now).elapsed() < GRACE
             && self.saving.stages.load(Relaxed) > 0
     }

@@ -17,7 +17,7 @@ use super::progress::report::{Reports, StageReport};
 use super::save_points::{SavePoint, SavePoints};
 use super::workers::Workers;
 use crate::error::{Error, ErrorKind, Result};
-use crate::store::checkpoint::Identity;
+use crate::store::checkpoint::{Identity, SavedField};
 use crate::store::{Scratch, Traffic};
 
 /// Runs kernels over bricks: threads, cancellation, progress, scratch and the account of all that.
@@ -94,9 +94,12 @@ impl Engine {
     }
 
     /// The run is over: what was put by goes, unless the run ended by something that can be mended: a signal, a
-    /// full disk, too little memory.
+    /// full disk, too little memory. A run that is terminated says what it leaves.
     pub fn settle_save_points<R>(&self, result: &Result<R>) {
         let is_final = |error: &Error| matches!(error.kind(), ErrorKind::Input | ErrorKind::Vanished);
+        if result.is_err() && self.cancel.is_terminated() {
+            self.saving.iter().for_each(|saving| saving.tell_of_last(self.progress.as_ref()));
+        }
         if result.as_ref().err().is_none_or(is_final) {
             self.saving.iter().for_each(|saving| saving.clear());
         }
@@ -235,6 +238,18 @@ impl Engine {
     #[must_use]
     pub fn save_point(&self, name: &str) -> Option<SavePoint<'_>> {
         Some(self.saving.as_ref()?.begin(name, &self.cancel, self.progress.as_ref()))
+    }
+
+    /// Work on a field with which the first stage of a name has ended, and which it leaves as it is. Where the run is terminated in it,
+    /// and that stage has left what it knew ([`SavePoint::leave`]), a checkpoint of both is taken, if none holds them.
+    ///
+    /// # Errors
+    /// Of the work, and when the run is to end.
+    pub fn after<R>(&self, stage: &str, field: Option<&dyn SavedField>, work: impl FnOnce() -> Result<R>) -> Result<R> {
+        match (&self.saving, field) {
+            (Some(saving), Some(field)) => saving.after(stage, field, (&self.cancel, self.progress.as_ref()), work),
+            _ => work(),
+        }
     }
 
     /// What the finished stages cost, in the order they ended.

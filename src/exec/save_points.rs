@@ -46,6 +46,16 @@ pub struct SavePoints {
     spent: Mutex<(Duration, u64)>,
     /// Why the last one could not be taken, where it was told.
     failure: Mutex<Option<io::ErrorKind>>,
+    /// What stages ended with that left it for those after them.
+    left: Mutex<HashMap<String, Left>>,
+    /// A run that was asked to end has said which checkpoint there is.
+    is_answered: AtomicBool,
+}
+
+/// What a stage ended with: what it knew, packed, and whether the last checkpoint holds that.
+struct Left {
+    facts: Vec<u8>,
+    stands: bool,
 }
 
 impl SavePoints {
@@ -61,6 +71,8 @@ impl SavePoints {
             stages: Mutex::default(),
             spent: Mutex::default(),
             failure: Mutex::default(),
+            left: Mutex::default(),
+            is_answered: AtomicBool::new(false),
         }
     }
 
@@ -73,6 +85,38 @@ impl SavePoints {
     /// Removes all checkpoints: the run is done.
     pub fn clear(&self) {
         self.checkpoints.clear();
+    }
+
+    /// A run that was asked to end, and does so, says which checkpoint there is, where none was taken then.
+    pub(super) fn tell_of_last(&self, progress: &dyn Progress) {
+        if self.is_answered.swap(true, Relaxed) {
+            return;
+        }
+        progress.note(if self.checkpoints.are_there() {
+            "nothing could be put by of what ran before the end; --resume goes on from the checkpoint before"
+        } else {
+            "nothing could be put by of what ran before the end, and there is no checkpoint; the next run begins anew"
+        });
+    }
+
+    /// Work on a field with which a stage has ended, and which it leaves as it is: where the run is to end in it, a checkpoint of what
+    /// that stage left is taken.
+    ///
+    /// # Errors
+    /// Of the work, and when the run is to end.
+    pub(super) fn after<R>(
+        &self,
+        stage: &str,
+        field: &dyn SavedField,
+        (cancel, progress): (&Cancel, &dyn Progress),
+        work: impl FnOnce() -> Result<R>,
+    ) -> Result<R> {
+        let key = format!("{stage} #1");
+        let left = self.left.lock().unwrap_or_else(PoisonError::into_inner).remove(&key);
+        let Some(Left { facts, stands }) = left else { return work() };
+        let mut save_point = self.begin_as(key, false, cancel, progress);
+        save_point.stands = stands;
+        save_point.step_packed(|| Ok(facts), &[field], work)
     }
 
     /// The save point of a stage that begins.
@@ -172,18 +216,40 @@ impl SavePoint<'_> {
         fields: &[&dyn SavedField],
         work: impl FnOnce() -> Result<R>,
     ) -> Result<R> {
+        self.step_packed(|| pack(&facts()), fields, work)
+    }
+
+    fn step_packed<R>(
+        &mut self,
+        facts: impl FnOnce() -> io::Result<Vec<u8>>,
+        fields: &[&dyn SavedField],
+        work: impl FnOnce() -> Result<R>,
+    ) -> Result<R> {
         self.cancel.go_no_farther();
         let done = work();
         self.cancel.go_on();
         let is_ended = |error: &Error| matches!(error.kind(), ErrorKind::Interrupted { .. });
         if self.cancel.is_saving() && done.as_ref().is_err_and(is_ended) {
             if self.stands {
+                self.points.is_answered.store(true, Relaxed);
                 self.progress.note("the last checkpoint holds what this stage began with; --resume goes on from it");
             } else {
-                self.reached(false, facts, fields)?;
+                self.reached_packed(false, || Ok((facts()?, Vec::new())), fields)?;
             }
         }
         done
+    }
+
+    /// The stage ends with these facts and one field: what comes after it and works on that field can be put by with them, once the
+    /// stage is over (`Engine::after`).
+    ///
+    /// # Errors
+    /// When they have no form in which they can be put by.
+    pub fn leave<F: Serialize>(&self, facts: &F) -> Result<()> {
+        let facts = pack(facts).map_err(|error| Error::from_io("a checkpoint cannot be made", &error))?;
+        let left = Left { facts, stands: self.stands };
+        self.points.left.lock().unwrap_or_else(PoisonError::into_inner).insert(self.key.clone(), left);
+        Ok(())
     }
 
     /// What the stage had put by in the run that this one goes on with.
@@ -233,6 +299,19 @@ impl SavePoint<'_> {
         known: impl FnOnce() -> (F, Vec<Linked>),
         fields: &[&dyn SavedField],
     ) -> Result<()> {
+        let known = || {
+            let (facts, linked) = known();
+            Ok((pack(&facts)?, linked))
+        };
+        self.reached_packed(ended, known, fields)
+    }
+
+    fn reached_packed(
+        &mut self,
+        ended: bool,
+        known: impl FnOnce() -> io::Result<(Vec<u8>, Vec<Linked>)>,
+        fields: &[&dyn SavedField],
+    ) -> Result<()> {
         let (is_last, wishes) = (self.cancel.is_asked(), self.points.wishes());
         let is_wished = wishes != self.wishes;
         if !is_last && !is_wished && !self.is_due(ended, fields) {
@@ -242,23 +321,30 @@ impl SavePoint<'_> {
         self.cancel.check()?;
         let started = Instant::now();
         let goes_on = || self.cancel.check().map_err(io::Error::other);
-        let (facts, linked) = known();
-        let saved =
-            pack(&facts).and_then(|facts| self.points.checkpoints.save(&self.key, facts, (fields, &linked), &goes_on));
+        let saved = known()
+            .and_then(|(facts, linked)| self.points.checkpoints.save(&self.key, facts, (fields, &linked), &goes_on));
         let Taken { bytes: written, linking } = *saved.as_ref().unwrap_or(&Taken::default());
         // What is flushed of the output is no cost of checkpoints: it has to reach the disk.
         self.points.spend(started.elapsed().saturating_sub(linking), written);
         (self.last, self.wishes, self.stands) = (Instant::now(), wishes, saved.is_ok());
+        let is_second = is_last && self.points.is_answered.swap(true, Relaxed);
         match saved {
             Ok(_) if is_last || is_wished => {
                 self.progress.note(&format!("a checkpoint of {} was taken; --resume goes on from it", bytes(written)));
             }
             Ok(_) => {}
             Err(error) => {
-                let what = if is_last { "before the end" } else { "the run goes on without" };
+                let what = match (is_second, is_last) {
+                    (true, _) => "no checkpoint could be taken of what was solved before, which is solved again",
+                    (_, true) => "no checkpoint could be taken, before the end",
+                    _ => "no checkpoint could be taken, the run goes on without",
+                };
+                let is_late = is_last && self.cancel.check().is_err();
+                let why =
+                    if is_late { "it takes longer than a run that is ended has".into() } else { error.to_string() };
                 // One that was asked for is answered each time.
                 if self.points.is_new(error.kind()) || is_wished || is_last {
-                    self.progress.note(&format!("no checkpoint could be taken, {what}: {error}"));
+                    self.progress.note(&format!("{what}: {why}"));
                 }
             }
         }

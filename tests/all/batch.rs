@@ -13,7 +13,7 @@ use crate::common::held::{Ended, Held};
 use crate::common::patience::output_of;
 
 /// A folder with stacks and marks of one ball under several names, and a list.
-fn bench(names: &[&str], list: &str) -> Bench {
+pub(crate) fn bench(names: &[&str], list: &str) -> Bench {
     let bench = Bench::new(&Ball::small());
     fs::create_dir(bench.path("in")).unwrap();
     for name in names {
@@ -24,10 +24,10 @@ fn bench(names: &[&str], list: &str) -> Bench {
     bench
 }
 
-const LIST: &str = "[defaults]\ncommand = \"segment\"\npoints = \"in/{stem}.csv\"\nmax_steps = 3\n\n[[items]]\nimages = \"in/*.tif\"\n";
+pub(crate) const LIST: &str = "[defaults]\ncommand = \"segment\"\npoints = \"in/{stem}.csv\"\nmax_steps = 3\n\n[[items]]\nimages = \"in/*.tif\"\n";
 
 /// Runs it; returns the exit code, what was said, and the names of items that ran.
-fn batch(bench: &Bench, arguments: &str) -> (i32, String, Vec<String>) {
+pub(crate) fn batch(bench: &Bench, arguments: &str) -> (i32, String, Vec<String>) {
     let output = bench.run(&format!("batch jobs.toml -o out --memory 600MiB --threads 2 --log json {arguments}"));
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(!said.contains("panicked"), "{said}");
@@ -41,7 +41,7 @@ fn batch(bench: &Bench, arguments: &str) -> (i32, String, Vec<String>) {
 }
 
 /// Rows of the summary by item.
-fn rows(bench: &Bench, name: &str) -> BTreeMap<String, Value> {
+pub(crate) fn rows(bench: &Bench, name: &str) -> BTreeMap<String, Value> {
     let summary = bench.json(&format!("out/{name}.json"));
     let rows = summary["rows"].as_array().unwrap().iter();
     rows.map(|row| (row["item"].as_str().unwrap().to_string(), row.clone())).collect()

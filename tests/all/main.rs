@@ -21,6 +21,7 @@ mod gaussian;
 mod heat;
 mod level_set;
 mod live;
+mod live_series;
 mod maximum_principle;
 mod memory;
 mod mesh_dialects;
@@ -46,6 +47,7 @@ mod wavefront;
 
 #[cfg(target_os = "linux")]
 mod batch;
+mod batch_told;
 mod builders;
 mod builders_refused;
 mod citations;

@@ -402,7 +402,6 @@ fn what_cannot_be_is_said_in_one_sentence() {
         ("--time 5:5", "is no time at all"),
         ("--time 7:2", "is no time at all"),
         ("--time x", "'x' is no whole number"),
-        ("--time all --live", "--live shows a run over one time"),
     ] {
         let told = run(flags, 2);
         assert!(told.contains(says), "{flags}: {told}");

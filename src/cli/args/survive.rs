@@ -40,6 +40,13 @@ pub(crate) enum Checkpoint {
     Folder(PathBuf),
 }
 
+impl SurviveArgs {
+    /// Whether checkpoints were asked for in so many words, rather than taken because nobody said anything.
+    pub(crate) fn asks(&self) -> bool {
+        self.resume || self.checkpoint_every.is_some() || matches!(self.checkpoint, Some(Checkpoint::Folder(_)))
+    }
+}
+
 impl FromStr for Checkpoint {
     type Err = &'static str;
 

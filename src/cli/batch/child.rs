@@ -85,6 +85,18 @@ pub(crate) fn open_log(path: &Path) -> io::Result<Option<File>> {
     Ok(Some(log))
 }
 
+/// Says in the log of an item that is not run why not; whether that is the batch's own now. One that others have, or that holds
+/// what is not `own`, stays as it is.
+pub(crate) fn log_refusal(path: &Path, own: bool, reason: &str) -> io::Result<bool> {
+    let Some(mut log) = open_log(path)? else { return Ok(own) };
+    if !own && log.metadata()?.len() > 0 {
+        return Ok(false);
+    }
+    log.set_len(0)?;
+    writeln!(log, "{ERROR}{reason}")?;
+    Ok(true)
+}
+
 /// Starts a run that tells all it does in its log. It ends with the thread that calls this.
 pub(crate) fn start(item: &Item, arguments: &[OsString], mut log: File) -> io::Result<Child> {
     log.set_len(0)?;

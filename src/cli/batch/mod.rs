@@ -2,7 +2,7 @@
 //! threads; and what is known of them afterwards.
 
 pub(crate) mod asked;
-mod child;
+pub(crate) mod child;
 mod content;
 pub(crate) mod list;
 pub(crate) mod page;

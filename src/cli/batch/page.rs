@@ -70,10 +70,16 @@ fn put_row(cells: &mut Html, folder: &Folder, row: &Row, is_first: bool) {
         }
     });
     let of = |value: Option<f64>| value.map_or(String::new(), number);
+    for (name, number) in HEAD[2..4].iter().zip([row.object, row.time]) {
+        cells.element("td", &[("data-name", name)], &number.map_or(String::new(), |number| number.to_string()));
+    }
+    cells.within("td", &[("data-name", HEAD[4])], |cell| {
+        cell.text(row.state);
+        if let Some(reason) = &row.reason {
+            cell.element("div", &[("class", "faint reason")], reason);
+        }
+    });
     let rest = [
-        row.object.map_or(String::new(), |label| label.to_string()),
-        row.time.map_or(String::new(), |time| time.to_string()),
-        row.state.into(),
         of(row.volume),
         of(row.area),
         of(row.marks_mean),
@@ -81,7 +87,7 @@ fn put_row(cells: &mut Html, folder: &Folder, row: &Row, is_first: bool) {
         row.seconds.filter(|_| is_first).map_or(String::new(), seconds),
         row.peak_memory_bytes.filter(|_| is_first).map_or(String::new(), bytes),
     ];
-    for (name, text) in HEAD[2..].iter().zip(&rest) {
+    for (name, text) in HEAD[5..].iter().zip(&rest) {
         cells.element("td", &[("data-name", name)], text);
     }
 }

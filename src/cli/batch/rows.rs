@@ -10,7 +10,7 @@ use crate::cli::report::csv::quoted;
 pub(crate) struct Row {
     pub(crate) item: String,
     pub(crate) object: Option<u64>,
-    /// Of an item with several times of an image.
+    /// Of an item of one time of an image, or of several.
     pub(crate) time: Option<u64>,
     pub(crate) state: &'static str,
     pub(crate) exit_code: Option<i32>,
@@ -38,7 +38,8 @@ pub(super) fn rows(name: &str, state: Option<&State>) -> Vec<Row> {
     let whole = Row {
         item: name.into(),
         object: None,
-        time: None,
+        // The one time that an item was asked for; of several each object has its own.
+        time: state.and_then(|state| state.settings.get("time")?.parse().ok()),
         state: stage.name(),
         exit_code: state.and_then(|state| state.code),
         reason: state.and_then(|state| state.reason.clone()),
@@ -55,7 +56,7 @@ pub(super) fn rows(name: &str, state: Option<&State>) -> Vec<Row> {
     }
     let row = |object: &Object| Row {
         object: object.label,
-        time: object.time,
+        time: object.time.or(whole.time),
         // Of a run that failed in part the objects that it found are done.
         state: if object.reason.is_some() { Stage::Failed.name() } else { Stage::Done.name() },
         reason: object.reason.clone(),

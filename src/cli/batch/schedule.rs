@@ -66,15 +66,19 @@ pub(crate) fn check_own(folder: &Folder, item: &Item) -> std::result::Result<(),
     let there = |path: &Path| path.symlink_metadata().is_ok();
     let (store, log) = (folder.store(&item.name), folder.log(&item.name));
     let is_made = |path: &PathBuf| state.as_ref().is_some_and(|state| state.made.contains(path));
+    let is_logged = state.as_ref().is_some_and(|state| state.owns || state.logged);
     let foreign = if there(&store) && !state.as_ref().is_some_and(|state| state.owns) {
         store
-    } else if state.is_none() && fs::metadata(&log).is_ok_and(|is| !is.is_file() || is.len() > 0) {
+    } else if !is_logged && fs::metadata(&log).is_ok_and(|is| !is.is_file() || is.len() > 0) {
         log
     } else if let Some(file) = item.writes.iter().find(|path| there(path) && !is_made(path)) {
         file.clone()
     } else {
         return Ok(());
     };
+    if let Some(State { is_unreadable: true, reason: Some(reason), .. }) = state {
+        return Err(Refused { code: 2, reason });
+    }
     let foreign = foreign.display();
     let reason = format!("{foreign} is there and not of this batch; move it away, or give the item another `name`");
     Err(Refused { code: 2, reason })

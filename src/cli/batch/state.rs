@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -74,10 +74,16 @@ pub(crate) struct State {
     pub(crate) threads: Option<usize>,
     /// Whether a store of its name is this batch's own.
     pub(crate) owns: bool,
+    /// Whether its log is, where no run of it was begun.
+    #[serde(default)]
+    pub(crate) logged: bool,
     /// Files beside the store that runs of it have made.
     #[serde(default)]
     pub(crate) made: Vec<PathBuf>,
     pub(crate) objects: Vec<Object>,
+    /// What was known cannot be read: all else here is what is told of that.
+    #[serde(skip)]
+    pub(crate) is_unreadable: bool,
 }
 
 /// The folder of results.
@@ -113,7 +119,23 @@ impl Folder {
 
     /// What is known of an item, if anything.
     pub(crate) fn state(&self, item: &str) -> Option<State> {
-        serde_json::from_slice(&fs::read(self.path(item)).ok()?).ok()
+        let path = self.path(item);
+        let read = match fs::read(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return None,
+            Ok(bytes) => serde_json::from_slice(&bytes).map_err(|error| error.to_string()),
+            Err(error) => Err(error.to_string()),
+        };
+        Some(read.unwrap_or_else(|error| State::unreadable(&self.lost(item, &path, &error))))
+    }
+
+    /// What to do where it is not known what a batch made of an item.
+    fn lost(&self, item: &str, path: &Path, error: &str) -> String {
+        let (path, store, log) = (path.display(), self.store(item), self.log(item));
+        format!(
+            "{path} cannot be read, so it is not known whether {} and {} are this batch's own: {error}; remove these three, and the item runs anew",
+            store.display(),
+            log.display()
+        )
     }
 
     /// Keeps what is known of an item.
@@ -131,22 +153,35 @@ impl Folder {
 impl State {
     /// An item that is about to be run; what earlier runs made stays this batch's own.
     pub(crate) fn begun(item: &Item, before: Option<Self>) -> Self {
-        let (owns, made) = before.map_or((false, Vec::new()), |before| (before.owns, before.made));
+        let (owns, logged, made) =
+            before.map_or((false, false, Vec::new()), |before| (before.owns, before.logged, before.made));
+        Self { settings: item.settings.clone(), owns, logged, made, ..Self::of(Stage::Interrupted) }
+    }
+
+    /// Nothing but a stage.
+    fn of(stage: Stage) -> Self {
         Self {
             version: VERSION.into(),
-            settings: item.settings.clone(),
+            settings: BTreeMap::new(),
             inputs: Vec::new(),
-            stage: Stage::Interrupted,
+            stage,
             code: None,
             reason: None,
             seconds: None,
             peak: None,
             memory: None,
             threads: None,
-            owns,
-            made,
+            owns: false,
+            logged: false,
+            made: Vec::new(),
             objects: Vec::new(),
+            is_unreadable: false,
         }
+    }
+
+    /// An item of which a batch kept something that cannot be read any more.
+    fn unreadable(why: &str) -> Self {
+        Self { code: Some(2), reason: Some(why.into()), is_unreadable: true, ..Self::of(Stage::Failed) }
     }
 
     /// What changed between this run of an item and one that is to be made.
@@ -171,6 +206,7 @@ impl State {
 pub(crate) fn reasons(folder: &Folder, item: &Item, keeps: bool, stop: &AtomicBool) -> Result<Vec<String>> {
     let Some(state) = folder.state(&item.name) else { return Ok(vec!["missing".into()]) };
     match state.stage {
+        Stage::Failed if state.is_unreadable => return Ok(vec!["what was known of it cannot be read".into()]),
         Stage::Failed => return Ok(vec!["failed before".into()]),
         Stage::Interrupted => return Ok(vec!["interrupted before".into()]),
         Stage::Skipped => return Ok(vec!["missing".into()]),

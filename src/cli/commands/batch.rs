@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::cli::args::batch::BatchArgs;
 use crate::cli::batch::asked::Asked;
+use crate::cli::batch::child::log_refusal;
 use crate::cli::batch::list::items::{Item, items};
 use crate::cli::batch::list::problems::Problems;
 use crate::cli::batch::list::{init, manifest};
@@ -146,7 +147,7 @@ impl Batch<'_> {
                 }
                 Some(Err(refused)) => {
                     ended += 1;
-                    let state = self.refused(item, refused)?;
+                    let state = self.refused(item, &refused)?;
                     summary.set(*place, &state);
                     self.teller.ended(&item.name, &state, [ended, all], 0.0);
                 }
@@ -168,10 +169,19 @@ impl Batch<'_> {
         self.end(&summary)
     }
 
-    /// Keeps why an item was not run.
-    fn refused(&self, item: &Item, refused: Refused) -> Result<State> {
-        let mut state = State::begun(item, self.folder.state(&item.name));
-        (state.stage, state.code, state.reason) = (Stage::Failed, Some(refused.code), Some(refused.reason));
+    /// Keeps why an item was not run, and says it in its log.
+    fn refused(&self, item: &Item, refused: &Refused) -> Result<State> {
+        let before = self.folder.state(&item.name);
+        let is_lost = before.as_ref().is_some_and(|before| before.is_unreadable);
+        let mut state = State::begun(item, before);
+        (state.stage, state.code, state.reason) = (Stage::Failed, Some(refused.code), Some(refused.reason.clone()));
+        // What cannot be read stays until somebody has looked at it: what lies beside it would be nobody's else.
+        if is_lost && check_own(&self.folder, item).is_err() {
+            return Ok(state);
+        }
+        // What is no log, or cannot be written, is left; the summaries tell the reason too.
+        let (log, is_own) = (self.folder.log(&item.name), state.owns || state.logged);
+        state.logged = log_refusal(&log, is_own, &refused.reason).unwrap_or(state.logged);
         self.folder.keep(&item.name, &state)?;
         Ok(state)
     }

@@ -160,6 +160,7 @@ impl Job {
             return Ok(());
         }
         self.console.say(&plan);
+        self.note_without_checkpoints::<P>();
         let (output, console) = (&self.args.job.output, self.console.as_ref());
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
         let engine = if self.comm.ranks() == 1 {
@@ -180,6 +181,17 @@ impl Job {
             print(&format!("{}\n{told}", table::stages(&engine.reports())))?;
         }
         Ok(())
+    }
+
+    /// Says where there will be no checkpoints although somebody asked for them.
+    fn note_without_checkpoints<P: Precision>(&self) {
+        let asks = self.args.job.output.survive.asks() && self.comm.ranks() == 1;
+        if asks && self.settings.heap_bytes::<P>(&self.geometry) > 0 {
+            self.console.note(&format!(
+                "in the textbook's order {} solves in one heap and takes no checkpoint before it is solved; leave --schedule out where a run may be ended",
+                self.settings.method.name()
+            ));
+        }
     }
 
     fn solve_and_write<P: Precision>(&self, engine: &Engine) -> Result<Found> {

@@ -135,7 +135,7 @@ pub(crate) fn without_save_points(
     (output, typed): (&OutputArgs, &[String]),
     console: &dyn Progress,
 ) -> Result<Engine> {
-    if output.survive.resume || matches!(output.survive.checkpoint, Some(Checkpoint::Folder(_))) {
+    if output.survive.asks() {
         console.note("runs on several ranks take no checkpoints, and go on from none: this one begins anew");
     }
     let is_told = engine.comm().rank() == 0 && output.store().is_some();
@@ -165,8 +165,19 @@ pub(crate) fn checkpoints(
     identity: impl FnOnce() -> Result<Option<Identity>>,
     console: &dyn Progress,
 ) -> Result<Option<Checkpoints>> {
-    let Some(folder) = folder(output) else { return Ok(None) };
-    let Some(identity) = identity()? else { return Ok(None) };
+    let asks = output.survive.asks();
+    let Some(folder) = folder(output) else {
+        if asks && output.survive.checkpoint.is_none() {
+            console.note("without a store there are no checkpoints; name a folder for them with --checkpoint");
+        }
+        return Ok(None);
+    };
+    let Some(identity) = identity()? else {
+        if asks {
+            console.note("a run that reads standard input or a pipe takes no checkpoints; give it a file");
+        }
+        return Ok(None);
+    };
     Ok(Some(if output.survive.resume {
         let (checkpoints, found) = Checkpoints::resume(&folder, identity)?;
         found.torn.iter().for_each(|torn| console.note(&format!("a checkpoint is passed over: {torn}")));

@@ -13,7 +13,7 @@ use super::version::OmeVersion;
 use crate::error::{Error, Result};
 
 /// The attribute of live stores, beside `ome`.
-const ATTRIBUTE: &str = "strandline";
+pub(super) const ATTRIBUTE: &str = "strandline";
 
 /// Whether a live store is still written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,6 +11,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::files::{create_parent, io_error, write_json};
+use super::root::ATTRIBUTE;
 use super::store::StoreWriter;
 use super::sums::{FileSum, listed_sums, store_files};
 use super::version::OmeVersion;
@@ -37,13 +38,16 @@ pub struct TimeAxis {
 }
 
 impl StoreWriter {
-    /// Joins the images that stores of single times hold in one group, in the order of the times; a store that is none, or holds no such
-    /// image, has fill values at its time.
+    /// Joins the image that the store of a single time holds in a group to those of other times: it is the `n`-th of so many. The
+    /// first that is joined says what the image is; times that are not there have fill values, and so does one that has no such image.
     ///
     /// # Errors
-    /// When none holds it, two differ in shape, type or how they are packed, or files cannot be written.
-    pub fn join_times(&self, group: &str, times: &[Option<&Path>], axis: &TimeAxis) -> Result<()> {
-        self.join(group, times, axis).map_err(|error| error.at(self.path()))
+    /// When it differs from those before in shape, type or how it is packed, or files cannot be written.
+    pub fn join_time(&self, group: &str, (n, times): (usize, usize), from: &Path, axis: &TimeAxis) -> Result<()> {
+        if !has_image(&from.join(group), self.version()) {
+            return Ok(());
+        }
+        self.join(group, (n, times), from, axis).map_err(|error| error.at(self.path()))
     }
 
     /// Makes a group, and those above it, that hold no image of their own.
@@ -69,38 +73,32 @@ impl StoreWriter {
         self.link(from, &files).map_err(|error| error.at(self.path()))
     }
 
-    fn join(&self, group: &str, times: &[Option<&Path>], axis: &TimeAxis) -> Result<()> {
-        let holding = || times.iter().flatten().filter(|store| has_image(&store.join(group), self.version()));
-        let Some(first) = holding().next() else {
-            return Err(Error::failed(format!("no time has the image {group:?}")));
-        };
-        let described = attributes(&first.join(group), self.version())?;
+    fn join(&self, group: &str, (n, times): (usize, usize), from: &Path, axis: &TimeAxis) -> Result<()> {
+        let (single, joined) = (from.join(group), self.folder().join(group));
+        let described = attributes(&single, self.version())?;
         let levels = levels_of(&described);
-        let mut ome = described.as_object().cloned().unwrap_or_default();
-        over_time(&mut ome, axis);
-        for store in holding() {
-            take_window(&mut ome, &attributes(&store.join(group), self.version())?);
-        }
-        self.begin_group(group)?;
+        let is_first = !has_image(&joined, self.version());
+        let mut ome = if is_first {
+            let mut ome = described.as_object().cloned().unwrap_or_default();
+            over_time(&mut ome, axis);
+            self.begin_group(group)?;
+            ome
+        } else {
+            attributes(&joined, self.version())?.as_object().cloned().unwrap_or_default()
+        };
+        take_window(&mut ome, &described);
         for level in &levels {
-            let array = |store: &Path| read(&store.join(group).join(level).join(array_document(self.version())));
-            let single = array(first)?;
-            for store in holding() {
-                if array(store)? != single {
-                    return Err(Error::failed(format!(
-                        "the times differ in the shape, type or packing of {group}/{level}; they cannot be one array"
-                    )));
-                }
-            }
-            let document = array_over_time(single, times.len());
-            let folder = self.folder().join(group).join(level);
-            write_json(&folder.join(array_document(self.version())), &document)?;
-        }
-        for (time, store) in times.iter().enumerate().filter_map(|(time, store)| Some((time, (*store)?))) {
-            if has_image(&store.join(group), self.version()) {
-                self.link_shards(group, &levels, time, store)?;
+            let array = |folder: &Path| folder.join(level).join(array_document(self.version()));
+            let document = array_over_time(read(&array(&single))?, times);
+            if is_first {
+                write_json(&array(&joined), &document)?;
+            } else if read(&array(&joined))? != document {
+                return Err(Error::failed(format!(
+                    "the times differ in the shape, type or packing of {group}/{level}; they cannot be one array"
+                )));
             }
         }
+        self.link_shards(group, &levels, n, from)?;
         self.end_group(group, ome)
     }
 
@@ -159,6 +157,8 @@ fn attributes(group: &Path, version: OmeVersion) -> Result<Value> {
     };
     if let Some(told) = told.as_object_mut() {
         told.remove("version");
+        // Of 0.4 what a live store says of itself lies beside.
+        told.remove(ATTRIBUTE);
     }
     Ok(told)
 }

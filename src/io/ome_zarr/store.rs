@@ -292,6 +292,7 @@ impl StoreWriter {
         let mut names = self.lock();
         names.push(name.to_owned());
         names.sort();
+        names.dedup();
         if self.place.is_joined() {
             return Ok(());
         }

@@ -20,6 +20,7 @@ use crate::kernel::distance::seeding::initialise::Cube;
 use crate::kernel::distance::seeding::outside::OutsideSources;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
+use crate::store::checkpoint::SavedField;
 
 /// Which voxels points fix at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -183,7 +184,8 @@ pub fn solve_sets_watched<P: Precision, R>(
     let order = (settings.method, settings.schedule);
     let solved = solve_watched::<P>(&stage, &sources, &set, order, options, reads)?;
     stage.finish();
-    then(solved, &set)
+    let state = solved.state.clone();
+    engine.after("distance", state.as_deref().map(|state| state as &dyn SavedField), || then(solved, &set))
 }
 
 /// The voxels that the points of each data set fix.

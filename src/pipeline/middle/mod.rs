@@ -7,6 +7,8 @@
 
 mod assembled;
 mod crowded;
+#[cfg(test)]
+mod ended;
 mod exact;
 mod job;
 pub(crate) mod settings;

@@ -18,12 +18,14 @@ use super::record;
 use crate::error::{Error, Result, one_line};
 use crate::grid::digits::bytes;
 use crate::store::hidden::remove_abandoned;
-use crate::store::{HiddenFile, free_space};
+use crate::store::{HiddenFile, begin_writeback, free_space};
 
 /// So many manifests are kept, with what they name.
 const KEPT: usize = 2;
 /// Bytes that are handed to the disk at a time.
 const BUFFER: usize = 1 << 20;
+/// After so many bytes the disk is to begin with them.
+const FLOW: usize = 32 << 20;
 
 #[derive(Serialize, Deserialize)]
 struct Manifest {
@@ -199,6 +201,12 @@ impl Checkpoints {
         Some(Kept { facts: entry.facts.clone(), files, links })
     }
 
+    /// Whether there is one, of this run or of the one that it goes on with.
+    #[must_use]
+    pub fn are_there(&self) -> bool {
+        !self.state.lock().unwrap_or_else(PoisonError::into_inner).kept.is_empty()
+    }
+
     /// What a stage has put by is of no use: the next checkpoint names nothing of it.
     pub fn forget(&self, key: &str) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).entries.remove(key);
@@ -323,7 +331,7 @@ impl Checkpoints {
     /// Writes a file beside, flushes it, and gives it its name.
     fn put(&self, name: &str, write: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
         let (hidden, file) = HiddenFile::create(&self.folder.join(name), "")?;
-        let mut out = BufWriter::with_capacity(BUFFER, file);
+        let mut out = BufWriter::with_capacity(BUFFER, Flowing { file, waiting: 0 });
         write(&mut out)?;
         out.into_inner().map_err(io::IntoInnerError::into_error)?;
         hidden.sync()?;
@@ -360,6 +368,28 @@ impl Checkpoints {
             let _ = fs::remove_dir(&self.folder);
         }
         state.lock = None;
+    }
+}
+
+/// A file of which the disk gets what was written while the rest still is: it is waited for in the end.
+struct Flowing {
+    file: File,
+    waiting: usize,
+}
+
+impl Write for Flowing {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.waiting += written;
+        if self.waiting >= FLOW {
+            begin_writeback(&self.file);
+            self.waiting = 0;
+        }
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
     }
 }
 

@@ -40,10 +40,6 @@ use work::Work;
 /// Runs the command.
 pub(super) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     let mut args = args.clone();
-    if args.output.live {
-        let what = "--live shows a run over one time; leave it out, or give one --time";
-        return Err(Error::usage(what));
-    }
     let is_kept = args.output.store().is_some();
     if !is_kept && args.output.survive.resume {
         return Err(Error::usage(
@@ -161,28 +157,34 @@ impl<'a> Series<'a> {
     fn run_in(&self, work: &Work) -> Result<()> {
         self.check_files(work)?;
         let output = &self.args.output;
+        let create = if output.live { StoreWriter::create_live_as } else { StoreWriter::create_as };
         let begin = |path| -> Result<StoreWriter> {
-            Ok(StoreWriter::create_as(output.ome.into(), path, output.overwrite)?.packed(output.compress.into()))
+            Ok(create(output.ome.into(), path, output.overwrite)?.packed(output.compress.into()))
         };
         let store = output.store().map(begin).transpose()?;
-        let done = self.solve_all(work)?;
+        let done = self.solve_all(work, store.as_ref())?;
         self.cancel.check()?;
         let refused = refusals(&done, &self.whole_in());
-        self.join(work, store, &done)?;
+        self.finish(work, store, &done)?;
         refused.map_or(Ok(()), Err)
     }
 
-    /// Solves all times that are not done, one after the other.
-    fn solve_all(&self, work: &Work) -> Result<Vec<TimeReport>> {
+    /// Solves all times that are not done, one after the other; each is joined to the store when it is.
+    fn solve_all(&self, work: &Work, store: Option<&StoreWriter>) -> Result<Vec<TimeReport>> {
         let opens = |time: u32| -> Result<Box<dyn VolumeSource>> {
             Ok(formats::open_stack(&self.args.image, self.args.picture.volume.select_at(time))?)
         };
         let mut follower = Follower::new(&opens);
         let (mut done, mut said, mut first_error) = (Vec::new(), self.console.notes(), None);
+        let is_done = |report: TimeReport, done: &mut Vec<TimeReport>| -> Result<()> {
+            store.map_or(Ok(()), |store| self.join(work, store, &report))?;
+            done.push(report);
+            Ok(())
+        };
         for time in self.times.clone() {
             self.cancel.check()?;
             if let Some(report) = work.done(time, &self.files_of(time)) {
-                done.push(TimeReport::solved(time, report));
+                is_done(TimeReport::solved(time, report), &mut done)?;
                 continue;
             }
             let (n, all) = (time - self.times.start + 1, self.times.len());
@@ -206,14 +208,15 @@ impl<'a> Series<'a> {
                     self.console.note(&format!("time {time}: nothing of it could be solved: {error}"));
                     self.keep_image(time, work)?;
                     let asked = self.marks.asked(time, self.args.seed.len(), moved.as_ref());
-                    done.push(TimeReport { time, report: None, reason: Some(error.to_string()), asked });
+                    let report = TimeReport { time, report: None, reason: Some(error.to_string()), asked };
+                    is_done(report, &mut done)?;
                     first_error.get_or_insert(error);
                     continue;
                 }
                 Err(error) if error.kind() != ErrorKind::Partly => return Err(error),
                 _ => {}
             }
-            done.push(TimeReport::solved(time, work.report(time)?));
+            is_done(TimeReport::solved(time, work.report(time)?), &mut done)?;
         }
         match first_error {
             Some(error) if done.iter().all(|time| time.report.is_none()) => Err(error),
@@ -269,7 +272,7 @@ impl<'a> Series<'a> {
             if output.survive.checkpoint != Some(Checkpoint::Off) {
                 output.survive.checkpoint = None;
             }
-            (output.output, output.report) = (Output::Store(store), None);
+            (output.output, output.report, output.live) = (Output::Store(store), None, false);
         } else {
             (output.report, output.survive.checkpoint) = (Some(work.report_file(time)), Some(Checkpoint::Off));
         }

@@ -1,6 +1,7 @@
 //! What a solved distance can be read as: distances and the indices of nearest sources, both made out of the state of
 //! the method as they are read, so that no second field is stored.
 
+use std::io::{self, Write};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
@@ -8,6 +9,7 @@ use crate::exec::{Workers, read_with_borrowed};
 use crate::grid::{Box3, NO_SOURCE};
 use crate::kernel::distance::state::method::DistanceState;
 use crate::kernel::distance::state::precision::Precision;
+use crate::store::checkpoint::SavedField;
 use crate::store::{BoxSource, BrickArray};
 
 /// A solved distance.
@@ -20,6 +22,8 @@ pub struct Solved<'a, P> {
     pub with_source: Option<Arc<dyn DistanceWithSource<P> + Send + 'a>>,
     /// 1 where a source fixed the voxel, else 0.
     pub fixed: Arc<dyn BoxSource<u8> + Send + 'a>,
+    /// The state of the method, where a checkpoint of a front that has ended holds nothing else.
+    pub state: Option<Arc<dyn SavedField + Send + 'a>>,
     /// Voxels that sources fixed.
     pub fixed_voxels: u64,
     /// Distances from a voxel to a triangle that were computed to fix them.
@@ -68,7 +72,8 @@ impl<M: DistanceState> Values<M> {
     {
         let (values, with_source) = (self.clone(), None);
         let (sources, fixed) = (values.clone(), values.clone());
-        Solved { values, sources, with_source, fixed, fixed_voxels, triangle_distances }
+        let state: Arc<dyn SavedField + Send + 'a> = values.clone();
+        Solved { values, sources, with_source, fixed, state: Some(state), fixed_voxels, triangle_distances }
     }
 
     /// Reads the state of a box and hands each voxel on, with its place in the box.
@@ -85,6 +90,16 @@ impl<M: DistanceState> Values<M> {
             }
             Ok(())
         })
+    }
+}
+
+impl<M: DistanceState> SavedField for Values<M> {
+    fn saved_bytes(&self) -> u64 {
+        self.state.saved_bytes()
+    }
+
+    fn save(&self, out: &mut dyn Write, goes_on: &dyn Fn() -> io::Result<()>) -> io::Result<()> {
+        self.state.save(out, goes_on)
     }
 }
 

@@ -78,7 +78,10 @@ pub(crate) fn advance_front<M: DistanceMethod>(
     stage.iterated(front.rounds, 0.0);
     front.put_by(true, None)?;
     match front.save_point.take() {
-        Some(mut save_point) => save_point.step(|| front.known(None), &[array], then),
+        Some(mut save_point) => {
+            save_point.step(|| front.known(None), &[array], then)?;
+            save_point.leave(&front.known(None))
+        }
         None => then(),
     }
 }

@@ -20,7 +20,7 @@ use crate::exec::Progress;
 use crate::grid::DataSets;
 use crate::io::geometry::read::point_file::PointFile;
 use crate::io::geometry::read::points::read_points;
-use crate::io::ome_zarr::{StoreWriter, TIMES, time_name};
+use crate::io::ome_zarr::{LiveState, StoreWriter, TIMES, time_name};
 
 /// What of a time's store goes into its group.
 const OF_TIME: [&str; 5] = ["levelset", "distance", "marks.csv", "report.json", "report.html"];
@@ -28,14 +28,44 @@ const OF_TIME: [&str; 5] = ["levelset", "distance", "marks.csv", "report.json", 
 const IMAGES: [&str; 2] = ["", "labels/segmentation"];
 
 impl Series<'_> {
-    /// Joins all times, and tells of them.
+    /// Joins a time that is done: its images, and what belongs to it alone. A live store shows it from now on.
     ///
     /// # Errors
     /// When files cannot be written.
-    pub(super) fn join(&self, work: &Work, store: Option<StoreWriter>, times: &[TimeReport]) -> Result<()> {
+    pub(super) fn join(
+        &self,
+        work: &Work,
+        store: &StoreWriter,
+        TimeReport { time, report, .. }: &TimeReport,
+    ) -> Result<()> {
+        let Some(from) = work.store_there(*time) else { return Ok(()) };
+        let (n, count) = ((time - self.times.start) as usize, self.times.len());
+        if report.is_some() {
+            let group = format!("{TIMES}/{}", time_name(*time));
+            store.group(&group)?;
+            for part in OF_TIME {
+                store.take_over(&from, part, &format!("{group}/{part}"))?;
+            }
+            store.take_over(&from, "meshes", &format!("meshes/{}", time_name(*time)))?;
+        }
+        for image in IMAGES {
+            store.join_time(image, (n, count), &from, &self.axis)?;
+        }
+        let done = (n + 1) as f64 / count as f64;
+        store.live().map_or(Ok(()), |root| root.tell(LiveState::Running, done))
+    }
+
+    /// Tells of all times, which are joined.
+    ///
+    /// # Errors
+    /// When files cannot be written.
+    pub(super) fn finish(&self, work: &Work, store: Option<StoreWriter>, times: &[TimeReport]) -> Result<()> {
         let output = &self.args.output;
         if let Some(store) = &store {
-            self.join_images(work, store, times)?;
+            let stores: Vec<Option<PathBuf>> = times.iter().map(|time| work.store_there(time.time)).collect();
+            if let Some(marks) = all_marks(&stores, times)? {
+                write(&store.file("marks.csv")?, true, &marks)?;
+            }
         }
         let mut notes = self.console.notes();
         for note in times.iter().filter_map(|time| time.report.as_ref()).flat_map(|report| {
@@ -61,28 +91,6 @@ impl Series<'_> {
             write(path, output.overwrite, &json(&whole)?)?;
         }
         self.print(&whole.told(&self.whole_in()))
-    }
-
-    fn join_images(&self, work: &Work, store: &StoreWriter, times: &[TimeReport]) -> Result<()> {
-        let stores: Vec<Option<PathBuf>> = times.iter().map(|time| work.store_there(time.time)).collect();
-        let named: Vec<Option<&Path>> = stores.iter().map(Option::as_deref).collect();
-        for image in IMAGES {
-            store.join_times(image, &named, &self.axis)?;
-        }
-        let solved = times.iter().zip(named).filter(|(time, _)| time.report.is_some());
-        for (time, from) in solved.filter_map(|(time, from)| Some((time.time, from?))) {
-            let group = format!("{TIMES}/{}", time_name(time));
-            store.group(&group)?;
-            for part in OF_TIME {
-                store.take_over(from, part, &format!("{group}/{part}"))?;
-            }
-            store.take_over(from, "meshes", &format!("meshes/{}", time_name(time)))?;
-        }
-        let marks = all_marks(&stores, times)?;
-        if let Some(marks) = marks {
-            write(&store.file("marks.csv")?, true, &marks)?;
-        }
-        Ok(())
     }
 
     /// Slices through the first, the middle and the last time that were solved; where there is no memory for them, a note.
