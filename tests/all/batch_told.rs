@@ -31,7 +31,7 @@ fn an_item_that_is_refused_says_so_in_its_log_and_its_row() {
         let page = fs::read_to_string(bench.path("out/summary.html")).unwrap();
         let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
         let page = roxmltree::Document::parse_with_options(&page, options).unwrap();
-        let row = page.descendants().filter(|node| node.has_tag_name("tr")).next_back().unwrap();
+        let row = page.descendants().rfind(|node| node.has_tag_name("tr")).unwrap();
         let told: String = row.descendants().filter_map(|node| node.is_text().then(|| node.text()).flatten()).collect();
         assert!(told.starts_with('b') && told.contains(&reason), "{told}");
     }
