@@ -119,9 +119,8 @@ pub fn walls(
     let (geometry, comm) = (volume.geometry(), engine.comm());
     let _held = engine.reserve(WallsSettings::needs(volume, survey, engine.threads(), store.is_some()).footprint)?;
     let boxes = Boxes::new(geometry, comm);
-    // The first rank writes all of the volume.
-    let writes = store.filter(|_| comm.rank() == 0);
-    let bricks = if comm.ranks() == 1 || writes.is_some() { None } else { Some(bricks_read(geometry, &boxes)) };
+    // Each rank writes its share of the volume, wherever that lies.
+    let bricks = if comm.ranks() == 1 || store.is_some() { None } else { Some(bricks_read(geometry, &boxes)) };
     let needed = |id: BrickId| bricks.as_ref().is_none_or(|bricks| bricks.binary_search(&id).is_ok());
     let stage = engine.stage("read", 0);
     stage.voxels(geometry.domain().volume());
@@ -137,17 +136,17 @@ pub fn walls(
         *label_voxels.entry(label).or_insert(0) += count;
     }
     stage.finish();
-    if comm.rank() == 0 {
-        check_found(settings, &label_voxels)?;
-    }
+    check_found(settings, &label_voxels)?;
     let found = WallsFound { label_voxels, measures, labels: label_measures(&pairs), pairs };
-    if let Some(store) = writes {
+    if let Some(store) = store {
         match &touching.bricks {
             Bricks::U8(bricks) => write_volume(engine, geometry, bricks, &found, store)?,
             Bricks::U16(bricks) => write_volume(engine, geometry, bricks, &found, store)?,
             Bricks::U32(bricks) => write_volume(engine, geometry, bricks, &found, store)?,
         }
-        write_tables(store, &found.pairs, &found.labels, &found.label_voxels)?;
+        if comm.rank() == 0 {
+            write_tables(store, &found.pairs, &found.labels, &found.label_voxels)?;
+        }
     }
     Ok(found)
 }
