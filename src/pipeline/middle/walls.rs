@@ -278,7 +278,9 @@ impl<'a> WallsOf<'a> {
     fn count(&self, own: &[u32]) {
         let found = labels::count(own);
         let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
-        found.into_iter().for_each(|(label, voxels)| *counts.entry(label).or_insert(0) += voxels);
+        for (label, voxels) in found {
+            *counts.entry(label).or_insert(0) += voxels;
+        }
     }
 }
 

@@ -129,7 +129,7 @@ impl<S: Sides> Partition<S> {
         let next = patch.keys.len() as u32;
         let key = || VertexKey::within(&within.voxels.map(|voxel| voxel.map(|v| 2 * v))[..within.len]);
         let (found, key) = if within.len == 2 {
-            let [first, second] = [set.trailing_zeros(), 7 - set.leading_zeros()].map(|n| corners[n as usize]);
+            let [first, second] = [set.trailing_zeros(), set.ilog2()].map(|n| corners[n as usize]);
             let place = 7 * cell.part.offset_of(within.voxels[0]) + usize::from(first ^ second) - 1;
             if self.on_edges[place] != NONE {
                 return self.on_edges[place];

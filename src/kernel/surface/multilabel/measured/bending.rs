@@ -99,11 +99,15 @@ fn turned(along: DVec3, [here, beyond]: [DVec3; 2]) -> f64 {
     0.5 * length * libm::atan2(here.cross(beyond).dot(along) / length, here.dot(beyond))
 }
 
+/// An edge on the side of a box: the labels of its facets, and its ends.
+type Seamed = ([u32; 2], [VertexKey; 2]);
+
 /// The bending of all patches, put together in their order.
 #[derive(Clone, Debug, Default)]
 pub struct Bendings {
     sums: BTreeMap<[u32; 2], f64>,
-    waiting: KeyMap<([u32; 2], [VertexKey; 2]), ([f64; 3], [f64; 3])>,
+    /// Edges whose second facet is still to come: along which way they go, and the normal of the first.
+    waiting: KeyMap<Seamed, [[f64; 3]; 2]>,
     most: usize,
     layer: i64,
 }
@@ -120,11 +124,11 @@ impl Bendings {
         }
         for seam in &bending.seams {
             let key = (seam.labels, seam.ends);
-            if let Some((along, normal)) = self.waiting.remove(&key) {
+            if let Some([along, normal]) = self.waiting.remove(&key) {
                 let turned = turned(along.into(), [normal.into(), seam.normal.into()]);
                 *self.sums.entry(seam.labels).or_insert(0.0) += turned;
             } else {
-                self.waiting.insert(key, (seam.along, seam.normal));
+                self.waiting.insert(key, [seam.along, seam.normal]);
                 self.most = self.most.max(self.waiting.len());
             }
         }

@@ -44,7 +44,7 @@ fn radius(width: f64) -> i64 {
 struct Weights {
     radius: i64,
     /// From the middle on.
-    weights: Vec<f32>,
+    of_places: Vec<f32>,
     /// Those of all places before each, from that at which it begins to that behind its end.
     sums: Vec<f32>,
 }
@@ -55,7 +55,7 @@ impl Weights {
         let value = |n: i64| libm::exp(-0.5 * (n as f64 / width).powi(2));
         let sum: f64 = (-radius..=radius).map(value).sum();
         let sums = (-radius..=radius + 1).map(|n| ((-radius..n).map(value).sum::<f64>() / sum) as f32);
-        Self { radius, weights: (0..=radius).map(|n| (value(n) / sum) as f32).collect(), sums: sums.collect() }
+        Self { radius, of_places: (0..=radius).map(|n| (value(n) / sum) as f32).collect(), sums: sums.collect() }
     }
 
     /// What it sees of the places from one on up to another, counted from its middle.
@@ -226,7 +226,7 @@ fn add_rows(rows: &[f32], has_any: &[bool], start: usize, apart: usize, along: &
         let row = start + n * apart;
         if has_any[row] {
             found = true;
-            let weight = along.weights[n.abs_diff(along.radius as usize)];
+            let weight = along.of_places[n.abs_diff(along.radius as usize)];
             let values = &rows[row * out.len()..][..out.len()];
             out.iter_mut().zip(values).for_each(|(out, value)| *out += weight * value);
         }
