@@ -11,7 +11,7 @@ use crate::batch::{LIST, batch, bench, rows};
 #[test]
 fn a_log_of_others_stays() {
     let bench = bench(&["a", "b"], LIST);
-    fs::create_dir(bench.path("out")).unwrap();
+    fs::create_dir_all(bench.path("out")).unwrap();
     bench.write("out/a.log", "mine");
     for _ in 0..2 {
         assert_eq!(batch(&bench, "").0, 3);

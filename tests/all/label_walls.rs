@@ -212,7 +212,8 @@ fn two_halves_of_a_ball_share_a_disc() {
     for label in &found.labels {
         assert_eq!(euler(&mesh, label.label), 2);
         assert!((label.volume.unwrap() / volume.volume_of(label.label) - 1.0).abs() < 0.005);
-        assert!((label.contact_area - found.pairs[2].area).abs() < 1e-9);
+        let (contact, area) = (label.contact_area, found.pairs[2].area);
+        assert!((contact / area - 1.0).abs() < 1e-9, "label {}: {contact} of {area}", label.label);
     }
 }
 
@@ -229,7 +230,8 @@ fn many_cells_are_closed_and_fill_what_they_fill_together() {
         // Half spaces and a ball share one piece without a hole; of slivers voxels may leave several.
         if found.label_voxels[&label.label] > 300 {
             assert_eq!(number, 2, "label {}", label.label);
-            assert!((own / its - 1.0).abs() < 0.05, "label {}: {own} of {its}", label.label);
+            // What is round at lines where several meet is much of a cell of some 1000 voxels.
+            assert!((own / its - 1.0).abs() < 0.06, "label {}: {own} of {its}", label.label);
         }
         let walls = found.pairs.iter().filter(|pair| pair.labels.contains(&label.label));
         assert!((walls.map(|pair| pair.area).sum::<f64>() / label.area - 1.0).abs() < 1e-12);
@@ -262,8 +264,12 @@ fn what_fills_the_volume_is_closed_at_its_end() {
     assert_eq!(euler(&mesh, 5), 2);
     let (own, its) = (found.labels[0].volume.unwrap(), volume.volume_of(5));
     assert!((own / its - 1.0).abs() < 0.01, "{own} of {its}: edges and corners are rounded");
-    let lowest = mesh.mesh.vertices.iter().map(|v| v[2]).fold(f64::INFINITY, f64::min);
-    assert!((lowest - 99.0).abs() < 0.1, "{lowest}");
+    // Flat but near edges, and nowhere farther from the faces between voxels than half a voxel.
+    let inner = |v: &&[f64; 3]| (0..2).all(|a| (6.0..28.0).contains(&(v[a] - volume.geometry.origin[a])));
+    let below = mesh.mesh.vertices.iter().filter(|v| v[2] < 105.0);
+    assert!(below.clone().all(|v| v[2] >= 98.0));
+    let flat: Vec<f64> = below.filter(inner).map(|v| v[2]).collect();
+    assert!(flat.len() > 100 && flat.iter().all(|z| (z - 99.0).abs() < 0.1), "{flat:?}");
 }
 
 #[test]
