@@ -5,7 +5,7 @@ import numpy as np
 
 def cloud(rng, path):
     """Points of an ellipsoid, a ring or two bodies, some of them off."""
-    count = int(10 ** rng.uniform(2.3, 3.1))
+    count = int(10 ** rng.uniform(2.8, 3.2))
     directions = rng.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     kind = rng.integers(3)

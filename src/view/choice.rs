@@ -4,7 +4,7 @@
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
 
 use super::described::{Image, Kind};
-use super::shown::{MeshFile, Shown};
+use super::shown::{MeshFile, Shown, root_of};
 
 /// What stays as it is in a name that is a part of an address (RFC 3986, unreserved), and in a path.
 const NAME: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'_').remove(b'.').remove(b'~');
@@ -112,11 +112,6 @@ pub(super) fn choices(shown: &Shown) -> Vec<&str> {
 pub(super) fn asked(query: Option<&str>) -> Option<String> {
     let sent = query?.split('&').find_map(|part| part.strip_prefix("store="))?;
     percent_decode_str(sent).decode_utf8().ok().map(std::borrow::Cow::into_owned)
-}
-
-/// The store that a path on the server leads into.
-pub(super) fn root_of(path: &str) -> &str {
-    path.split('/').next().unwrap_or_default()
 }
 
 /// A name as a part of an address.

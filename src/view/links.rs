@@ -1,10 +1,10 @@
 //! Where and how other programs open what is shown: of each program what it can open.
 
-use super::choice::{choices, name_in_address, root_of};
+use super::choice::{choices, name_in_address};
 use super::described::{Image, Kind};
 use super::folder::Folder;
 use super::listing::quoted;
-use super::shown::{MeshFile, Shown};
+use super::shown::{MeshFile, Shown, root_of};
 use super::state::address;
 use super::told;
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::neighbours::Joined;
 use super::object_report::ObjectReport;
-use super::objects::Solved;
+use super::ranks::solved::Solved;
 use crate::error::Result;
 use crate::exec::{Engine, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, Slot};

@@ -11,11 +11,11 @@ use super::outlined::outlines::scatter_of;
 use super::outlined::survey::{Looking, Outlined, Told, Trust, left_out_of, trust};
 use super::picture::Picture;
 use super::ranks::parts::own_objects;
-use super::ranks::solved::{in_order, of_all_ranks};
+use super::ranks::solved::{Solved, in_order, of_all_ranks};
 use super::settings::{Guides, ImageModel, SegmentSettings, Start};
 use crate::error::{Error, ErrorKind, Result};
 use crate::exec::Engine;
-use crate::grid::{Box3, Geometry, digits};
+use crate::grid::{Geometry, digits};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::Hausdorff;
@@ -25,24 +25,12 @@ use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::output::viewer_mesh::{Segments, for_viewers};
 use crate::pipeline::surface::{self, Drawn};
-use crate::store::{BrickArray, Element, ElementType};
+use crate::store::{Element, ElementType};
 
 /// What was solved, in order of the labels, and what was not.
 pub(super) struct Objects {
     pub solved: Vec<Solved>,
     pub refused: Vec<Refused>,
-}
-
-/// A solved object whose surface is drawn.
-pub(super) struct Solved {
-    /// Its box in voxels of the image; may reach past it.
-    pub window: Box3,
-    /// The grid of its box.
-    pub geometry: Geometry,
-    /// The segmentation function.
-    pub u: BrickArray<f32>,
-    /// What is told of it.
-    pub report: ObjectReport,
 }
 
 /// Solves all objects, of several ranks each some; all ranks then have all. They are solved on a grid whose first voxel is the

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use super::{Drawn, Marks, MeshFile, Series, Shown};
+use super::{Drawn, Marks, MeshFile, Series, Shown, root_of};
 use crate::error::{Error, Result};
 use crate::io::geometry::read::point_file::PointFile;
 use crate::io::geometry::read::points::read_points;
@@ -14,7 +14,6 @@ use crate::io::stack::formats::open_stack;
 use crate::io::stack::volume::Select;
 use crate::pipeline::output::viewer_mesh::{PRECOMPUTED, SIMPLIFIED};
 use crate::pipeline::segment::MARKS;
-use crate::view::choice::root_of;
 use crate::view::described::{image, multiscale};
 use crate::view::documents::{fault, is_array, is_meant_as_store, unshown};
 use crate::view::folder::Folder;

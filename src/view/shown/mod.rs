@@ -6,7 +6,6 @@ mod adding;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::choice::root_of;
 use super::described::{Axis, Image};
 use super::documents::{fault, is_meant_as_store, says_something, unshown};
 use super::folder::Folder;
@@ -186,4 +185,9 @@ impl Shown {
     pub(super) fn live(&self) -> impl Iterator<Item = Live> {
         self.roots.iter().filter_map(|(_, folder)| live(folder.root()))
     }
+}
+
+/// The store that a path on the server leads into.
+pub(in crate::view) fn root_of(path: &str) -> &str {
+    path.split('/').next().unwrap_or_default()
 }

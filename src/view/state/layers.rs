@@ -4,9 +4,9 @@ use serde_json::{Map, Value, json};
 
 use super::placing::dimension;
 use super::window::window;
-use crate::view::choice::{Chosen, path_in_address, root_of};
+use crate::view::choice::{Chosen, path_in_address};
 use crate::view::described::{Axis, Image, Kind, Unsolved};
-use crate::view::shown::{Marks, MeshFile};
+use crate::view::shown::{Marks, MeshFile, root_of};
 
 /// Colours of meshes without one, evenly around the circle of hues.
 const HUE_STEP: f64 = 0.618_033_988_75;

@@ -10,7 +10,8 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 
 pub(super) use self::layers::address;
-use super::choice::{Chosen, root_of};
+use super::choice::Chosen;
+use super::shown::root_of;
 
 /// The state; sources begin with a slash, for the server that the page came from.
 pub(super) fn state(chosen: &Chosen<'_>) -> Value {

@@ -7,8 +7,19 @@ use crate::error::{Error, Result};
 use crate::exec::{Comm, Stage, gather_records, spread_fields};
 use crate::grid::{Box3, Geometry};
 use crate::pipeline::segment::object_report::{ObjectReport, Refused};
-use crate::pipeline::segment::objects::Solved;
 use crate::store::BrickArray;
+
+/// A solved object whose surface is drawn.
+pub(in crate::pipeline::segment) struct Solved {
+    /// Its box in voxels of the image; may reach past it.
+    pub window: Box3,
+    /// The grid of its box.
+    pub geometry: Geometry,
+    /// The segmentation function.
+    pub u: BrickArray<f32>,
+    /// What is told of it.
+    pub report: ObjectReport,
+}
 
 /// What is told of all objects, by their numbers, in order of these. All ranks tell theirs at the same time.
 ///
