@@ -70,7 +70,7 @@ def ours(labels, spacing, folder, flags=()):
     """Corners of the triangles, their labels, seconds, and MiB, by this program."""
     image, mesh, report = (folder / name for name in ("labels.tif", "walls.ply", "report.json"))
     tifffile.imwrite(
-        image, labels, imagej=True, resolution=(1 / spacing[0], 1 / spacing[1]), metadata={"spacing": spacing[2]}
+        image, labels, imagej=True, resolution=(1 / spacing[0], 1 / spacing[1]), metadata={"axes": "ZYX", "spacing": spacing[2]}
     )
     spaced = ["--image-spacing", ",".join(map(str, spacing))]
     command = [os.environ["STRANDLINE"], "middle", image, *spaced, *flags, "-q", "-o", "none", "--overwrite"]
