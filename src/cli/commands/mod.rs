@@ -15,4 +15,3 @@ pub(crate) mod store_contents;
 pub(crate) mod verify;
 #[cfg(feature = "viewer")]
 pub(crate) mod view;
-pub(crate) mod walls;

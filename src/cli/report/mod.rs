@@ -12,4 +12,3 @@ pub(crate) mod run_report;
 pub(crate) mod series;
 pub(crate) mod settings;
 pub(crate) mod table;
-pub(crate) mod walls;

@@ -1,7 +1,8 @@
 //! `EdgeTally`: whether a mesh is closed, told exactly while its triangles pass.
 
+use std::collections::HashMap;
+
 use super::growing::Growing;
-use super::key_hash::KeyMap;
 
 /// The directed edges whose opposite has not come yet.
 ///
@@ -10,7 +11,7 @@ use super::key_hash::KeyMap;
 /// triangles in the order of bricks the tally holds no more than the edges of the current layer.
 #[derive(Clone, Debug, Default)]
 pub struct EdgeTally {
-    waiting: KeyMap<(u32, u32), u32>,
+    waiting: HashMap<(u32, u32), u32>,
     open: u64,
     /// Entries that waited at the same time.
     most: usize,

@@ -4,7 +4,6 @@ pub(crate) mod clustering;
 pub(crate) mod components;
 pub(crate) mod edge_tally;
 pub(crate) mod growing;
-pub(crate) mod key_hash;
 pub(crate) mod measure;
 pub(crate) mod nearest;
 pub(crate) mod patch;

@@ -10,22 +10,11 @@ use crate::exec::Cancel;
 use crate::grid::{Box3, Geometry, refuse_too_many};
 use crate::io::stack::label_volume::LabelVolume;
 use crate::kernel::image::labels::{border, labelled};
-use crate::store::ElementType;
 
 /// A volume of labels, read by the boxes in which it is stored.
-pub trait Labels: Sync {
+pub trait Labels {
     /// Where its voxels lie.
     fn geometry(&self) -> &Geometry;
-
-    /// The type that its labels are stored in.
-    fn element(&self) -> ElementType {
-        ElementType::U32
-    }
-
-    /// Bytes that are held while it is read box by box, in each thread that does.
-    fn reading_bytes(&self) -> u64 {
-        0
-    }
 
     /// The boxes in which it is stored, x fastest, laid on a regular grid.
     fn natural_boxes(&self) -> Box<dyn Iterator<Item = Box3> + '_>;
@@ -40,14 +29,6 @@ pub trait Labels: Sync {
 impl Labels for LabelVolume {
     fn geometry(&self) -> &Geometry {
         self.geometry()
-    }
-
-    fn element(&self) -> ElementType {
-        self.element()
-    }
-
-    fn reading_bytes(&self) -> u64 {
-        self.reading_bytes()
     }
 
     fn natural_boxes(&self) -> Box<dyn Iterator<Item = Box3> + '_> {
