@@ -55,11 +55,12 @@ struct Case {
     neighbours: Neighbours,
 }
 
-/// A solved field: distances, sources, how many voxels are fixed; what it took.
+/// A solved field: distances, sources, which voxels are fixed and how many; what it took.
 #[derive(Debug, PartialEq)]
 struct Field<P> {
     distances: Vec<P>,
     sources: Vec<u32>,
+    fixed: Vec<u8>,
     fixed_voxels: u64,
     bricks: u64,
     rounds: u64,
@@ -86,7 +87,9 @@ impl Case {
         .into_iter();
         let (mut field, mut report) = done.next().expect("a rank");
         for (other, did) in done {
-            assert!(other.distances == field.distances && other.sources == field.sources, "ranks read the same");
+            let same =
+                other.distances == field.distances && other.sources == field.sources && other.fixed == field.fixed;
+            assert!(same, "ranks read the same");
             field.bricks += other.bricks;
             field.fixed_voxels += other.fixed_voxels;
             report.brick_loads += did.brick_loads;
@@ -114,6 +117,7 @@ impl Case {
         let field = Field {
             distances: whole(&*solved.values),
             sources: whole(&*solved.sources),
+            fixed: whole(&*solved.fixed),
             fixed_voxels: solved.fixed_voxels,
             bricks: report.bricks,
             rounds: report.iterations,

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 use rstar::RTree;
 use strandline::error::Result;
+use strandline::exec::as_threads;
 use strandline::grid::{Geometry, TriangleMesh};
 use strandline::kernel::surface::PatchIndex;
 use strandline::pipeline::distance::Method;
@@ -282,7 +283,7 @@ fn a_given_beta_finds_the_same_space_and_hole() {
 
 /// u and the mesh, vertex for vertex, for any number of threads and ranks and for a window that drops what it loads.
 #[test]
-fn threads_and_memory_change_no_bit() {
+fn threads_ranks_and_memory_change_no_bit() {
     let cloud = sponge();
     let grid = grid_around(&cloud, 0.04);
     let run = |lab: &Lab| {
@@ -296,5 +297,14 @@ fn threads_and_memory_change_no_bit() {
     let first = run(&Lab::new(1));
     for lab in [Lab::new(2), Lab::new(4), Lab::with_window(2, 2 << 20)] {
         assert!(run(&lab) == first);
+    }
+    for ranks in [2, 3] {
+        let found = as_threads(ranks, |comm| {
+            let lab = Lab::new(1);
+            Ok(run(&Lab { engine: lab.engine.as_rank(comm), ..lab }))
+        });
+        // The first draws the surface; all have the field.
+        let found = found.expect("a surface");
+        assert!(found[0].0 == first.0 && found.iter().all(|(_, u)| *u == first.1), "{ranks} ranks");
     }
 }

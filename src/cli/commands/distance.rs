@@ -16,7 +16,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, save_points, told_of_room, without_save_points};
+use crate::cli::outputs::survival::{finished_before, survivable, told_of_room};
 use crate::cli::print;
 use crate::cli::report::distance::{Found, Settings, describe_found};
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
@@ -30,9 +30,8 @@ use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, place, triple};
 use crate::cli::terminal::world;
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Comm, Engine, Plan, Progress, as_threads};
+use crate::exec::{Budget, Cancel, Comm, Engine, Plan, Progress};
 use crate::grid::{DataSets, Geometry};
-use crate::io::geometry::read::sources::is_standard_input;
 use crate::io::geometry::write::formats::Values;
 use crate::io::ome_zarr::StoreWriter;
 use crate::job::disk::Disk;
@@ -67,27 +66,22 @@ pub(crate) fn run(args: &DistanceJobArgs, typed: &[String]) -> Result<()> {
 }
 
 /// Runs `middle`: a distance with labels, and the surface between them.
-pub(crate) fn run_middle(args: DistanceJobArgs, choice: MiddleChoice, typed: &[String]) -> Result<()> {
+pub(crate) fn run_middle(args: DistanceJobArgs, choice: &MiddleChoice, typed: &[String]) -> Result<()> {
     begin(args, Some(choice), typed)
 }
 
-fn begin(mut args: DistanceJobArgs, middle: Option<MiddleChoice>, typed: &[String]) -> Result<()> {
-    let mesh = middle.as_ref().and_then(|choice| choice.mesh.clone());
+fn begin(mut args: DistanceJobArgs, middle: Option<&MiddleChoice>, typed: &[String]) -> Result<()> {
+    let mesh = middle.and_then(|choice| choice.mesh.clone());
     let output = &mut args.job.output;
     let files = [output.report.clone(), mesh];
     if finished_before(output, &files, typed)? {
         return Ok(());
     }
     settings::check_ranks(args.job.ranks)?;
-    let reads_input = args.sources.iter().any(|source| is_standard_input(source));
-    let comm = world::ranks()?;
-    if reads_input && comm.ranks().max(args.job.ranks) > 1 {
-        return Err(Error::usage("several ranks cannot read standard input; give files that all of them can read"));
-    }
-    if args.job.ranks == 1 || comm.ranks() > 1 {
-        return Job::new(args, middle, typed, comm)?.run_precise();
-    }
-    as_threads(args.job.ranks, |comm| Job::new(args.clone(), middle.clone(), typed, comm)?.run_precise()).map(drop)
+    let in_process = args.job.ranks;
+    world::on_ranks(in_process, &args.sources, |comm| {
+        Job::new(args.clone(), middle.cloned(), typed, comm)?.run_precise()
+    })
 }
 
 impl Job {
@@ -105,14 +99,9 @@ impl Job {
         };
         outputs.check()?;
         mesh.as_deref().map(mesh_format).transpose()?;
-        let resources = settings::resources(&args.job.resources, args.job.output.store())?;
-        let resources = resources.share(
-            world::sharing(args.job.ranks),
-            [args.job.resources.memory.is_some(), args.job.resources.threads.is_some()],
-        );
-        // The first rank speaks for all.
-        let voice = if comm.rank() == 0 { Voice::of_run(&args.job.output) } else { Voice::Quiet };
-        let console = Arc::new(Console::new(voice));
+        let job = &args.job;
+        let resources = settings::resources_of_rank(&job.resources, job.output.store(), job.ranks)?;
+        let console = Arc::new(Console::new(Voice::of_rank(comm.as_ref(), &job.output)));
         let mut notes = Vec::new();
         let given = grid::given(&args.job.grid, &mut notes)?;
         for note in &notes {
@@ -161,13 +150,8 @@ impl Job {
         }
         self.console.say(&plan);
         self.note_without_checkpoints::<P>();
-        let (output, console) = (&self.args.job.output, self.console.as_ref());
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
-        let engine = if self.comm.ranks() == 1 {
-            engine.with_save_points(save_points(output, &self.typed, console)?)
-        } else {
-            without_save_points(engine, (output, &self.typed), console)?
-        };
+        let engine = survivable(engine, (&self.args.job.output, &self.typed), None, self.console.as_ref())?;
         engine.outlook().expect(with_page(self.stages::<P>(threads), self.args.job.output.store().is_some()));
         let result = self.solve_and_write::<P>(&engine);
         self.console.clear();

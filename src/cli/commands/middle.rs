@@ -26,5 +26,5 @@ pub(crate) fn run(args: &MiddleArgs, typed: &[String]) -> Result<()> {
         mesh: surface.mesh,
     };
     let fields = ChoiceArgs { labels: true, ..ChoiceArgs::default() };
-    run_middle(DistanceJobArgs { sources, job, choice: fields }, choice, typed)
+    run_middle(DistanceJobArgs { sources, job, choice: fields }, &choice, typed)
 }

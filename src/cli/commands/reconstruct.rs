@@ -15,7 +15,7 @@ use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile, distance_to_marks};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, save_points, told_of_room, without_save_points};
+use crate::cli::outputs::survival::{finished_before, survivable, told_of_room};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -29,10 +29,9 @@ use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration, grouped, number, place, triple};
 use crate::cli::terminal::world;
 use crate::error::{Error, Result};
-use crate::exec::{Budget, Cancel, Comm, Engine, Progress, as_threads};
+use crate::exec::{Budget, Cancel, Comm, Engine, Progress};
 use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::read::source::Source;
-use crate::io::geometry::read::sources::is_standard_input;
 use crate::job::disk::Disk;
 use crate::job::resources::Resources;
 use crate::pipeline::output::viewer_mesh::{Segments, Simplified};
@@ -70,14 +69,8 @@ pub(crate) fn run(args: &ReconstructArgs, typed: &[String]) -> Result<()> {
         return Ok(());
     }
     settings::check_ranks(args.ranks)?;
-    let comm = world::ranks()?;
-    if is_standard_input(&args.cloud) && comm.ranks().max(args.ranks) > 1 {
-        return Err(Error::usage("several ranks cannot read standard input; give a file that all of them can read"));
-    }
-    if args.ranks == 1 || comm.ranks() > 1 {
-        return run_rank(args, typed, comm);
-    }
-    as_threads(args.ranks, |comm| run_rank(args.clone(), typed, comm)).map(drop)
+    let cloud = args.cloud.clone();
+    world::on_ranks(args.ranks, &[cloud], |comm| run_rank(args.clone(), typed, comm))
 }
 
 /// Runs the command on one of the ranks.
@@ -154,12 +147,8 @@ impl Job {
         };
         outputs.check()?;
         args.mesh.as_deref().map(mesh_format).transpose()?;
-        let resources = settings::resources(&args.resources, args.output.store())?;
-        let gave = [args.resources.memory.is_some(), args.resources.threads.is_some()];
-        let resources = resources.share(world::sharing(args.ranks), gave);
-        // The first rank speaks for all.
-        let voice = if comm.rank() == 0 { Voice::of_run(&args.output) } else { Voice::Quiet };
-        let console = Arc::new(Console::new(voice));
+        let resources = settings::resources_of_rank(&args.resources, args.output.store(), args.ranks)?;
+        let console = Arc::new(Console::new(Voice::of_rank(comm.as_ref(), &args.output)));
         let cloud = match read_told(&args.cloud, &|text| console.note(text))? {
             Source::Cloud(cloud) => cloud.positions,
             Source::Mesh(mesh) => {
@@ -231,13 +220,8 @@ impl Job {
     }
 
     fn run(&self, seconds: f64, most: u64) -> Result<()> {
-        let (output, console) = (&self.args.output, self.console.as_ref());
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
-        let engine = if self.comm.ranks() == 1 {
-            engine.with_save_points(save_points(output, &self.typed, console)?)
-        } else {
-            without_save_points(engine, (output, &self.typed), console)?
-        };
+        let engine = survivable(engine, (&self.args.output, &self.typed), None, self.console.as_ref())?;
         engine.outlook().expect(with_page(plan(seconds, self.writes_fields()), self.writes_fields()));
         let result = self.solve_and_write(&engine);
         self.console.clear();

@@ -20,7 +20,7 @@ use crate::cli::outputs::checks::{Outputs, numbered};
 use crate::cli::outputs::drawing::{ObjectFiles, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
 use crate::cli::outputs::store::{begin_store_on_ranks, join_store};
-use crate::cli::outputs::survival::{finished_before, save_points, save_points_of, told_of_room, without_save_points};
+use crate::cli::outputs::survival::{finished_before, survivable, told_of_room};
 use crate::cli::print;
 use crate::cli::report::page::evidence::{Evidence, Measure, Root};
 use crate::cli::report::page::written::{Written, with_page};
@@ -31,9 +31,8 @@ use crate::cli::terminal::signals;
 use crate::cli::terminal::text::{bytes, duration};
 use crate::cli::terminal::world;
 use crate::error::{Error, Result};
-use crate::exec::{Cancel, Comm, Engine, Progress, as_threads};
+use crate::exec::{Cancel, Comm, Engine, Progress};
 use crate::grid::{Box3, Geometry};
-use crate::io::geometry::read::sources::is_standard_input;
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stack::volume::Stack;
 use crate::job::resources::Resources;
@@ -86,7 +85,7 @@ pub(crate) struct Names {
 pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     settings::check_ranks(args.ranks)?;
     if args.picture.time.one().is_none() {
-        if args.ranks > 1 || world::ranks()?.ranks() > 1 {
+        if world::number(args.ranks) > 1 {
             let what = "several times are solved by one rank; give one --time, or run the times as items of a batch";
             return Err(Error::usage(what));
         }
@@ -97,28 +96,13 @@ pub(crate) fn run(args: &SegmentArgs, typed: &[String]) -> Result<()> {
     if finished_before(&mut args.output, &files, typed)? {
         return Ok(());
     }
-    let comm = world::ranks()?;
-    if comm.ranks().max(args.ranks) > 1 {
-        check_for_ranks(&args)?;
-    }
-    let cancel = signals::cancel_on_signals()?;
-    if args.ranks == 1 || comm.ranks() > 1 {
-        return run_rank(args, typed, cancel, comm);
-    }
-    as_threads(args.ranks, |comm| run_rank(args.clone(), typed, cancel.clone(), comm)).map(drop)
-}
-
-/// What several ranks cannot do.
-fn check_for_ranks(args: &SegmentArgs) -> Result<()> {
-    if args.points.iter().any(|path| is_standard_input(path)) {
-        return Err(Error::usage("several ranks cannot read standard input; give files that all of them can read"));
-    }
-    if args.drawn.picture.is_some() && args.output.store().is_none() {
+    if world::number(args.ranks) > 1 && args.drawn.picture.is_some() && args.output.store().is_none() {
         return Err(Error::usage(
             "a picture is drawn from a store, which several ranks write together; give -o OUT.zarr too",
         ));
     }
-    Ok(())
+    let cancel = signals::cancel_on_signals()?;
+    world::on_ranks(args.ranks, &args.points, |comm| run_rank(args.clone(), typed, cancel.clone(), comm))
 }
 
 /// Runs the command on one of the ranks.
@@ -155,9 +139,7 @@ impl Job {
         typed: &[String],
         (cancel, comm): (Cancel, Arc<dyn Comm>),
     ) -> Result<Self> {
-        // The first rank speaks for all.
-        let voice = if comm.rank() == 0 { Voice::of_run(&args.output) } else { Voice::Quiet };
-        let console = Console::new(voice);
+        let console = Console::new(Voice::of_rank(comm.as_ref(), &args.output));
         let (points, points_in, time) = (args.points.clone(), args.points_in, args.picture.time.first());
         let mut marking = |opened: &OpenStack, console: &Console| {
             let reading = Reading { image: &opened.geometry, points_in, time: Some(time) };
@@ -192,9 +174,7 @@ impl Job {
         outputs.check()?;
         args.drawn.mesh.as_deref().map(mesh_format).transpose()?;
         args.drawn.picture.as_deref().map(picture::check_name).transpose()?;
-        let resources = settings::resources(&args.resources, args.output.store())?;
-        let gave = [args.resources.memory.is_some(), args.resources.threads.is_some()];
-        let resources = resources.share(world::sharing(args.ranks), gave);
+        let resources = settings::resources_of_rank(&args.resources, args.output.store(), args.ranks)?;
         let console = Arc::new(console);
         let select = args.picture.volume.select_at(time);
         let opened = open_stack(&args.image, select, spacing)?;
@@ -289,13 +269,9 @@ impl Job {
         if self.console.is_verbose() {
             self.describe().lines().for_each(|line| self.console.say(line));
         }
-        let (output, console) = (&self.args.output, self.console.as_ref());
         let engine = self.resources.engine(&self.cancel, self.console.clone())?.as_rank(self.comm.clone());
-        let engine = match &self.identity {
-            _ if self.comm.ranks() > 1 => without_save_points(engine, (output, &self.typed), console)?,
-            Some(known) => engine.with_save_points(save_points_of(output, known, console)?),
-            None => engine.with_save_points(save_points(output, &self.typed, console)?),
-        };
+        let asked = (&self.args.output, self.typed.as_slice());
+        let engine = survivable(engine, asked, self.identity.as_ref(), self.console.as_ref())?;
         let (voxels, threads, writes) = (self.crop.volume(), self.resources.threads, self.needs_store());
         engine.outlook().expect(with_page(
             plan(estimate, &self.guides(), self.comm.as_ref(), (voxels, threads, writes)),

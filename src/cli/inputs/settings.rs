@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::cli::args::common::{
     Edge, ImageArg, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, SmoothingArg, StartArg, StopArg,
 };
+use crate::cli::terminal::world;
 use crate::error::{Error, Result};
 use crate::job::resources::Resources;
 use crate::pipeline::distance::Method;
@@ -125,6 +126,12 @@ pub(crate) fn spacing(flag: &str, given: Option<[f64; 3]>) -> Result<Option<[f64
 /// Memory, threads and scratch; `output` is what lies nearest to large free disks when nothing else is said.
 pub(crate) fn resources(args: &ResourceArgs, output: Option<&Path>) -> Result<Resources> {
     Resources::new(args.memory, args.threads, args.scratch.as_deref(), output)
+}
+
+/// The same of one of several ranks, of which so many share this process; others may share the machine.
+pub(crate) fn resources_of_rank(args: &ResourceArgs, output: Option<&Path>, in_process: usize) -> Result<Resources> {
+    let gave = [args.memory.is_some(), args.threads.is_some()];
+    Ok(resources(args, output)?.share(world::sharing(in_process), gave))
 }
 
 #[cfg(test)]

@@ -112,48 +112,30 @@ fn check_same(store: &Path, now: &Identity) -> Result<()> {
     Err(Error::usage(what).at(store))
 }
 
-/// Where the run puts by what it solves, with what it goes on from.
+/// The engine of a run that puts by what it solves, and goes on from what was put by. What its inputs hold is looked at here where it is
+/// not `known` before. Several ranks take no checkpoints, which is told who asked for them; the first one looks at the inputs for what the store
+/// tells of them.
 ///
 /// # Errors
-/// When another run works there, or what lies there is of another one.
-pub(crate) fn save_points(
-    output: &OutputArgs,
-    typed: &[String],
-    console: &dyn Progress,
-) -> Result<Option<Arc<SavePoints>>> {
-    let found = checkpoints(output, || identity(typed), console)?;
-    Ok(found.map(|checkpoints| Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish()))))
-}
-
-/// The engine of one of several ranks. These take no checkpoints, which is told who asked for them; the first one looks at the inputs for
-/// what the store tells of them.
-///
-/// # Errors
-/// When an input cannot be read.
-pub(crate) fn without_save_points(
+/// When another run works there, what lies there is of another one, or an input cannot be read.
+pub(crate) fn survivable(
     engine: Engine,
     (output, typed): (&OutputArgs, &[String]),
+    known: Option<&Identity>,
     console: &dyn Progress,
 ) -> Result<Engine> {
+    let identity = || known.map_or_else(|| identity(typed), |known| Ok(Some(known.clone())));
+    if engine.comm().ranks() == 1 {
+        let found = checkpoints(output, identity, console)?;
+        let every = output.survive.checkpoint_every;
+        return Ok(engine.with_save_points(found.map(|found| Arc::new(SavePoints::new(found, every, wish())))));
+    }
     if output.survive.asks() {
         console.note("runs on several ranks take no checkpoints, and go on from none: this one begins anew");
     }
     let is_told = engine.comm().rank() == 0 && output.store().is_some();
-    let known = if is_told && output.survive.checkpoint != Some(Checkpoint::Off) { identity(typed)? } else { None };
-    Ok(engine.known_as(known))
-}
-
-/// The same of a run whose inputs have been looked at before.
-///
-/// # Errors
-/// As [`save_points`].
-pub(crate) fn save_points_of(
-    output: &OutputArgs,
-    known: &Identity,
-    console: &dyn Progress,
-) -> Result<Option<Arc<SavePoints>>> {
-    let found = checkpoints(output, || Ok(Some(known.clone())), console)?;
-    Ok(found.map(|checkpoints| Arc::new(SavePoints::new(checkpoints, output.survive.checkpoint_every, wish()))))
+    let is_told = is_told && output.survive.checkpoint != Some(Checkpoint::Off);
+    Ok(engine.known_as(if is_told { identity()? } else { None }))
 }
 
 /// The checkpoints of a run, with what it goes on from; none where it takes none.

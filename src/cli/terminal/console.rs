@@ -16,7 +16,7 @@ use super::log;
 use super::text::{duration, grouped};
 use crate::cli::args::common::{LogArg, OutputArgs};
 use crate::error::one_line;
-use crate::exec::{Outlook, Progress};
+use crate::exec::{Comm, Outlook, Progress};
 
 /// Notes that are said; the report has all.
 const MOST_NOTES: usize = 20;
@@ -53,6 +53,11 @@ impl Voice {
             LogArg::Json if quiet => Self::Quiet,
             LogArg::Json => Self::Json,
         }
+    }
+
+    /// What the flags of a run ask for of a rank: the first one speaks for all.
+    pub(crate) fn of_rank(comm: &dyn Comm, output: &OutputArgs) -> Self {
+        if comm.rank() == 0 { Self::of_run(output) } else { Self::Quiet }
     }
 
     /// What the flags of a run ask for.

@@ -1,12 +1,14 @@
 //! The processes that an MPI launcher has started together with this one: who they are to a run, and how it ends for all of them.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::cli::args::command_line::Command;
 use crate::error::{Error, Result};
-use crate::exec::{Comm, SelfComm, launched};
+use crate::exec::{Comm, SelfComm, as_threads, launched};
 #[cfg(feature = "mpi")]
 use crate::exec::{Counted, MpiComm};
+use crate::io::geometry::read::sources::is_standard_input;
 use crate::job::resources::Sharing;
 
 /// Refuses what would be done by each of several processes alike: all would write over each other's output.
@@ -42,6 +44,11 @@ pub(crate) fn on_this_machine() -> usize {
     launched().map_or(1, |launched| launched.on_this_machine)
 }
 
+/// How many ranks run a job that is given so many in this process; MPI need not be begun to know that.
+pub(crate) fn number(in_process: usize) -> usize {
+    launched().map_or(1, |launched| launched.processes).max(in_process)
+}
+
 /// How ranks share this machine, of which so many are threads of this process.
 pub(crate) fn sharing(in_process: usize) -> Sharing {
     let machine = on_this_machine();
@@ -72,6 +79,23 @@ pub(crate) fn ranks() -> Result<Arc<dyn Comm>> {
         return Ok(Arc::new(Counted::new(WORLD.get_or_init(|| world).clone())));
     }
     Ok(Arc::new(SelfComm))
+}
+
+/// Runs a job on all ranks: as the one of them that this process is, or as so many threads of it. Of its inputs none may be one that only one
+/// rank can read.
+///
+/// # Errors
+/// Of the job, and when MPI cannot be begun.
+pub(crate) fn on_ranks(
+    in_process: usize,
+    inputs: &[PathBuf],
+    job: impl Fn(Arc<dyn Comm>) -> Result<()> + Sync,
+) -> Result<()> {
+    if number(in_process) > 1 && inputs.iter().any(|path| is_standard_input(path)) {
+        return Err(Error::usage("several ranks cannot read standard input; give files that all of them can read"));
+    }
+    let comm = ranks()?;
+    if in_process == 1 || comm.ranks() > 1 { job(comm) } else { as_threads(in_process, job).map(drop) }
 }
 
 /// What ends one rank often ends all, and the first says it for them: the others wait a moment, in which it ends them too.

@@ -8,7 +8,7 @@ use super::kept::label_bytes;
 use super::neighbours::needs;
 use super::outlined::shape_start::BAND;
 use super::ranks::parts::own_objects;
-use super::reach::first_reach;
+use super::reach::{first_reach, likely_work};
 use super::settings::{Guides, SegmentSettings};
 use crate::exec::{Comm, Footprint, Plan};
 use crate::grid::{Box3, BrickGrid};
@@ -16,7 +16,7 @@ use crate::kernel::level_set::cell::{CELL, CELL_LEN};
 use crate::pipeline::enclosure::needs::{
     COARSE_VOXELS, DISTANCE_BYTES, KEPT_BYTES, SECONDS_PER_NEAR_VOXEL, SOLVE_BYTES, THREAD_BYTES, box_bytes,
 };
-use crate::pipeline::enclosure::region::{RegionOfInterest, voxel_bounds};
+use crate::pipeline::enclosure::region::RegionOfInterest;
 use crate::pipeline::image::smoothing::thread_bytes;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::marks::{ObjectMarks, cloud_of, contour_gap};
@@ -211,15 +211,7 @@ pub fn plan(
     if writes {
         plan.extend([("write image".into(), all * STACK_SECONDS[1]), ("write labels".into(), all * STACK_SECONDS[2])]);
     }
-    // The surface of an object goes with its extents squared.
-    let surface = |marks: &ObjectMarks| {
-        let part = match marks.seed {
-            Some(_) => guides.geometry.domain(),
-            None => voxel_bounds(&marks.contours.concat(), guides.geometry),
-        };
-        libm::pow(part.volume().max(1) as f64, 2.0 / 3.0)
-    };
-    let surfaces: Vec<f64> = guides.objects.iter().map(surface).collect();
+    let surfaces: Vec<f64> = guides.objects.iter().map(|marks| likely_work(marks, guides.geometry)).collect();
     let near = estimate.near_voxels as f64 * SECONDS_PER_NEAR_VOXEL / threads as f64 / surfaces.iter().sum::<f64>();
     for n in own_objects(comm, guides.objects, guides.geometry) {
         let (marks, surface) = (&guides.objects[n], surfaces[n]);

@@ -1,7 +1,7 @@
 //! Labels of a live store that are written while other objects are still solved: where no object can reach there are none, and where
 //! one alone can, they are its own as soon as it has come to rest.
 //!
-//! How far an object reaches beyond its marks only its solution tells; here it is taken to be half of their extents. So at the
+//! How far an object reaches beyond its marks only its solution tells; here it is guessed (`likely_box`). So at the
 //! end all labels are looked at, and were some shown that have become others, all are written again.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -12,17 +12,13 @@ use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
-use crate::pipeline::enclosure::region::voxel_bounds;
-use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::output::pyramid::{Pyramid, Reduce, held, visits};
 use crate::pipeline::segment::begun::Solution;
 use crate::pipeline::segment::labels::{LabelVolume, Overlap, Placed};
 use crate::pipeline::segment::neighbours::Joined;
+use crate::pipeline::segment::reach::likely_box;
 use crate::pipeline::segment::settings::{Guides, SegmentSettings};
 use crate::store::{BoxSource, Element, ElementType};
-
-/// Voxels that an object reaches farther than half of its extents.
-const MARGIN: i64 = 8;
 
 /// Labels that are written as they come.
 pub(crate) trait Early: Sync {
@@ -91,7 +87,7 @@ impl<T: Element> EarlyLabels<T> {
         let geometry = guides.geometry;
         let image = begin_image::<T>(store, geometry, guides.objects.iter().map(|marks| marks.object))?;
         let pyramid = Pyramid::new(engine, image, Reduce::Mode)?;
-        let reaches: Vec<Box3> = guides.objects.iter().map(|marks| reach(marks, geometry)).collect();
+        let reaches: Vec<Box3> = guides.objects.iter().map(|marks| likely_box(marks, geometry)).collect();
         let visit = |chunks: Vec<Box3>| {
             let mut reaching = (0..reaches.len()).filter(|&n| chunks.iter().any(|chunk| meets(chunk, &reaches[n])));
             let reached = match (reaching.next(), reaching.next()) {
@@ -182,16 +178,6 @@ fn read<T: Element>(
         }
     }
     Ok(())
-}
-
-/// The voxels that an object may have.
-fn reach(marks: &ObjectMarks, geometry: &Geometry) -> Box3 {
-    if marks.seed.is_some() {
-        return geometry.domain();
-    }
-    let bounds = voxel_bounds(&marks.contours.concat(), geometry);
-    let farther = bounds.shape().map(|n| n / 2 + MARGIN);
-    Box3::new(std::array::from_fn(|a| bounds.lo[a] - farther[a]), std::array::from_fn(|a| bounds.hi[a] + farther[a]))
 }
 
 fn meets(a: &Box3, b: &Box3) -> bool {

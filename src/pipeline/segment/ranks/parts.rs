@@ -4,14 +4,11 @@ use crate::error::Result;
 use crate::exec::{Comm, Engine};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::StoreWriter;
-use crate::pipeline::enclosure::region::voxel_bounds;
 use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::output::pyramid::written_by_this_rank;
+use crate::pipeline::segment::reach::{likely_box, likely_work};
 use crate::pipeline::segment::settings::{Guides, SegmentSettings};
 use crate::store::ElementType;
-
-/// Voxels that an object reaches farther than half of its extents, about.
-const MARGIN: i64 = 16;
 
 /// The numbers of the objects that this rank solves, in order: the largest come first, each to the rank that has least to do
 /// (Graham 1969), so all ranks find the same without a word.
@@ -23,7 +20,7 @@ pub(in crate::pipeline::segment) fn own_objects(
     if comm.ranks() == 1 {
         return (0..objects.len()).collect();
     }
-    let takes: Vec<f64> = objects.iter().map(|marks| work(marks, grid)).collect();
+    let takes: Vec<f64> = objects.iter().map(|marks| likely_work(marks, grid)).collect();
     let owners = shared_out(&takes, comm.ranks());
     (0..objects.len()).filter(|&n| owners[n] == comm.rank()).collect()
 }
@@ -39,15 +36,6 @@ fn shared_out(takes: &[f64], ranks: usize) -> Vec<usize> {
         busy[rank] += takes[n];
     }
     owners
-}
-
-/// What an object takes, compared with others: its band, which goes with its surface.
-fn work(marks: &ObjectMarks, grid: &Geometry) -> f64 {
-    let part = match marks.seed {
-        Some(_) => grid.domain(),
-        None => voxel_bounds(&marks.contours.concat(), grid),
-    };
-    libm::pow(part.volume().max(1) as f64, 2.0 / 3.0)
 }
 
 /// The parts of the image that this rank looks at often: around the objects that it solves, and what it writes. What else it
@@ -70,18 +58,8 @@ pub(in crate::pipeline::segment) fn kept_parts(
         Some(store) => written_by_this_rank(engine, geometry, store.finest_edges(geometry.shape, element))?,
         None => Vec::new(),
     };
-    let grid = Geometry { origin: [0.0; 3], ..geometry.clone() };
-    for n in own_objects(comm, guides.objects, geometry) {
-        let marks = guides.objects[n].moved(geometry.origin.map(|v| -v));
-        if marks.seed.is_some() {
-            return Ok(None);
-        }
-        let bounds = voxel_bounds(&marks.contours.concat(), &grid);
-        let farther = bounds.shape().map(|n| n / 2 + MARGIN);
-        let lo = std::array::from_fn(|a| bounds.lo[a] - farther[a]);
-        let hi = std::array::from_fn(|a| bounds.hi[a] + farther[a]);
-        parts.push(Box3::new(lo, hi).intersect(&geometry.domain()));
-    }
+    let own = own_objects(comm, guides.objects, geometry);
+    parts.extend(own.into_iter().map(|n| likely_box(&guides.objects[n], geometry).intersect(&geometry.domain())));
     Ok(Some(parts))
 }
 
