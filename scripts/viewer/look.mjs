@@ -3,7 +3,7 @@
 //     STRANDLINE=PATH KEEP=FOLDER node look.mjs STORE WHAT,WHAT,... [STORE WHAT,...]...
 //
 // WHAT of a store that is still written: what is to be seen now, a slash, and what is to be seen on the same page when it is complete.
-// WHAT: image (grey values that vary), labels (a coloured tint over a section), surface (colour in the view of space), marks (points of
+// WHAT: image (greys that differ from pixel to pixel), labels (a coloured tint over a section), surface (colour in the view of space), marks (points of
 // their own yellow). Pictures go to KEEP. Ends with 1 where something is missing, a request failed or the page had an error, where the page
 // of a store that is still written does not stay where it was moved to, or where one of another does not say that the store was taken away,
 // that it is there again, or that the server has ended.
@@ -33,8 +33,13 @@ const isMark = ([r, g, b]) => Math.abs(r - 255) < 25 && Math.abs(g - 225) < 25 &
 // The frame that is drawn around data is pure yellow.
 const isFrame = ([r, g, b]) => r > 200 && g > 200 && b < 40;
 
+const isGrey = ([x, y, c]) => isSection(x, y) && saturation(c) < 12;
+const differ = (one, other) => isGrey(one) && isGrey(other) && one[2][0] !== other[2][0];
+// Pixels of an image differ from the next one almost everywhere; those of words and buttons, which a page has in any case, are few.
+const WORDS = 5;
+
 const LOOKS = {
-  image: (pixels) => new Set(pixels.filter(([x, y, c]) => isSection(x, y) && saturation(c) < 12).map(([, , c]) => c[0])).size * 10,
+  image: (pixels) => Math.floor(pixels.filter((pixel, n) => n > 0 && differ(pixels[n - 1], pixel)).length / WORDS),
   labels: (pixels) => pixels.filter(([x, y, c]) => isSection(x, y) && saturation(c) > 25 && !isMark(c) && !isFrame(c)).length,
   surface: (pixels) => pixels.filter(([x, y, c]) => isSpace(x, y) && saturation(c) > 25 && !isMark(c) && !isFrame(c)).length,
   marks: (pixels) => pixels.filter(([, y, c]) => y > 60 && isMark(c)).length,
