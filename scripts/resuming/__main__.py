@@ -21,7 +21,7 @@ from pathlib import Path
 
 from interrupting import runs
 
-from . import trials
+from . import cost, trials
 
 HOWS = ("kill", "term", "disk", "damage")
 
@@ -36,6 +36,10 @@ def arguments():
     parser.add_argument("--how", action="append", choices=HOWS, help="this way alone; repeatable")
     parser.add_argument("--folder", type=Path, help="where inputs and outputs are made, a few GB [default: $TMPDIR]")
     parser.add_argument("--large", action="store_true", help="a distance of 512^3 voxels instead of 192^3")
+    parser.add_argument(
+        "--cost", type=int, metavar="EDGE", help="no trial, but what checkpoints cost a distance of EDGE^3 voxels"
+    )
+    parser.add_argument("--pairs", type=int, default=3, help="pairs of runs that are timed for that (3)")
     parser.add_argument("--pause-while", type=Path, metavar="FILE", help="no trial begins while there is such a file")
     return parser.parse_args()
 
@@ -108,6 +112,9 @@ def main():
     bad = counted = 0
     with tempfile.TemporaryDirectory(prefix="strandline-resume-", dir=settings.folder) as folder:
         place = Path(folder)
+        if settings.cost:
+            cost.tell(program, place, settings.cost, settings.pairs)
+            return
         for name, command in commands(root, place, settings.large).items():
             if settings.only and name not in settings.only:
                 continue
