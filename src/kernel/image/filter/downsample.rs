@@ -28,20 +28,61 @@ pub fn coarse_box(fine: &Box3, factors: [i64; 3]) -> Box3 {
 /// When a slice's length does not fit its shape, or a factor is not positive.
 pub fn mean<T: Element>(source: &[T], source_shape: [i64; 3], factors: [i64; 3], out: &mut [T]) {
     let blocks = Blocks::new(source.len(), source_shape, factors, out.len());
-    let mut sums = vec![0.0; blocks.coarse[0]];
-    for (row, out) in out.chunks_exact_mut(blocks.coarse[0].max(1)).enumerate() {
-        sums.fill(0.0);
-        let rows = blocks.source_rows(row);
-        let height = rows.len() as f64;
-        for source_row in rows {
-            let values = source[source_row * blocks.source[0]..][..blocks.source[0]].chunks(blocks.factors[0]);
-            for (sum, block) in sums.iter_mut().zip(values) {
-                *sum += block.iter().fold(0.0, |total, value| total + value.to_f64());
+    pulp::Arch::new().dispatch(Means { source, blocks: &blocks, out });
+}
+
+/// The means of all blocks; what they are told by is made once for each kind of processor.
+struct Means<'a, T> {
+    source: &'a [T],
+    blocks: &'a Blocks,
+    out: &'a mut [T],
+}
+
+impl<T: Element> pulp::NullaryFnOnce for Means<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Means { source, blocks, out } = self;
+        let width = blocks.coarse[0];
+        let mut sums = vec![0.0; width];
+        for (row, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
+            sums.fill(0.0);
+            let rows = blocks.source_rows(row);
+            let height = rows.len() as f64;
+            for source_row in rows {
+                let values = &source[source_row * blocks.source[0]..][..blocks.source[0]];
+                match blocks.factors[0] {
+                    1 => add_row::<T, 1>(values, &mut sums),
+                    2 => add_row::<T, 2>(values, &mut sums),
+                    factor => add_blocks(values.chunks(factor), &mut sums),
+                }
+            }
+            // All blocks are as wide but the last.
+            let whole = height * blocks.factors[0] as f64;
+            out.iter_mut().zip(&sums).for_each(|(value, sum)| *value = T::from_f64(sum / whole));
+            if let (Some(last), Some(sum)) = (out.last_mut(), sums.last()) {
+                *last = T::from_f64(sum / (height * blocks.width(width - 1) as f64));
             }
         }
-        for (x, (value, sum)) in out.iter_mut().zip(&sums).enumerate() {
-            *value = T::from_f64(sum / (height * blocks.width(x) as f64));
-        }
+    }
+}
+
+/// Adds a row to the sums of blocks that are `N` voxels wide.
+#[inline(always)]
+fn add_row<T: Element, const N: usize>(values: &[T], sums: &mut [f64]) {
+    let (blocks, rest) = values.as_chunks::<N>();
+    let whole = blocks.len();
+    for (sum, block) in sums.iter_mut().zip(blocks) {
+        *sum += block.iter().fold(0.0, |total, value| total + value.to_f64());
+    }
+    add_blocks([rest].into_iter().filter(|rest| !rest.is_empty()), &mut sums[whole..]);
+}
+
+#[inline(always)]
+fn add_blocks<'a, T: Element>(blocks: impl Iterator<Item = &'a [T]>, sums: &mut [f64]) {
+    for (sum, block) in sums.iter_mut().zip(blocks) {
+        *sum += block.iter().fold(0.0, |total, value| total + value.to_f64());
     }
 }
 
@@ -57,12 +98,18 @@ pub fn mode<T: Element>(source: &[T], source_shape: [i64; 3], factors: [i64; 3],
     let mut block = Vec::with_capacity(blocks.factors.iter().product());
     for (row, out) in out.chunks_exact_mut(blocks.coarse[0].max(1)).enumerate() {
         let rows = blocks.source_rows(row);
+        let rows: Vec<&[T]> = rows.iter().map(|row| &source[row * blocks.source[0]..][..blocks.source[0]]).collect();
+        // Most rows lie within one label.
+        let first = rows[0][0];
+        if rows.iter().all(|row| row.iter().all(|&value| value == first)) {
+            out.fill(first);
+            continue;
+        }
         for (x, value) in out.iter_mut().enumerate() {
+            let start = x * blocks.factors[0];
+            let part = start..start + blocks.width(x);
             block.clear();
-            for source_row in &rows {
-                let start = source_row * blocks.source[0] + x * blocks.factors[0];
-                block.extend_from_slice(&source[start..start + blocks.width(x)]);
-            }
+            rows.iter().for_each(|row| block.extend_from_slice(&row[part.clone()]));
             *value = most_frequent(&block);
         }
     }

@@ -19,6 +19,8 @@ pub struct Histogram {
 
 /// Bins are named by this many upper bits of a value's pattern.
 const BIN_BITS: u32 = 20;
+/// Values whose bins are told in one go, by instructions that take several at once, before they are counted one by one.
+const TOGETHER: usize = 512;
 
 impl Default for Histogram {
     fn default() -> Self {
@@ -30,15 +32,19 @@ impl Histogram {
     /// Counts some values.
     ///
     /// # Errors
-    /// With the place of a value that is no finite number; those before it are counted.
+    /// With the place of the first value that is no finite number; some before it are counted.
     pub fn add<T: Element>(&mut self, values: &[T]) -> Result<(), usize> {
-        for (place, value) in values.iter().enumerate() {
-            let value = value.to_f64();
-            if !value.is_finite() {
-                return Err(place);
+        let mut bins = [0; TOGETHER];
+        for (n, some) in values.chunks(TOGETHER).enumerate() {
+            if let Some(place) = some.iter().position(|value| !value.to_f64().is_finite()) {
+                return Err(n * TOGETHER + place);
             }
-            (self.low, self.high) = (self.low.min(value), self.high.max(value));
-            self.bins[bin_of(value) as usize] += 1;
+            let [low, high] = extremes(some).map(Element::to_f64);
+            (self.low, self.high) = (self.low.min(low), self.high.max(high));
+            bins.iter_mut().zip(some).for_each(|(bin, value)| *bin = bin_of(value.to_f64()));
+            for &bin in &bins[..some.len()] {
+                self.bins[bin as usize] += 1;
+            }
         }
         Ok(())
     }
@@ -102,6 +108,24 @@ impl Histogram {
     }
 }
 
+/// The smallest and the largest of some numbers, of which there is at least one.
+fn extremes<T: Element>(values: &[T]) -> [T; 2] {
+    const LANES: usize = 16;
+    let (mut low, mut high) = ([values[0]; LANES], [values[0]; LANES]);
+    let mut lanes = values.chunks_exact(LANES);
+    // Lanes of their own are told together.
+    for some in &mut lanes {
+        for n in 0..LANES {
+            low[n] = if some[n] < low[n] { some[n] } else { low[n] };
+            high[n] = if some[n] > high[n] { some[n] } else { high[n] };
+        }
+    }
+    let rest = lanes.remainder().iter();
+    let least = low.iter().chain(rest.clone()).fold(values[0], |a, &b| if b < a { b } else { a });
+    let most = high.iter().chain(rest).fold(values[0], |a, &b| if b > a { b } else { a });
+    [least, most]
+}
+
 /// The bin of a value; bins are ordered as values are.
 fn bin_of(value: f64) -> u32 {
     let bits = (value as f32).to_bits();
@@ -134,6 +158,9 @@ mod tests {
         let constant = of(&[5.0f32; 8]).range([1.0, 99.0]);
         assert_eq!(constant.low, constant.high);
         assert_eq!(Histogram::default().add(&[1.0, f32::NAN, 2.0]), Err(1));
+        let mut late = vec![1.0; 3 * TOGETHER];
+        (late[2 * TOGETHER + 7], late[2 * TOGETHER + 9]) = (f64::NEG_INFINITY, f64::NAN);
+        assert_eq!(Histogram::default().add(&late), Err(2 * TOGETHER + 7));
     }
 
     #[test]
