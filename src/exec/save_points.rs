@@ -330,7 +330,9 @@ impl SavePoint<'_> {
         let is_second = is_last && self.points.is_answered.swap(true, Relaxed);
         match saved {
             Ok(_) if is_last || is_wished => {
-                self.progress.note(&format!("a checkpoint of {} was taken; --resume goes on from it", bytes(written)));
+                // What is linked to fields and shards that lie on the disk already takes none.
+                let of = if written > 0 { format!(" of {}", bytes(written)) } else { String::new() };
+                self.progress.note(&format!("a checkpoint{of} was taken; --resume goes on from it"));
             }
             Ok(_) => {}
             Err(error) => {
