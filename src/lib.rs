@@ -143,7 +143,7 @@ pub use job::{
 };
 pub use kernel::distance::state::neighbours::Neighbours;
 pub use kernel::distance::state::precision::Precision;
-pub use kernel::surface::{Contact, Hausdorff, Measures, Pair};
+pub use kernel::surface::{Contact, Hausdorff, LabelMeasures, Measures, Pair};
 pub use pipeline::distance::{DistanceFound, Init, Method, Schedule};
 pub use pipeline::enclosure::search::Hole;
 pub use pipeline::image::terms::Smoothing;

@@ -5,11 +5,14 @@ use super::mesh::{Drawing, LabelledMesh};
 use super::run::{finish_store, mesh_file, run_setters};
 use super::task::{Ready, Task, task_setters};
 use super::words::in_builders_words;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::kernel::distance::state::precision::Precision;
-use crate::kernel::surface::{Measures, Pair};
+use crate::kernel::surface::{LabelMeasures, Measures, Pair};
 use crate::pipeline::distance::Kept;
-use crate::pipeline::middle::{LabelMode, MiddleFound, MiddleSettings, SurfaceKind, check_sets, middle_kept};
+use crate::pipeline::distance::seeding::label_borders::Labels;
+use crate::pipeline::middle::{
+    LabelMode, MiddleFound, MiddleSettings, MiddleSources, SurfaceKind, check_sets, middle_kept, with_touching,
+};
 use crate::pipeline::output::viewer_mesh::Segments;
 use crate::store::MeshSink;
 
@@ -31,11 +34,12 @@ pub struct MiddleSurface<'a> {
     task: Task<'a>,
     surface: SurfaceKind,
     mode: LabelMode,
+    background: bool,
 }
 
 impl Default for MiddleSurface<'_> {
     fn default() -> Self {
-        Self { task: Task::default(), surface: SurfaceKind::Exact, mode: LabelMode::Tracked }
+        Self { task: Task::default(), surface: SurfaceKind::Exact, mode: LabelMode::Tracked, background: false }
     }
 }
 
@@ -56,6 +60,12 @@ impl<'a> MiddleSurface<'a> {
     /// How labels are told; by the sources that the method tracks where this is left out.
     pub fn labels(mut self, mode: LabelMode) -> Self {
         self.mode = mode;
+        self
+    }
+
+    /// Of one label volume: the walls between its labels and around each of them, against what has no label (0) and what lies around the volume.
+    pub fn background(mut self) -> Self {
+        self.background = true;
         self
     }
 
@@ -90,23 +100,33 @@ impl<'a> MiddleSurface<'a> {
 
     fn solved<P: Precision>(&self, mesh: &mut dyn MeshSink) -> Result<SolvedMiddle<P>> {
         let mut ready = self.task.ready::<P>()?;
-        check_sets(&ready.sets, self.surface)?;
+        let volume = self.task.sole_volume().filter(|volume| *volume.geometry == ready.geometry);
+        if self.background && (volume.is_none() || self.surface == SurfaceKind::Labels) {
+            return Err(Error::usage(
+                "--background draws surfaces around the labels of one label volume, on its own voxels; leave out other sources, --surface labels \
+                 and what lays another grid",
+            ));
+        }
+        check_sets(&ready.sets, (self.surface, self.background))?;
         ready.settings.labels = true;
         let settings = MiddleSettings { distance: ready.settings, surface: self.surface, labels: self.mode };
         let Ready { sets, geometry, resources, notes, settings: distance } = &mut ready;
         let writes = self.task.run.store.is_some();
         let needs = settings.needs::<P>(geometry, sets, resources.threads, 1, writes).keeping::<P>(geometry, true);
+        let labels = volume.as_ref().map(|volume| volume as &dyn Labels);
+        let needs = with_touching(needs, labels, resources.threads);
         let engine = self.task.run.engine(resources, needs.held)?;
         self.task.run.check_disk(&self.task.disk::<P>((resources, geometry, distance), &needs, true)?, notes)?;
         let store = self.task.run.begin_store()?;
         let mut drawing = Drawing::new(mesh, mesh_file(store.as_ref())?.as_deref(), geometry, true)?;
         let kept = Kept::new(&engine, geometry, true)?;
-        let found = middle_kept(&engine, geometry, sets, &settings, (store.as_ref(), Some(&kept)), &mut drawing)?;
+        let sources = MiddleSources { sets, volume: labels, background: self.background };
+        let found = middle_kept(&engine, geometry, &sources, &settings, (store.as_ref(), Some(&kept)), &mut drawing)?;
         drawing.finish(&engine, store.as_ref(), geometry, Segments::Pairs)?;
         finish_store(&engine, store)?;
-        let MiddleFound { distance, measures, pairs } = found;
+        let MiddleFound { distance, measures, pairs, labels } = found;
         let distance = SolvedDistance::new(ready, distance, kept);
-        Ok(SolvedMiddle { distance, mesh: LabelledMesh::default(), measures, pairs })
+        Ok(SolvedMiddle { distance, mesh: LabelledMesh::default(), measures, pairs, labels })
     }
 }
 
@@ -120,4 +140,6 @@ pub struct SolvedMiddle<P: Precision> {
     pub measures: Measures,
     /// What lies between each two labels that meet.
     pub pairs: Vec<Pair>,
+    /// What each label measures.
+    pub labels: Vec<LabelMeasures>,
 }

@@ -4,6 +4,7 @@ use super::disk::Disk;
 use super::given::{Gathered, Given};
 use super::resources::Resources;
 use super::run::Run;
+use super::volume::PlacedLabels;
 use crate::error::{Error, Result};
 use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::state::neighbours::Neighbours;
@@ -88,6 +89,14 @@ impl Task<'_> {
         let store = self.run.store.as_deref();
         let written = if store.is_some() { settings.written::<P>(geometry, is_middle) } else { 0 };
         Disk::of_grid(resources, store, geometry, needs, written)
+    }
+
+    /// The label volume that was given, where it alone was.
+    pub(super) fn sole_volume(&self) -> Option<PlacedLabels<'_>> {
+        match self.given.as_slice() {
+            [Given::Volume(source, geometry)] => Some(PlacedLabels { source: source.as_ref(), geometry }),
+            _ => None,
+        }
     }
 
     fn check_grid(&self) -> Result<()> {

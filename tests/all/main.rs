@@ -54,6 +54,7 @@ mod citations;
 mod cli;
 mod clouds_cli;
 mod convert;
+mod label_walls;
 mod layering;
 mod outlines;
 #[cfg(target_os = "linux")]

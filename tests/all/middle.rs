@@ -585,7 +585,7 @@ fn a_run_is_told_and_written() {
     );
     assert_eq!(bench.entries("out"), ["x.stl", "x.zarr"]);
     assert_eq!(bench.entries("out/x.zarr/labels"), ["border", "nearest", "zarr.json"]);
-    assert_eq!(bench.entries("out/x.zarr/meshes"), ["pairs.csv", "precomputed", "surface.ply"]);
+    assert_eq!(bench.entries("out/x.zarr/meshes"), ["labels.csv", "pairs.csv", "precomputed", "surface.ply"]);
     let report = bench.json("out/x.zarr/report.json");
     assert_eq!((&report["command"], &report["settings"]["surface"]), (&"middle".into(), &"exact".into()));
     let pair = &report["result"]["pairs"][0];
@@ -593,7 +593,7 @@ fn a_run_is_told_and_written() {
     assert_eq!(pair["thickness"]["min"].as_f64(), pair["distance"]["min"].as_f64().map(|d| 2.0 * d));
     let table = fs::read_to_string(bench.path("out/x.zarr/meshes/pairs.csv")).unwrap();
     let row: Vec<&str> = table.lines().nth(1).unwrap().split(',').collect();
-    assert_eq!((row.len(), row[2].parse::<f64>().ok()), (12, pair["area"].as_f64()));
+    assert_eq!((row.len(), row[2].parse::<f64>().ok()), (15, pair["area"].as_f64()));
     bench.succeed("measure out/x.stl");
     bench.succeed("middle cube.off ball.off point.xyz --spacing 0.1 -o none");
     for (arguments, complaint) in [

@@ -67,7 +67,7 @@ fn info_tells_every_field_of_a_store() {
     let labels = told.lines().find(|line| line.starts_with("labels/nearest, values")).unwrap();
     assert!(labels.ends_with(" 1 to 4"), "{told}");
     for word in
-        ["labels/border, level 0", "32 x 8 x 8", "float32", "meshes/surface.ply", " triangles", "meshes/pairs.csv"]
+        ["labels/border, level 0", "32 x 8 x 8", "uint16", "meshes/surface.ply", " triangles", "meshes/pairs.csv"]
     {
         assert!(told.contains(word), "{word}: {told}");
     }

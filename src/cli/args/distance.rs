@@ -126,5 +126,6 @@ pub(crate) fn sources_help() -> String {
 pub(crate) struct MiddleChoice {
     pub(crate) surface: SurfaceKind,
     pub(crate) labels: LabelMode,
+    pub(crate) background: bool,
     pub(crate) mesh: Option<PathBuf>,
 }

@@ -6,7 +6,8 @@ use clap::{Args, ValueEnum};
 
 use super::distance::{FieldJobArgs, sources_help};
 
-/// Compute the surface equally far from labelled point clouds and triangle meshes.
+/// Compute the surface equally far from labelled point clouds and triangle meshes, and smooth walls between labels of a volume that
+/// touch.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct MiddleArgs {
     #[arg(required = true, num_args = 1.., value_name = "SOURCE", help = labelled_help())]
@@ -28,6 +29,10 @@ pub(crate) struct SurfaceArgs {
     /// distances the lower label
     #[arg(long, value_enum, default_value_t = LabelsArg::Tracked)]
     pub(crate) labels: LabelsArg,
+    /// Of one label volume: surfaces of labels against what has none (label 0) and against what lies around the volume too, so that
+    /// each label has a closed surface around it
+    #[arg(long)]
+    pub(crate) background: bool,
     /// Write the surface once more, in a file of its own, in the format of its name
     #[arg(long, value_name = "FILE.ply|obj|stl|vtp")]
     pub(crate) mesh: Option<PathBuf>,

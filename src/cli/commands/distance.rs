@@ -11,7 +11,7 @@ use crate::cli::args::distance::{DistanceJobArgs, InitArg, PrecisionArg, Schedul
 use crate::cli::inputs::agreed::check_agreed;
 use crate::cli::inputs::grid;
 use crate::cli::inputs::settings;
-use crate::cli::inputs::sources::{Read, read_sets};
+use crate::cli::inputs::sources::{Read, open_volume, read_sets};
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
@@ -34,13 +34,15 @@ use crate::exec::{Budget, Cancel, Comm, Engine, Plan, Progress};
 use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::write::formats::Values;
 use crate::io::ome_zarr::StoreWriter;
+use crate::io::stack::label_volume::{LabelVolume, is_label_volume};
 use crate::job::disk::Disk;
 use crate::job::resources::{Resources, Sharing};
 use crate::kernel::distance::state::precision::Precision;
+use crate::pipeline::distance::seeding::label_borders::Labels;
 use crate::pipeline::distance::{
     DistanceSettings, Init, Needs, Schedule, Writes, check_iterations, distance, outside_note,
 };
-use crate::pipeline::middle::{MiddleSettings, check_sets, middle};
+use crate::pipeline::middle::{MiddleSettings, MiddleSources, check_sets, middle_kept, with_touching};
 use crate::pipeline::output::viewer_mesh::Segments;
 use crate::store::MeshSink;
 
@@ -53,6 +55,8 @@ struct Job {
     resources: Resources,
     sets: DataSets,
     geometry: Geometry,
+    /// The label volume that all sources are from, if so.
+    volume: Option<LabelVolume>,
     console: Arc<Console>,
     cancel: Cancel,
     started: Instant,
@@ -108,13 +112,17 @@ impl Job {
             console.note(note);
         }
         let Read { sets, volume } = read_sets(&args, given.as_ref(), resources.memory, &console, &cancel)?;
-        middle.as_ref().map_or(Ok(()), |choice| check_sets(&sets, choice.surface))?;
+        middle.as_ref().map_or(Ok(()), |choice| check_sets(&sets, (choice.surface, choice.background)))?;
         let bounds = sets.bounds().ok_or_else(|| Error::input("the files hold no source"))?;
         let geometry = match (given, volume) {
             (Some(geometry), _) => geometry,
             (None, Some(geometry)) if !args.job.grid.is_asked_for() => geometry,
             _ => grid::around(&args.job.grid, bounds)?,
         };
+        let sole =
+            args.sources.first().filter(|path| middle.is_some() && args.sources.len() == 1 && is_label_volume(path));
+        let quiet = Console::new(Voice::Quiet);
+        let volume = sole.map(|path| open_volume(path, &args.job.grid, &quiet)).transpose()?;
         if let Some(note) = outside_note(&geometry, &sets) {
             console.note(&note);
         }
@@ -122,7 +130,7 @@ impl Job {
             settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
         }
         let typed = typed.to_vec();
-        Ok(Self { args, middle, typed, settings, resources, sets, geometry, console, cancel, started, comm })
+        Ok(Self { args, middle, typed, settings, resources, sets, geometry, volume, console, cancel, started, comm })
     }
 
     fn run_precise(&self) -> Result<()> {
@@ -225,7 +233,10 @@ impl Job {
         let (geometry, sets) = (&self.geometry, &self.sets);
         match self.middle_settings() {
             Some(settings) => {
-                Ok(Found::of_middle(&middle::<P>(engine, geometry, sets, &settings, store, mesh)?, sets.count()))
+                let volume = self.volume.as_ref().map(|volume| volume as &dyn Labels);
+                let sources = MiddleSources { sets, volume, background: false };
+                let found = middle_kept::<P>(engine, geometry, &sources, &settings, (store, None), mesh)?;
+                Ok(Found::of_middle(&found, sets.count()))
             }
             None => Ok(Found::new(&distance::<P>(engine, geometry, sets, &self.settings, store)?)),
         }
@@ -247,7 +258,10 @@ impl Job {
     fn needs<P: Precision>(&self, threads: usize) -> Needs {
         let (writes, ranks) = (self.args.job.output.store().is_some(), self.comm.ranks());
         match self.middle_settings() {
-            Some(middle) => middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes),
+            Some(middle) => {
+                let needs = middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes);
+                with_touching(needs, self.volume.as_ref().map(|volume| volume as &dyn Labels), threads)
+            }
             None => self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], self.writes()),
         }
     }

@@ -15,3 +15,4 @@ pub(crate) mod store_contents;
 pub(crate) mod verify;
 #[cfg(feature = "viewer")]
 pub(crate) mod view;
+pub(crate) mod walls;

@@ -9,10 +9,19 @@ use crate::grid::DataSets;
 /// # Errors
 /// When one differs, or is gone.
 pub(crate) fn check_agreed(comm: &dyn Comm, asked: &str, sets: &DataSets) -> Result<()> {
-    if comm.ranks() == 1 {
-        return Ok(());
-    }
-    let all = comm.gather([asked.as_bytes(), &sum(sets).to_le_bytes()].concat())?;
+    if comm.ranks() == 1 { Ok(()) } else { check(comm, [asked.as_bytes(), &sum(sets).to_le_bytes()].concat()) }
+}
+
+/// Refuses ranks of which one was asked for something else. All ranks ask.
+///
+/// # Errors
+/// When one differs, or is gone.
+pub(crate) fn check_asked(comm: &dyn Comm, asked: &str) -> Result<()> {
+    if comm.ranks() == 1 { Ok(()) } else { check(comm, asked.as_bytes().to_vec()) }
+}
+
+fn check(comm: &dyn Comm, own: Vec<u8>) -> Result<()> {
+    let all = comm.gather(own)?;
     let Some(other) = all.iter().position(|own| *own != all[0]) else { return Ok(()) };
     Err(Error::usage(format!(
         "rank {other} has other inputs, or was given other flags, than rank 0: all ranks need the same command line, and files that are \

@@ -127,7 +127,8 @@ fn refuse_other_unit(volume: &Geometry, unit: &mut Option<LengthUnit>) -> Result
     )))
 }
 
-fn open_volume(path: &Path, args: &GridArgs, console: &Console) -> Result<LabelVolume> {
+/// Opens a label volume, and tells what there is to be told of it.
+pub(crate) fn open_volume(path: &Path, args: &GridArgs, console: &Console) -> Result<LabelVolume> {
     let (path, note) = labels_of(path)?;
     let select = args.volume.select();
     let stack = open_stack(&path, select, args.image_spacing)?;

@@ -11,7 +11,7 @@ use crate::cli::args::distance::{DistanceJobArgs, PrecisionArg};
 use crate::cli::terminal::text::{grouped, number};
 use crate::job::resources::Resources;
 use crate::kernel::distance::state::neighbours::Neighbours;
-use crate::kernel::surface::Pair;
+use crate::kernel::surface::{LabelMeasures, Pair};
 use crate::pipeline::distance::{DistanceFound, DistanceSettings, Init, Schedule};
 use crate::pipeline::middle::{LabelMode, MiddleFound, SurfaceKind};
 use crate::pipeline::output::viewer_mesh::Simplified;
@@ -181,12 +181,16 @@ struct Middle {
     /// The copy of a large surface.
     simplified: Option<SimplifiedCopy>,
     pairs: Vec<PairReport>,
+    labels: Vec<LabelReport>,
 }
 
+/// The surface between two labels.
 #[derive(Debug, Serialize)]
-struct PairReport {
-    labels: [u32; 2],
-    area: f64,
+pub(crate) struct PairReport {
+    pub(crate) labels: [u32; 2],
+    pub(crate) area: f64,
+    /// Of what of it lies between voxels that touch.
+    contact_area: f64,
     triangles: u64,
     lowest_xyz: [f64; 3],
     highest_xyz: [f64; 3],
@@ -194,6 +198,22 @@ struct PairReport {
     distance: Range,
     /// Of the gap between the two sets.
     thickness: Range,
+    /// Positive where the first label bulges into the second.
+    mean_curvature: f64,
+}
+
+/// What a label measures.
+#[derive(Debug, Serialize)]
+pub(crate) struct LabelReport {
+    pub(crate) label: u32,
+    /// Null where its surface is open.
+    volume: Option<f64>,
+    area: f64,
+    contact_area: f64,
+    /// Positive where it is convex.
+    mean_curvature: f64,
+    /// The mean length of chords through it; null where its surface is open.
+    thickness: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -214,21 +234,43 @@ impl Middle {
             triangles: measures.triangles,
             simplified: None,
             pairs: found.pairs.iter().map(PairReport::new).collect(),
+            labels: found.labels.iter().map(LabelReport::new).collect(),
         }
     }
 }
 
+impl LabelReport {
+    pub(crate) fn new(found: &LabelMeasures) -> Self {
+        Self {
+            label: found.label,
+            volume: found.volume,
+            area: found.area,
+            contact_area: found.contact_area,
+            mean_curvature: found.mean_curvature,
+            thickness: found.thickness,
+        }
+    }
+
+    /// In a few words.
+    pub(crate) fn described(&self) -> String {
+        let volume = self.volume.map_or(String::new(), |volume| format!("volume {}, ", number(volume)));
+        format!("{volume}area {}, {} of it in contact", number(self.area), number(self.contact_area))
+    }
+}
+
 impl PairReport {
-    fn new(pair: &Pair) -> Self {
+    pub(crate) fn new(pair: &Pair) -> Self {
         let [min, max] = pair.distance;
         Self {
             labels: pair.labels,
             area: pair.area,
+            contact_area: pair.contact_area,
             triangles: pair.triangles,
             lowest_xyz: pair.extent[0],
             highest_xyz: pair.extent[1],
             distance: Range { min, max },
             thickness: Range { min: 2.0 * min, max: 2.0 * max },
+            mean_curvature: pair.mean_curvature(),
         }
     }
 }

@@ -12,3 +12,4 @@ pub(crate) mod run_report;
 pub(crate) mod series;
 pub(crate) mod settings;
 pub(crate) mod table;
+pub(crate) mod walls;

@@ -8,7 +8,7 @@ use super::zarr::label_images;
 use crate::error::{Error, Result};
 use crate::grid::{Box3, Geometry};
 use crate::io::ome_zarr::is_store;
-use crate::store::{Sample, SampleWork};
+use crate::store::{ElementType, Sample, SampleWork};
 
 /// The group of a store's segmentation, which is taken where the store itself is given.
 const SEGMENTATION: &str = "labels/segmentation";
@@ -62,6 +62,12 @@ impl LabelVolume {
     #[must_use]
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
+    }
+
+    /// The type that its labels are read in.
+    #[must_use]
+    pub fn element(&self) -> ElementType {
+        self.stack.element()
     }
 
     /// The boxes in which it is stored, x fastest, laid on a regular grid.

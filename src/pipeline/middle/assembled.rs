@@ -4,11 +4,16 @@
 use crate::error::Result;
 use crate::exec::{Comm, Message, pack_message, unpack_message};
 use crate::grid::Geometry;
-use crate::kernel::surface::{Growing, Pairs, SurfaceMeasure, TaggedPatch, Welder};
+use crate::kernel::surface::{
+    Bending, Bendings, Facet, Growing, Measures, Pair, Pairs, SurfaceMeasure, TaggedPatch, Welder,
+};
 use crate::store::{MeshSink, Spill, Spilled};
 
-/// A patch, and how wide the gap is at each of its vertices, where somebody wants to know.
-pub(super) type MadePatch = (TaggedPatch, Vec<f64>);
+/// A patch, how wide the gap is at each of its vertices, where somebody wants to know, and how it is bent.
+pub(super) type MadePatch = (TaggedPatch, Vec<f64>, Bending);
+
+/// What the whole surface measures, and each part of it between two labels.
+pub(super) type Found = (Measures, Vec<Pair>);
 
 /// Who takes patches in their order.
 pub(super) trait Takes {
@@ -21,16 +26,23 @@ pub(super) trait Takes {
 /// The whole surface.
 pub(super) struct Whole<'s> {
     welder: Welder,
-    pub(super) measure: SurfaceMeasure,
-    pub(super) pairs: Pairs,
+    measure: SurfaceMeasure,
+    pairs: Pairs,
+    bendings: Bendings,
     sink: &'s mut dyn MeshSink,
 }
 
 impl<'s> Whole<'s> {
     pub(super) fn new(geometry: &Geometry, sink: &'s mut dyn MeshSink) -> Self {
         let (lo, hi) = (geometry.origin, geometry.position(geometry.shape));
-        let measure = SurfaceMeasure::new(std::array::from_fn(|a| 0.5 * (lo[a] + hi[a])));
-        Self { welder: Welder::new(geometry), measure, pairs: Pairs::default(), sink }
+        let middle = std::array::from_fn(|a| 0.5 * (lo[a] + hi[a]));
+        let (measure, pairs) = (SurfaceMeasure::new(middle), Pairs::new(middle));
+        Self { welder: Welder::new(geometry), measure, pairs, bendings: Bendings::default(), sink }
+    }
+
+    /// What was measured of all patches.
+    pub(super) fn finish(self) -> Found {
+        (self.measure.measures(), self.pairs.finish(&self.bendings))
     }
 
     /// Takes what another rank has drawn, some patches at a time: the length of each and it, packed.
@@ -54,18 +66,22 @@ impl Takes for Whole<'_> {
         self.sink.keeps_values()
     }
 
-    fn take(&mut self, (patch, gaps): &MadePatch) -> Result<()> {
+    fn take(&mut self, (patch, gaps, bending): &MadePatch) -> Result<()> {
+        self.bendings.add(bending, patch.patch.cells.lo[2]);
         self.welder.add_valued(&patch.patch, gaps, self.sink)?;
-        for (n, (corners, positions)) in self.welder.triangles_of(&patch.patch).enumerate() {
-            self.measure.add(corners, positions);
+        for (n, (corners, places)) in self.welder.triangles_of(&patch.patch).enumerate() {
+            self.measure.add(corners, places);
             let distances = patch.patch.triangles[n].map(|vertex| patch.distances[vertex as usize]);
-            self.pairs.add(patch.patch.pairs[n], positions, distances);
+            self.pairs.add(&Facet { labels: patch.patch.pairs[n], corners, places, distances });
         }
         Ok(())
     }
 
     fn holds(&self) -> (u64, Vec<Growing>) {
-        (self.welder.bytes_of_last(), [self.welder.tables().as_slice(), &self.measure.tables()].concat())
+        (
+            self.welder.bytes_of_last(),
+            [self.welder.tables().as_slice(), &self.measure.tables(), &[self.bendings.table()]].concat(),
+        )
     }
 }
 

@@ -25,6 +25,13 @@ const TABLE_PARTS: [f64; 2] = [0.08, 0.35];
 /// Bytes of a triangle in a patch, with its share of the vertices.
 const TRIANGLE_BYTES: f64 = 41.0;
 
+/// A box: how many labels have sources in it, how often two of these touch, and its voxels.
+pub(super) struct Filled {
+    pub(super) labels: usize,
+    pub(super) touching: f64,
+    pub(super) voxels: u64,
+}
+
 /// How much surface the sources of several labels make, in boxes of `edge` voxels. Bytes of patches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Crowded {
@@ -38,9 +45,8 @@ pub(super) struct Crowded {
 impl Crowded {
     /// Looks at the points; triangles are left out.
     pub(super) fn new(geometry: &Geometry, sets: &DataSets, edge: i64) -> Self {
-        let mut found = Self::default();
         if sets.count() < 2 {
-            return found;
+            return Self::default();
         }
         let voxels = labelled_voxels(geometry, sets);
         let grid = BrickGrid::new(geometry.shape, edge);
@@ -51,15 +57,24 @@ impl Crowded {
         let mut touching: Vec<BrickId> = touching(geometry, &voxels).map(box_of).collect();
         touching.sort_unstable();
         let mut touching = touching.as_slice();
-        for one in labels.chunk_by(|a, b| a.0 == b.0).filter(|one| one.len() > 1) {
+        let filled = labels.chunk_by(|a, b| a.0 == b.0).map(|one| {
             touching = &touching[touching.partition_point(|id| *id < one[0].0)..];
             let faces = touching.partition_point(|id| *id == one[0].0) as f64;
-            let (count, side) = (one.len() as f64, libm::cbrt(grid.brick_box(one[0].0).volume() as f64));
+            Filled { labels: one.len(), touching: faces, voxels: grid.brick_box(one[0].0).volume() }
+        });
+        Self::of(filled)
+    }
+
+    /// Of boxes.
+    pub(super) fn of(boxes: impl Iterator<Item = Filled>) -> Self {
+        let mut found = Self::default();
+        for Filled { labels, touching, voxels } in boxes.filter(|filled| filled.labels > 1) {
+            let (count, side) = (labels as f64, libm::cbrt(voxels as f64));
             let around = side * side * libm::cbrt(count);
             let lines = LINE_BYTES * side * libm::cbrt(count * count);
             // Two labels may lie apart, with a plane between them; of more that do not touch the faces are rougher.
-            let faces = match faces {
-                _ if one.len() == 2 => faces,
+            let faces = match touching {
+                _ if labels == 2 => touching,
                 touching if touching < around => APART * around,
                 touching => touching.max(TOUCHING * around),
             };

@@ -1,24 +1,20 @@
-//! Draws the surfaces between labels brick by brick, welded in grid order, and measures them.
+//! The surfaces equally far from labelled sources, in one box: what they are drawn from, and what that takes.
 
-use std::ops::Range;
-
-use super::assembled::{Takes, Whole, send};
 use super::crowded::Crowded;
+use super::draw::{Draws, EDGE};
+use super::touching::Touching;
 use crate::error::Result;
-use crate::exec::{Comm, Footprint, Stage, Workers};
-use crate::grid::{Box3, BrickGrid, BrickId, DataSets, Geometry};
+use crate::exec::Footprint;
+use crate::grid::{Box3, DataSets, Geometry};
 use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::image::labels;
 use crate::kernel::surface::{
-    Interfaces, Known, MarchingCubes, Measures, Nearby, Pair, Patch, TaggedPatch, cells_of_brick,
+    Interfaces, Known, MarchingCubes, Nearby, Sides, TaggedPatch, TouchingVoxels, Walls, cells_of_brick,
 };
-use crate::pipeline::output::drawn::{Drawn, STATED, Wave};
-use crate::store::{BoxSource, MeshSink, Spill};
-
-/// Edge of the boxes that the surface is drawn in, whatever the bricks are: so these do not tell the order of vertices.
-const EDGE: i64 = 32;
+use crate::pipeline::output::drawn::STATED;
+use crate::store::BoxSource;
 
 /// Bytes of what is remembered for each voxel of the layer that is drawn.
 const LAYER_BYTES: u64 = 64;
@@ -64,119 +60,74 @@ pub(super) struct Labelled<'a> {
     pub(super) sources: &'a dyn BoxSource<u32>,
     /// The first two labels.
     pub(super) first_labels: [u32; 2],
+    /// Which surface is drawn.
+    pub(super) kind: SurfaceKind,
+    /// The volume that all sources are from, whose labels touch in places.
+    pub(super) touching: Option<&'a Touching>,
 }
 
 /// Work buffers for one brick.
-struct Worker {
+pub(super) struct Worker {
     interfaces: Interfaces,
     nearby: Nearby,
     cubes: MarchingCubes,
     sources: Vec<u32>,
     labels: Vec<u32>,
+    /// The walls between labels that touch, the labels that these are told from, and those of the voxels of the box.
+    walls: Walls,
+    around: Vec<u32>,
+    own: Vec<u32>,
 }
 
-/// The boxes that the surface is drawn in, and which of them this rank draws: a run of them, so that in order of ranks they are in
-/// grid order.
-pub(super) struct Boxes {
-    grid: BrickGrid,
-    own: Range<BrickId>,
-}
+impl Draws for Labelled<'_> {
+    type Work = Worker;
 
-impl Boxes {
-    /// Of one of the ranks of `comm`.
-    pub(super) fn new(geometry: &Geometry, comm: &dyn Comm) -> Self {
-        let grid = BrickGrid::new(geometry.shape, EDGE);
-        let cut = |rank: usize| grid.len() * rank as u64 / comm.ranks() as u64;
-        Self { grid, own: cut(comm.rank())..cut(comm.rank() + 1) }
+    fn geometry(&self) -> &Geometry {
+        self.geometry
     }
 
-    /// What drawing this rank's boxes reads.
-    pub(super) fn reads(&self) -> impl Iterator<Item = Box3> {
-        let domain = Box3::from_shape(self.grid.shape());
-        self.own.clone().map(move |id| self.grid.brick_box(id).grow(2).intersect(&domain))
+    fn work(&self) -> Box<dyn Fn() -> Worker + Send + Sync> {
+        let spacing = self.geometry.spacing;
+        Box::new(move || Worker {
+            interfaces: Interfaces::default(),
+            nearby: Nearby::default(),
+            cubes: MarchingCubes::new(0.5),
+            sources: Vec::new(),
+            labels: Vec::new(),
+            walls: Walls::new(spacing),
+            around: Vec::new(),
+            own: Vec::new(),
+        })
     }
-}
 
-/// Sends the surfaces between labels to `sink`, where so many bytes were stated for that; measures all of them, and each
-/// pair. Of several ranks each draws its boxes, and the first puts the patches of all together, in their order: it alone has
-/// something to send and to tell.
-pub(super) fn draw(
-    stage: &Stage<'_>,
-    labelled: &Labelled<'_>,
-    boxes: &Boxes,
-    (kind, stated): (SurfaceKind, u64),
-    sink: &mut dyn MeshSink,
-) -> Result<(Measures, Vec<Pair>)> {
-    let comm = stage.comm();
-    let mut whole = Whole::new(labelled.geometry, sink);
-    if comm.rank() == 0 {
-        draw_own(stage, labelled, boxes, (kind, stated), &mut whole)?;
-        for rank in 1..comm.ranks() {
-            whole.take_from(comm, rank)?;
-        }
-    } else {
-        let mut spill = Spill::new(stage.scratch().dir())?;
-        draw_own(stage, labelled, boxes, (kind, stated), &mut spill)?;
-        send(comm, spill.read_back()?)?;
+    fn work_bytes(work: &Worker) -> u64 {
+        work.bytes()
     }
-    Ok((whole.measure.measures(), whole.pairs.finish()))
-}
 
-/// Draws this rank's boxes.
-fn draw_own(
-    stage: &Stage<'_>,
-    labelled: &Labelled<'_>,
-    boxes: &Boxes,
-    (kind, stated): (SurfaceKind, u64),
-    to: &mut dyn Takes,
-) -> Result<()> {
-    let make = || Worker {
-        interfaces: Interfaces::default(),
-        nearby: Nearby::default(),
-        cubes: MarchingCubes::new(0.5),
-        sources: Vec::new(),
-        labels: Vec::new(),
-    };
-    let (workers, with_gaps) = (Workers::new(make), to.wants_gaps());
-    let bricks: Vec<BrickId> = boxes.own.clone().collect();
-    let (mut drawn, mut left) = (Drawn::new(stage, stated), bricks.as_slice());
-    while !left.is_empty() {
-        let batch;
-        (batch, left) = left.split_at(drawn.next().min(left.len()));
-        let patches = stage.run(batch, &workers, |worker, &id| {
-            let patch = worker.patch(labelled, &boxes.grid.brick_box(id), kind)?;
-            let gaps = if with_gaps { labelled.gaps(&patch.patch) } else { Vec::new() };
-            Ok((patch, gaps))
-        })?;
-        patches.iter().filter(|(patch, _)| !patch.patch.triangles.is_empty()).try_for_each(|patch| to.take(patch))?;
-        let (last, tables) = to.holds();
-        drawn.took(&Wave {
-            patches: &patches.iter().map(|(patch, gaps)| patch.bytes() + 8 * gaps.len() as u64).collect::<Vec<_>>(),
-            buffers: &workers.idle(Worker::bytes),
-            last,
-            tables: &tables,
-            left: left.len(),
-        })?;
+    fn patch(&self, work: &mut Worker, part: &Box3) -> Result<TaggedPatch> {
+        work.patch(self, part)
     }
-    Ok(())
-}
 
-impl Labelled<'_> {
-    /// How wide the gap is at each vertex: its distances to both sets of a triangle that has it, summed.
-    fn gaps(&self, patch: &Patch) -> Vec<f64> {
+    /// Its distances to both sets of a triangle that has it, summed; none where these touch.
+    fn gaps(&self, TaggedPatch { patch, distances }: &TaggedPatch) -> Vec<f64> {
         let mut pairs = vec![[0; 2]; patch.positions.len()];
         for (corners, pair) in patch.triangles.iter().zip(&patch.pairs) {
             for &vertex in corners {
                 pairs[vertex as usize] = *pair;
             }
         }
-        let gap = |(position, pair): (&[f64; 3], [u32; 2])| {
+        let gap = |((position, &distance), pair): ((&[f64; 3], &f64), [u32; 2])| {
+            if distance == 0.0 {
+                return 0.0;
+            }
             let world = self.world(*position);
             pair.map(|label| self.shapes.distance(world, self.trees.nearest(label, world))).iter().sum()
         };
-        patch.positions.iter().zip(pairs).map(gap).collect()
+        patch.positions.iter().zip(distances).zip(pairs).map(gap).collect()
     }
+}
 
+impl Labelled<'_> {
     fn world(&self, position: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|a| self.geometry.origin[a] + position[a] * self.geometry.spacing[a])
     }
@@ -184,11 +135,12 @@ impl Labelled<'_> {
 
 impl Worker {
     fn bytes(&self) -> u64 {
-        let dense = (self.sources.capacity() + self.labels.capacity()) * size_of::<u32>();
-        self.interfaces.bytes() + self.nearby.bytes() + self.cubes.bytes() + dense as u64
+        let dense = [&self.sources, &self.labels, &self.around, &self.own].map(Vec::capacity);
+        let dense = (dense.iter().sum::<usize>() * size_of::<u32>()) as u64;
+        self.interfaces.bytes() + self.nearby.bytes() + self.cubes.bytes() + self.walls.bytes() + dense
     }
 
-    fn patch(&mut self, labelled: &Labelled<'_>, brick: &Box3, kind: SurfaceKind) -> Result<TaggedPatch> {
+    fn patch(&mut self, labelled: &Labelled<'_>, brick: &Box3) -> Result<TaggedPatch> {
         let mut patch = TaggedPatch::default();
         let Labelled { geometry, shapes, trees, .. } = *labelled;
         let cells = cells_of_brick(brick, geometry.shape, false);
@@ -202,12 +154,18 @@ impl Worker {
         if self.labels.iter().all(|&label| label == self.labels[0]) {
             return Ok(patch);
         }
-        match kind {
+        match labelled.kind {
             SurfaceKind::Exact => {
                 let (sources, labels, nearby) = (&mut self.sources, &self.labels, &mut self.nearby);
                 nearby.enter(geometry, shapes, trees, &part, labels);
                 nearby.settle(geometry, shapes, trees, labels, sources);
-                let known = Known { geometry, shapes, nearby, trees, part, sources, labels };
+                if let Some(volume) = labelled.touching {
+                    volume.read(&part, &mut self.own)?;
+                    volume.walls(&part, &mut self.around, &mut self.walls)?;
+                }
+                let touching = TouchingVoxels { own: &self.own, walls: &self.walls };
+                let touching = labelled.touching.map(|_| touching);
+                let known = Known { geometry, shapes, nearby, trees, part, sources, labels, touching };
                 self.interfaces.extract(&known, &cells, &mut patch);
             }
             SurfaceKind::Labels => {

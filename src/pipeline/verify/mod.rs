@@ -61,6 +61,11 @@ pub fn verify(engine: &Engine, store: &Path, tell: &mut dyn FnMut(Check)) -> Res
         "reconstruct" => {
             tell(surface::check(engine, store, "meshes/surface.ply", of("").map(DrawnFrom::LevelSet), result)?);
         }
+        "middle" if report["settings"]["surface"] == "walls" => {
+            let bounded = report["settings"]["background"] == true;
+            let from = |image| if bounded { DrawnFrom::Bounded(image) } else { DrawnFrom::Labels(image) };
+            tell(surface::check(engine, store, "meshes/surface.ply", of("labels/nearest").map(from), result)?);
+        }
         "distance" => tell(distances::check(engine, &images, &report)?),
         _ => {
             tell(distances::check(engine, &images, &report)?);

@@ -109,7 +109,7 @@ fn measures(mesh: &TriangleMesh, name: &str, told: &Value, found: &mut Check) {
         wrong("area:", &told["area"], measures.area.to_string());
     }
     let is_told = told["volume"].as_f64();
-    if is_told.is_none_or(|told| !near(told, measures.volume, 2.0 * moved * measures.area)) && is_closed {
+    if is_told.is_none_or(|told| !near(told.abs(), measures.volume.abs(), 2.0 * moved * measures.area)) && is_closed {
         wrong("volume:", &told["volume"], measures.volume.to_string());
     }
 }

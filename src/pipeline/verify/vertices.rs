@@ -27,12 +27,14 @@ pub(super) enum DrawnFrom<'a> {
     LevelSet(&'a Image),
     /// Labels: each vertex has two of them in its cell of voxels, or one voxel beside it.
     Labels(&'a Image),
+    /// The same where what has no label, and what lies around the image, counts as one.
+    Bounded(&'a Image),
 }
 
 impl<'a> DrawnFrom<'a> {
     fn image(self) -> &'a Image {
         match self {
-            Self::LevelSet(image) | Self::Labels(image) => image,
+            Self::LevelSet(image) | Self::Labels(image) | Self::Bounded(image) => image,
         }
     }
 
@@ -40,7 +42,7 @@ impl<'a> DrawnFrom<'a> {
     pub(super) fn told(self) -> String {
         match self {
             Self::LevelSet(image) => format!("on the surface u = 1/2 of {}", image.name()),
-            Self::Labels(image) => format!("where {} changes", image.name()),
+            Self::Labels(image) | Self::Bounded(image) => format!("where {} changes", image.name()),
         }
     }
 
@@ -53,9 +55,10 @@ impl<'a> DrawnFrom<'a> {
                 let Some(values) = padded::<f32>(image, part, &mut found) else { return found };
                 Box::new(move |position| off(geometry, position, eps, (&values, part)))
             }
-            Self::Labels(image) => {
+            Self::Labels(image) | Self::Bounded(image) => {
+                let is_bounded = matches!(self, Self::Bounded(_));
                 let Some(values) = padded::<u32>(image, part, &mut found) else { return found };
-                Box::new(move |position| in_one_label(geometry, position, (&values, part)))
+                Box::new(move |position| in_one_label(geometry, position, (&values, part), is_bounded))
             }
         };
         for &n in members {
@@ -147,19 +150,22 @@ fn off(geometry: &Geometry, position: [f64; 3], eps: f64, (values, part): (&[f32
 }
 
 /// What is wrong with the place of a vertex between labels, and the voxel below it.
-fn in_one_label(geometry: &Geometry, position: [f64; 3], (values, part): (&[u32], &Box3)) -> Option<Off> {
+fn in_one_label(
+    geometry: &Geometry,
+    position: [f64; 3],
+    (values, part): (&[u32], &Box3),
+    is_bounded: bool,
+) -> Option<Off> {
     let lower: [i64; 3] = geometry.to_voxels(position).map(|v| v.floor() as i64);
     let around = Box3::new(lower, lower.map(|v| v + 2)).grow(MARGIN).intersect(part);
-    let mut first = 0;
+    let mut first = None;
     for (y, z) in around.rows() {
         let row = part.offset_of([around.lo[0], y, z]);
-        for &label in values[row..][..around.shape()[0] as usize].iter().filter(|label| **label > 0) {
-            if first == 0 {
-                first = label;
-            } else if label != first {
+        for &label in values[row..][..around.shape()[0] as usize].iter().filter(|label| is_bounded || **label > 0) {
+            if *first.get_or_insert(label) != label {
                 return None;
             }
         }
     }
-    Some((lower, format!("lies in the midst of label {first}")))
+    Some((lower, format!("lies in the midst of label {}", first.unwrap_or(0))))
 }

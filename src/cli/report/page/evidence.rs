@@ -7,6 +7,8 @@ use crate::grid::DataSets;
 pub(crate) enum Root {
     /// Grey values, with labels beside them.
     Image,
+    /// Labels, with these beside them.
+    Labels,
     /// The segmentation function, 1 inside, the surface at 1/2.
     LevelSet,
     /// Distances.

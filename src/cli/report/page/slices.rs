@@ -87,7 +87,7 @@ fn label_image(folder: &Path, root: Root) -> Result<Option<ImageReader>> {
     let name = match root {
         Root::Image => "labels/segmentation",
         Root::LevelSet => return Ok(None),
-        Root::Distance => "labels/nearest",
+        Root::Distance | Root::Labels => "labels/nearest",
     };
     let group = folder.join(name);
     if group.is_dir() { ImageReader::open(&group).map(Some) } else { Ok(None) }
@@ -117,7 +117,7 @@ impl Shown {
     fn of(read: &[Read], root: Root) -> Self {
         let all: Vec<f32> = read.iter().flat_map(|slice| slice.values.iter().copied()).collect();
         let window = match root {
-            Root::Image => percentile_window(&all, 0.002, 0.998),
+            Root::Image | Root::Labels => percentile_window(&all, 0.002, 0.998),
             // Grey enough for what is drawn over it to be seen.
             Root::LevelSet => [-0.2, 1.8],
             Root::Distance => percentile_window(&all, 0.0, 1.0),
@@ -185,6 +185,7 @@ fn nice_step(length: f64) -> f64 {
 pub(super) fn explained(evidence: &Evidence<'_>) -> String {
     let points = format!("Yellow dots are {} within half a voxel of the slice.", evidence.points);
     match evidence.root {
+        Root::Labels => "Outlines of the labels over the volume.".into(),
         Root::Image => format!("Outlines of the objects over the image. {points}"),
         Root::LevelSet => format!("The solved function, light inside; its surface is outlined. {points}"),
         Root::Distance => format!(

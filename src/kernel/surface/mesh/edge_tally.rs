@@ -1,8 +1,7 @@
 //! `EdgeTally`: whether a mesh is closed, told exactly while its triangles pass.
 
-use std::collections::HashMap;
-
 use super::growing::Growing;
+use super::key_hash::KeyMap;
 
 /// The directed edges whose opposite has not come yet.
 ///
@@ -11,7 +10,7 @@ use super::growing::Growing;
 /// triangles in the order of bricks the tally holds no more than the edges of the current layer.
 #[derive(Clone, Debug, Default)]
 pub struct EdgeTally {
-    waiting: HashMap<(u32, u32), u32>,
+    waiting: KeyMap<(u32, u32), u32>,
     open: u64,
     /// Entries that waited at the same time.
     most: usize,

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 /// Bytes of a table.
-pub(in crate::kernel::surface) fn table_bytes<K, V>(table: &HashMap<K, V>) -> u64 {
+pub(in crate::kernel::surface) fn table_bytes<K, V, S>(table: &HashMap<K, V, S>) -> u64 {
     bytes_for::<K, V>(table.capacity())
 }
 
@@ -30,7 +30,7 @@ impl Growing {
 
     /// A table that had so many entries at most. Where entries go as well as come it may double when it is half full: their
     /// places stay marked.
-    pub(super) fn of_table<K, V>(table: &HashMap<K, V>, most: usize) -> Self {
+    pub(in crate::kernel::surface) fn of_table<K, V, S>(table: &HashMap<K, V, S>, most: usize) -> Self {
         // What is free is told without the places that are marked.
         let room = table.capacity().max(most);
         Self::new(bytes_for::<K, V>(room), most, room.div_ceil(2))

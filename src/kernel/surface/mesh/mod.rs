@@ -4,6 +4,7 @@ pub(crate) mod clustering;
 pub(crate) mod components;
 pub(crate) mod edge_tally;
 pub(crate) mod growing;
+pub(crate) mod key_hash;
 pub(crate) mod measure;
 pub(crate) mod nearest;
 pub(crate) mod patch;

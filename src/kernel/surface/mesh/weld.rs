@@ -1,8 +1,7 @@
 //! `Welder`: joins the patches of neighbouring bricks into one mesh, in memory that one layer of bricks decides.
 
-use std::collections::HashMap;
-
 use super::growing::Growing;
+use super::key_hash::KeyMap;
 use super::patch::Patch;
 use super::vertex_key::VertexKey;
 use crate::error::{Error, Result};
@@ -21,7 +20,7 @@ pub struct Welder {
     /// Whether positions are those of f32: what is measured is then what a file in single precision holds.
     is_single: bool,
     /// Numbers of the vertices that a later patch may share.
-    shared: HashMap<VertexKey, u32>,
+    shared: KeyMap<VertexKey, u32>,
     /// How many there were at the same time.
     most_shared: usize,
     /// The z index at which the current layer of cells starts.
@@ -40,7 +39,7 @@ impl Welder {
         Self {
             geometry: geometry.clone(),
             is_single: geometry.fits_single(),
-            shared: HashMap::new(),
+            shared: KeyMap::default(),
             most_shared: 0,
             layer: i64::MIN,
             vertices: 0,

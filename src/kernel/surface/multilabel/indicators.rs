@@ -11,6 +11,7 @@
 //! Widths are in voxels along each axis (`kernel::image::filter::box_gaussian`); spacing has no part in it, as stairs are made of
 //! voxels.
 
+use super::sides::Sides;
 use crate::grid::Box3;
 use crate::kernel::image::filter::box_gaussian::Gaussian;
 
@@ -27,7 +28,7 @@ const LEAST: f32 = 1e-4;
 
 /// The smoothed indicator functions of the labels in a box.
 #[derive(Clone, Debug)]
-pub(crate) struct Indicators {
+pub struct Indicators {
     names: Vec<u32>,
     /// By label, dense over the box: what the narrow Gaussian sees, and the logarithm of it over what the wide one does.
     narrow: Vec<Vec<f32>>,
@@ -35,18 +36,26 @@ pub(crate) struct Indicators {
     gaussians: [Gaussian; 2],
     /// The label of each voxel.
     labels: Vec<u32>,
+    part: Box3,
 }
 
 impl Default for Indicators {
     fn default() -> Self {
         let gaussians = SIGMAS.map(Gaussian::new);
-        Self { names: Vec::new(), narrow: Vec::new(), excess: Vec::new(), gaussians, labels: Vec::new() }
+        Self {
+            names: Vec::new(),
+            narrow: Vec::new(),
+            excess: Vec::new(),
+            gaussians,
+            labels: Vec::new(),
+            part: Box3::from_shape([0; 3]),
+        }
     }
 }
 
-impl Indicators {
-    /// Smooths the labels, dense over `around`, on `part`, around which that reaches as far as the Gaussian.
-    pub(crate) fn enter(&mut self, labels: &[u32], around: &Box3, part: &Box3) {
+impl Sides for Indicators {
+    fn enter(&mut self, labels: &[u32], around: &Box3, part: &Box3) {
+        self.part = *part;
         self.names.clear();
         self.names.extend(labels.chunk_by(|a, b| a == b).map(|run| run[0]));
         self.names.sort_unstable();
@@ -80,24 +89,28 @@ impl Indicators {
         }
     }
 
-    /// Bytes of memory.
-    pub(crate) fn bytes(&self) -> u64 {
+    fn bytes(&self) -> u64 {
         let of_fields: usize =
             self.narrow.iter().chain(&self.excess).map(|field| field.capacity() * size_of::<f32>()).sum();
         let of_labels = self.labels.capacity() * size_of::<u32>();
         (of_fields + of_labels) as u64 + self.gaussians.iter().map(Gaussian::bytes).sum::<u64>()
     }
 
-    /// Whether there is one label only.
-    pub(crate) fn is_one(&self) -> bool {
+    fn is_one(&self) -> bool {
         self.names.len() < 2
     }
 
-    /// The label at a place in the box.
-    pub(crate) fn label(&self, at: usize) -> u32 {
+    fn label(&self, at: usize) -> u32 {
         self.labels[at]
     }
 
+    fn between(&self, ends: [[i64; 3]; 2], [own, other]: [u32; 2]) -> f64 {
+        let [from, to] = ends.map(|voxel| self.lead(self.part.offset_of(voxel), own, other));
+        if from > to { from / (from - to) } else { 0.5 }
+    }
+}
+
+impl Indicators {
     /// How far a place lies on the side of one label, as seen from another, in voxels where the surface is flat.
     pub(crate) fn lead(&self, at: usize, label: u32, other: u32) -> f64 {
         let [own, its] = [label, other].map(|name| {

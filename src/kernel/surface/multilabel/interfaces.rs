@@ -19,6 +19,7 @@ use super::known::Known;
 use super::polygon::{self, Point};
 use super::splits::Splits;
 use super::tetrahedron::{ORDERS, Tetrahedron, corner_of};
+use super::touching::wall;
 use crate::grid::Box3;
 use crate::kernel::surface::mesh::growing::table_bytes;
 use crate::kernel::surface::mesh::patch::Patch;
@@ -197,7 +198,7 @@ impl Interfaces {
         }
         let number = |triangle: [usize; 3]| triangle.map(|n| ring[n].1);
         match creased.len() {
-            0 => polygon::fan(ring.len()).into_iter().map(number).collect(),
+            0 => polygon::fan(ring.len()).map(number).collect(),
             1 | 2 => {
                 let sign = if is_upward { 1.0 } else { -1.0 };
                 let point = |&(within, vertex): &(u8, u32)| Point {
@@ -262,9 +263,12 @@ impl Interfaces {
     /// The vertex within a set of the tetrahedron's corners, made when its first facet asks for it.
     fn vertex(&mut self, known: &Known<'_>, tetrahedron: &Tetrahedron, set: u8, patch: &mut TaggedPatch) -> u32 {
         let ([a, b, c, d], len, key) = tetrahedron.sorted(set);
-        self.enter(key, patch, |candidates| match len {
-            2 => candidates.on_edge(known, [a, b]),
-            3 => candidates.within(known, [a, b, c]),
+        let placed = || wall(known, &[a, b, c, d][..len]);
+        let between = |position| Between { position, distance: 0.0, normal: DVec3::ZERO };
+        self.enter(key, patch, |candidates| match (len, placed()) {
+            (_, Some(position)) => between(position),
+            (2, _) => candidates.on_edge(known, [a, b]),
+            (3, _) => candidates.within(known, [a, b, c]),
             _ => candidates.within(known, [a, b, c, d]),
         })
     }

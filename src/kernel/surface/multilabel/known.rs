@@ -1,6 +1,7 @@
 //! What is known of the voxels of a box when the surfaces between its labels are drawn.
 
 use super::nearby::Nearby;
+use super::walls::Walls;
 use crate::grid::{Box3, Geometry};
 use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_trees::SourceTrees;
@@ -22,6 +23,17 @@ pub struct Known<'a> {
     pub sources: &'a [u32],
     /// Label of each voxel, that of its source.
     pub labels: &'a [u32],
+    /// Of voxels of a label volume that touch.
+    pub touching: Option<TouchingVoxels<'a>>,
+}
+
+/// Voxels of a label volume, whose labels meet half way where they touch and not where their sources are equally far.
+#[derive(Clone, Copy, Debug)]
+pub struct TouchingVoxels<'a> {
+    /// Their own labels, dense over the same box; 0 for none.
+    pub own: &'a [u32],
+    /// Where two that touch meet.
+    pub walls: &'a Walls,
 }
 
 impl Known<'_> {

@@ -1,18 +1,19 @@
 //! The surfaces between the labels of a volume in one brick, and to what has none, as one mesh: cells are cut into
 //! tetrahedra and these by the labels of their corners (`tetrahedron`), as between labelled sources (`interfaces`).
-//! Vertices lie where smoothed indicator functions say (`indicators`).
+//! Vertices lie where smoothed indicator functions say: of objects that were found (`indicators`), or of labels that were given, each voxel
+//! of which keeps its own (`walls`).
 //!
 //! Every edge of the mesh has two facets, and three or more along the lines where three labels meet; label 0 counts as
 //! one. So the facets of each label are a closed surface.
 
-use std::collections::HashMap;
-
-use super::corner::Corner;
+use super::cuts::{Cuts, Piece};
 use super::indicators::{Indicators, RADIUS};
 use super::polygon;
-use super::tetrahedron::{ORDERS, Tetrahedron, corner_of};
+use super::sides::Sides;
+use super::tetrahedron::{ORDERS, corner_of};
 use crate::grid::Box3;
 use crate::kernel::surface::mesh::growing::table_bytes;
+use crate::kernel::surface::mesh::key_hash::KeyMap;
 use crate::kernel::surface::mesh::patch::Patch;
 use crate::kernel::surface::mesh::vertex_key::VertexKey;
 
@@ -22,104 +23,165 @@ const MARGIN: f64 = 1.0 / 256.0;
 /// How many voxels around the corners of cells are looked at.
 pub const REACH: i64 = RADIUS;
 
+/// No vertex was made there yet.
+const NONE: u32 = u32::MAX;
+
 /// Finds the surfaces brick by brick; keeps its working memory between bricks.
 #[derive(Clone, Debug, Default)]
-pub struct Partition {
-    indicators: Indicators,
-    vertices: HashMap<VertexKey, u32>,
+pub struct Partition<S = Indicators> {
+    sides: S,
+    cuts: Cuts,
+    /// The vertex on each edge, by 7 * (place of its lower voxel) + (axes of its step as bits) - 1.
+    on_edges: Vec<u32>,
+    /// Those within three corners or four.
+    within: KeyMap<VertexKey, u32>,
 }
 
-impl Partition {
+/// Some corners of a cell, in the order of all cells, with their labels.
+#[derive(Clone, Copy)]
+struct Within {
+    voxels: [[i64; 3]; 4],
+    labels: [u32; 4],
+    len: usize,
+}
+
+/// A cell that is cut.
+struct Cell {
+    lowest: [i64; 3],
+    part: Box3,
+    /// Of its corners, given by the bits of their axes.
+    labels: [u32; 8],
+}
+
+impl<S: Sides> Partition<S> {
+    /// With sides told by somebody.
+    #[must_use]
+    pub fn new(sides: S) -> Self {
+        Self { sides, cuts: Cuts::default(), on_edges: Vec::new(), within: KeyMap::default() }
+    }
+
     /// Fills `patch` with the surfaces in `cells`, given by their lowest corners. `labels` is dense over `around`, which
-    /// reaches [`REACH`] voxels around the corners of all cells.
+    /// reaches as far around the corners of all cells as who tells the sides needs, [`REACH`] voxels for objects.
     pub fn extract(&mut self, labels: &[u32], around: &Box3, cells: &Box3, patch: &mut Patch) {
         *patch = Patch { cells: *cells, ..Patch::default() };
-        self.vertices.clear();
         let part = Box3::new(cells.lo, cells.hi.map(|v| v + 1));
-        self.indicators.enter(labels, around, &part);
-        if self.indicators.is_one() {
+        self.sides.enter(labels, around, &part);
+        if self.sides.is_one() {
             return;
         }
+        self.within.clear();
+        self.on_edges.clear();
+        self.on_edges.resize(7 * part.len(), NONE);
+        let cuts = std::mem::take(&mut self.cuts);
+        let corners: [usize; 8] = std::array::from_fn(|n| part.offset_of(corner_of(part.lo, n as u8)));
         for (y, z) in cells.rows() {
-            for x in cells.lo[0]..cells.hi[0] {
-                self.cut_cell(&part, [x, y, z], patch);
+            let row = part.offset_of([cells.lo[0], y, z]);
+            for (at, x) in (row..).zip(cells.lo[0]..cells.hi[0]) {
+                let labels = corners.map(|corner| self.sides.label(at + corner));
+                if labels.iter().any(|label| *label != labels[0]) {
+                    self.cut(&cuts, &Cell { lowest: [x, y, z], part, labels }, patch);
+                }
             }
         }
+        self.cuts = cuts;
     }
 
     /// Bytes of memory that stay between bricks.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.indicators.bytes() + table_bytes(&self.vertices)
+        self.sides.bytes() + table_bytes(&self.within) + (self.on_edges.capacity() * size_of::<u32>()) as u64
     }
 
-    fn cut_cell(&mut self, part: &Box3, cell: [i64; 3], patch: &mut Patch) {
-        let label = |n: u8| self.indicators.label(part.offset_of(corner_of(cell, n)));
-        let first = label(0);
-        if (1..8).all(|n| label(n) == first) {
-            return;
-        }
-        let voxels: [Corner; 8] = std::array::from_fn(|n| {
-            let voxel = corner_of(cell, n as u8);
-            Corner { halves: voxel.map(|v| 2 * v), place: voxel.map(|v| v as f64), label: label(n as u8) }
-        });
-        for order in ORDERS {
-            let second = 1 << order[0];
-            let corners = [0, second, second | 1 << order[1], 7].map(|n: usize| voxels[n]);
-            let tetrahedron = Tetrahedron { corners };
-            tetrahedron.pieces(|corners, polygon| self.facet(part, &tetrahedron, corners, polygon, patch));
+    fn cut(&mut self, cuts: &Cuts, cell: &Cell, patch: &mut Patch) {
+        for order in 0..ORDERS.len() {
+            let corners = Cuts::corners(order);
+            let labels = corners.map(|corner| cell.labels[usize::from(corner)]);
+            for piece in cuts.of(order, labels) {
+                self.facet(cell, corners, piece, patch);
+            }
         }
     }
 
     /// Adds a polygon that separates the labels of two corners.
-    fn facet(&mut self, part: &Box3, tetrahedron: &Tetrahedron, corners: [u8; 2], sets: &[u8], patch: &mut Patch) {
-        let [from, to] = tetrahedron.pair(corners);
-        let is_upward = tetrahedron.is_upward(corners, sets);
-        let ring: Vec<u32> = sets.iter().map(|&set| self.vertex(part, tetrahedron, set, patch)).collect();
-        for triangle in polygon::fan(ring.len()) {
+    fn facet(&mut self, cell: &Cell, corners: [u8; 4], piece: &Piece, patch: &mut Patch) {
+        let [from, to] = piece.between.map(|n| cell.labels[usize::from(corners[n])]);
+        let is_upward = piece.is_upward == (from < to);
+        let mut ring = [NONE; 4];
+        for (vertex, &set) in ring.iter_mut().zip(&piece.ring) {
+            *vertex = self.vertex(cell, corners, set, patch);
+        }
+        for triangle in polygon::fan(piece.ring.len()) {
             let [a, b, c] = triangle.map(|n| ring[n]);
             patch.triangles.push(if is_upward { [a, b, c] } else { [a, c, b] });
             patch.pairs.push([from.min(to), from.max(to)]);
         }
     }
 
-    /// The vertex within a set of the tetrahedron's corners, made when its first facet asks for it.
-    fn vertex(&mut self, part: &Box3, tetrahedron: &Tetrahedron, set: u8, patch: &mut Patch) -> u32 {
-        let (corners, len, key) = tetrahedron.sorted(set);
-        let indicators = &self.indicators;
-        *self.vertices.entry(key).or_insert_with(|| {
-            let weights = weights(indicators, part, &corners[..len]);
-            let place = |a: usize| corners.iter().zip(&weights).map(|(corner, w)| w * corner.place[a]).sum();
-            patch.keys.push(key);
-            patch.positions.push(std::array::from_fn(place));
-            patch.keys.len() as u32 - 1
-        })
-    }
-}
-
-/// The weights of corners of different labels at the place between these: the middle of the places between each two.
-fn weights(indicators: &Indicators, part: &Box3, corners: &[Corner]) -> Vec<f64> {
-    let mut weights = vec![0.0; corners.len()];
-    let pairs = corners.len() * (corners.len() - 1) / 2;
-    for m in 1..corners.len() {
-        for n in 0..m {
-            let at = on_edge(indicators, part, [corners[n], corners[m]]);
-            weights[n] += (1.0 - at) / pairs as f64;
-            weights[m] += at / pairs as f64;
+    /// The vertex within a set of a tetrahedron's corners, made when its first facet asks for it.
+    fn vertex(&mut self, cell: &Cell, corners: [u8; 4], set: u8, patch: &mut Patch) -> u32 {
+        let mut within = Within { voxels: [[0; 3]; 4], labels: [0; 4], len: 0 };
+        // A way from the lowest corner to the highest takes its corners in the order of all cells.
+        for n in (0..4).filter(|n| set >> n & 1 == 1) {
+            within.voxels[within.len] = corner_of(cell.lowest, corners[n]);
+            within.labels[within.len] = cell.labels[usize::from(corners[n])];
+            within.len += 1;
         }
+        let next = patch.keys.len() as u32;
+        let key = || VertexKey::within(&within.voxels.map(|voxel| voxel.map(|v| 2 * v))[..within.len]);
+        let (found, key) = if within.len == 2 {
+            let [first, second] = [set.trailing_zeros(), set.ilog2()].map(|n| corners[n as usize]);
+            let place = 7 * cell.part.offset_of(within.voxels[0]) + usize::from(first ^ second) - 1;
+            if self.on_edges[place] != NONE {
+                return self.on_edges[place];
+            }
+            self.on_edges[place] = next;
+            (next, key())
+        } else {
+            let key = key();
+            (*self.within.entry(key).or_insert(next), key)
+        };
+        if found == next {
+            patch.keys.push(key);
+            patch.positions.push(self.place(&within));
+        }
+        found
     }
-    weights
+
+    /// Where the labels of some corners meet: the middle of the places between each two.
+    fn place(&self, within: &Within) -> [f64; 3] {
+        let weights = self.weights(within);
+        let place = std::array::from_fn(|a| (0..within.len).map(|n| weights[n] * within.voxels[n][a] as f64).sum());
+        self.sides.ends().map_or(place, |ends| at_ends(ends, place, &within.voxels[..within.len]))
+    }
+
+    fn weights(&self, within: &Within) -> [f64; 4] {
+        let Within { voxels, labels, len } = *within;
+        let mut weights = [0.0; 4];
+        let pairs = len * (len - 1) / 2;
+        for m in 1..len {
+            for n in 0..m {
+                // Near an end where they do not meet between the two.
+                let at = self.sides.between([voxels[n], voxels[m]], [labels[n], labels[m]]);
+                let at = at.clamp(MARGIN, 1.0 - MARGIN);
+                weights[n] += (1.0 - at) / pairs as f64;
+                weights[m] += at / pairs as f64;
+            }
+        }
+        weights
+    }
 }
 
-/// How far along an edge the labels of its ends are equal; near an end where they are not between the two.
-fn on_edge(indicators: &Indicators, part: &Box3, ends: [Corner; 2]) -> f64 {
-    let [from, to] = ends.map(|corner| indicators.lead(place(part, &corner), ends[0].label, ends[1].label));
-    let at = if from > to { from / (from - to) } else { 0.5 };
-    at.clamp(MARGIN, 1.0 - MARGIN)
-}
-
-fn place(part: &Box3, corner: &Corner) -> usize {
-    part.offset_of(corner.halves.map(|v| v / 2))
+/// Puts a vertex within some voxels where the volume ends between them.
+fn at_ends(ends: &Box3, place: [f64; 3], voxels: &[[i64; 3]]) -> [f64; 3] {
+    std::array::from_fn(|a| {
+        if voxels.iter().any(|voxel| voxel[a] < ends.lo[a]) {
+            ends.lo[a] as f64 - 0.5
+        } else if voxels.iter().any(|voxel| voxel[a] >= ends.hi[a]) {
+            ends.hi[a] as f64 - 0.5
+        } else {
+            place[a]
+        }
+    })
 }
 
 #[cfg(test)]
@@ -134,7 +196,7 @@ mod tests {
         let voxels = around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
         let labels: Vec<u32> = voxels.map(|v| label(v.map(|v| v as f64))).collect();
         let mut patch = Patch::default();
-        Partition::default().extract(&labels, &around, &cells, &mut patch);
+        <Partition>::default().extract(&labels, &around, &cells, &mut patch);
         let mut found = std::collections::BTreeMap::new();
         for (triangle, pair) in patch.triangles.iter().zip(&patch.pairs) {
             let [a, b, c] = triangle.map(|v| DVec3::from(patch.positions[v as usize]));

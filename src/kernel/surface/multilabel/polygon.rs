@@ -20,12 +20,12 @@ pub(crate) struct Point {
 
 /// The triangles of a polygon, by the places of their vertices in it.
 pub(crate) fn cut(polygon: &[Point]) -> Vec<[usize; 3]> {
-    best(polygon, 0, polygon.len() - 1).map_or_else(|| fan(polygon.len()), |(_, triangles)| triangles)
+    best(polygon, 0, polygon.len() - 1).map_or_else(|| fan(polygon.len()).collect(), |(_, triangles)| triangles)
 }
 
 /// The triangles of a polygon from its first vertex on.
-pub(crate) fn fan(count: usize) -> Vec<[usize; 3]> {
-    (1..count - 1).map(|n| [0, n, n + 1]).collect()
+pub(crate) fn fan(count: usize) -> impl Iterator<Item = [usize; 3]> {
+    (1..count - 1).map(|n| [0, n, n + 1])
 }
 
 /// The best cut of the part from one vertex to another, and how well the worst of its triangles is turned, as a cosine.

@@ -7,6 +7,7 @@
 
 use super::corner::Corner;
 use super::known::Known;
+use super::touching::do_touch;
 use crate::grid::{Box3, NEIGHBOURS_26};
 
 /// Other labels that are kept of a voxel, the nearest.
@@ -105,6 +106,10 @@ impl Splits {
     fn search(&mut self, known: &Known<'_>, ends: [[i64; 3]; 2]) -> Option<Corner> {
         let places = ends.map(|voxel| known.part.offset_of(voxel));
         let own = places.map(|place| known.labels[place]);
+        // Voxels that touch meet between them, whatever their sources say.
+        if do_touch(known, &ends.map(|voxel| Corner::of_voxel(known, voxel))) {
+            return None;
+        }
         if own.contains(&0) || !places.iter().any(|&place| self.is_near[place]) {
             return None;
         }

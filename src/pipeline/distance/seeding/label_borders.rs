@@ -10,11 +10,22 @@ use crate::exec::Cancel;
 use crate::grid::{Box3, Geometry, refuse_too_many};
 use crate::io::stack::label_volume::LabelVolume;
 use crate::kernel::image::labels::{border, labelled};
+use crate::store::ElementType;
 
 /// A volume of labels, read by the boxes in which it is stored.
-pub trait Labels {
+pub trait Labels: Sync {
     /// Where its voxels lie.
     fn geometry(&self) -> &Geometry;
+
+    /// The type that its labels are stored in.
+    fn element(&self) -> ElementType {
+        ElementType::U32
+    }
+
+    /// Bytes that are held while it is read box by box, in each thread that does.
+    fn reading_bytes(&self) -> u64 {
+        0
+    }
 
     /// The boxes in which it is stored, x fastest, laid on a regular grid.
     fn natural_boxes(&self) -> Box<dyn Iterator<Item = Box3> + '_>;
@@ -29,6 +40,14 @@ pub trait Labels {
 impl Labels for LabelVolume {
     fn geometry(&self) -> &Geometry {
         self.geometry()
+    }
+
+    fn element(&self) -> ElementType {
+        self.element()
+    }
+
+    fn reading_bytes(&self) -> u64 {
+        self.reading_bytes()
     }
 
     fn natural_boxes(&self) -> Box<dyn Iterator<Item = Box3> + '_> {
