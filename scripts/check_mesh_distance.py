@@ -50,7 +50,10 @@ def check(store, mesh, count, seed):
         problems.append("there are distances below the exact one")
     if (excess[~band] >= 0.5 * widest).any():
         problems.append("there are distances above the exact one by half a voxel")
-    if json.loads((store / "report.json").read_text())["settings"]["signed"]:
+    settings = json.loads((store / "report.json").read_text())["settings"]
+    if settings["exact"] and wrong.any():
+        problems.append("distances are not exact")
+    if settings["signed"]:
         winding = igl.fast_winding_number(vertices, triangles, places)
         clear = (np.abs(winding - 0.5) > 0.05) & (exact > ROUNDING * h)
         flipped = ((winding > 0.5) != (values < 0)) & clear

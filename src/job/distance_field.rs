@@ -58,6 +58,12 @@ impl<'a> DistanceField<'a> {
         self
     }
 
+    /// Without an error: each voxel asks the sources that can be nearest, and no method is used.
+    pub fn exact(mut self) -> Self {
+        self.task.settings.exact = true;
+        self
+    }
+
     run_setters!(task.run);
 
     /// Computes the distance, in single precision.

@@ -51,6 +51,7 @@ impl Default for Task<'_> {
                 labels: false,
                 closest_point: false,
                 brick: method.solver::<f32>().brick,
+                exact: false,
             },
             run: Run::default(),
         }

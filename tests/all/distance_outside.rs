@@ -78,6 +78,7 @@ pub(crate) fn settings(method: Method, schedule: Schedule, brick: i64) -> Distan
         labels: true,
         closest_point: false,
         brick,
+        exact: false,
     }
 }
 

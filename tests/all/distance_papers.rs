@@ -103,6 +103,7 @@ fn pair(lab: &Lab, h: f64, method: Method, schedule: Schedule, init: Init, label
         labels,
         closest_point: false,
         brick: 32,
+        exact: false,
     };
     run_distance::<f32>(&lab.engine, &grid_around(&clouds.concat(), h), &sets, &settings, None)
 }
@@ -186,6 +187,7 @@ fn subsets_of_the_cube_share_its_voxels_evenly() {
         labels: true,
         closest_point: false,
         brick: 16,
+        exact: false,
     };
     let found = run_distance::<f32>(&Lab::new(2).engine, &geometry, &sets, &settings, None).expect("a distance");
     let mut voxels = [vec![], vec![], vec![]];

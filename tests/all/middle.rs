@@ -38,6 +38,7 @@ fn settings(method: Method, surface: SurfaceKind, labels: LabelMode, brick: i64)
         labels: true,
         closest_point: false,
         brick,
+        exact: false,
     };
     MiddleSettings { distance, surface, labels }
 }

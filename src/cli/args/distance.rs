@@ -69,6 +69,7 @@ pub(crate) struct FieldArgs {
 /// Which fields beside or instead of the plain distance.
 #[derive(Clone, Copy, Debug, Default, Args)]
 #[command(next_help_heading = "Distance")]
+#[expect(clippy::struct_excessive_bools, reason = "each is asked for by itself")]
 pub(crate) struct ChoiceArgs {
     /// Negative inside closed meshes
     #[arg(long)]
@@ -79,6 +80,9 @@ pub(crate) struct ChoiceArgs {
     /// Also write the position of the nearest source
     #[arg(long)]
     pub(crate) closest_point: bool,
+    /// Without an error, of clouds and meshes: each voxel asks the sources that can be nearest, and no method is used
+    #[arg(long, conflicts_with_all = ["method", "schedule", "neighbours", "iterations", "init"])]
+    pub(crate) exact: bool,
 }
 
 /// In which order bricks are computed.

@@ -397,6 +397,7 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
         labels: args.choice.labels,
         closest_point: args.choice.closest_point,
         brick: args.job.resources.brick.unwrap_or(field.method.solver::<f32>().brick),
+        exact: args.choice.exact,
     };
     settings.check()?;
     check_iterations(field.iterations)?;

@@ -78,6 +78,8 @@ pub(crate) struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
     exact_labels: Option<bool>,
     closest_point: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    exact: Option<bool>,
     brick: i64,
     scratch: String,
 }
@@ -124,6 +126,7 @@ impl Settings {
             labels: settings.labels || middle.is_some(),
             exact_labels: middle.map(|choice| choice.labels == LabelMode::Exact),
             closest_point: settings.closest_point,
+            exact: middle.is_none().then_some(settings.exact),
             brick: settings.brick,
             scratch: resources.scratch.display().to_string(),
         }

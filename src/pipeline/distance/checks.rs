@@ -1,7 +1,7 @@
 //! Distances that cannot be computed, refused before anything is: settings that contradict each other, grids with too
 //! many bricks, lengths that the type of the field cannot hold.
 
-use super::{DistanceSettings, Schedule, Textbook};
+use super::{DistanceSettings, Init, Schedule, Textbook};
 use crate::error::{Error, Result};
 use crate::grid::digits::{grouped, number};
 use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
@@ -35,6 +35,9 @@ impl DistanceSettings {
         }
         if sweeps && self.neighbours == Neighbours::All && row.textbook == Textbook::Sweeps {
             return Err(Error::usage("sweeps by bricks cannot keep the order of 26 neighbours; leave --schedule out"));
+        }
+        if self.exact && (sweeps || self.neighbours == Neighbours::All || self.init != Init::Cell) {
+            return Err(Error::usage("exact distances need no method; leave --schedule, --neighbours and --init out"));
         }
         if sweeps && self.farthest.is_some() {
             return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::exact::exact;
 use super::ranks::{Reads, solve_watched};
 use super::readout::early::Early;
 use super::readout::found::DistanceFound;
@@ -35,6 +36,7 @@ pub enum Init {
 
 /// What is computed and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is asked for by itself")]
 pub struct DistanceSettings {
     /// Which method.
     pub method: Method,
@@ -54,6 +56,8 @@ pub struct DistanceSettings {
     pub closest_point: bool,
     /// Edge of the bricks.
     pub brick: i64,
+    /// Without an error: each voxel asks the sources that can be nearest, and no method is used.
+    pub exact: bool,
 }
 
 impl DistanceSettings {
@@ -65,6 +69,9 @@ impl DistanceSettings {
 
     /// Whether labels are looked at closer, for which sources are sorted.
     pub(crate) fn looks_closer<P: Precision>(&self, sets: &DataSets) -> bool {
+        if self.exact {
+            return false;
+        }
         let is_tracked = self.schedule == Schedule::Front && self.method.solver::<P>().tracks_sources();
         self.labels && sets.count() > 1 && is_tracked
     }
@@ -109,6 +116,13 @@ pub fn distance_kept<P: Precision>(
     let wanted = Wanted { labels: settings.labels, borders: false, closest_point: settings.closest_point };
     let read_out = ReadOut { geometry, sets, is_signed: settings.signed, wanted, kept };
     let reading = Reading::new(read_out, engine, store)?;
+    if settings.exact {
+        drop(lent);
+        let stage = engine.stage("sort sources", 0);
+        let exact = exact::<P>(geometry, sets, settings);
+        stage.finish();
+        return reading.finish(&exact);
+    }
     // Only who watches a store gains by seeing its bricks one by one.
     let early = reads_early(settings, store).then_some(&reading as &dyn Early<P>);
     let reads = Reads { early, boxes: &reading.reads() };
@@ -121,6 +135,7 @@ pub fn distance_kept<P: Precision>(
 /// Whether bricks are read out while others are still solved.
 fn reads_early(settings: &DistanceSettings, store: Option<&StoreWriter>) -> bool {
     store.is_some_and(|store| store.live().is_some())
+        && !settings.exact
         && settings.schedule == Schedule::Front
         && settings.init != Init::Contiguous
 }

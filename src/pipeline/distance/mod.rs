@@ -6,6 +6,7 @@
 
 mod checks;
 mod costs;
+mod exact;
 mod job;
 mod needs;
 mod ranks;

@@ -3,6 +3,7 @@
 use super::{DistanceSettings, Kept, Schedule, Textbook, Wanted};
 use crate::exec::{Footprint, Plan, ROUND_BYTES};
 use crate::grid::{BrickGrid, DataSets, Geometry};
+use crate::kernel::distance::features::exact_sources::work_bytes;
 use crate::kernel::distance::repair::descent::remembered_bytes;
 use crate::kernel::distance::seeding::outside::count_outside;
 use crate::kernel::distance::state::precision::Precision;
@@ -91,6 +92,10 @@ const READ_SIDE_BYTES: u64 = 3 + 24;
 const READ_SECONDS: f64 = 8e-9;
 const WRITE_SECONDS: [f64; 3] = [25e-9, 8e-9, 20e-9];
 
+/// Bytes of a voxel that was told exactly, and seconds of one thread for it.
+const EXACT_BYTES: u64 = 8 + 4;
+const EXACT_SECONDS: f64 = 300e-9;
+
 /// Bytes that the trees of all sources take.
 pub(crate) fn tree_bytes(sets: &DataSets) -> u64 {
     TREE_BYTES[0] * sets.positions.len() as u64 + TREE_BYTES[1] * sets.mesh.len() as u64
@@ -130,6 +135,9 @@ impl DistanceSettings {
         let written = if writes == Writes::Nothing { 0.0 } else { written };
         let looks_again = if self.keeps_sources() { 2.0 } else { 1.0 };
         let read = looks_again * READ_SECONDS + written;
+        if self.exact {
+            return vec![("read out".into(), all * (EXACT_SECONDS + read))];
+        }
         vec![("distance".into(), all * solver.seconds * apart * order), ("read out".into(), all * read)]
     }
 
@@ -152,8 +160,12 @@ impl DistanceSettings {
         threads: usize,
         writes: Writes,
     ) -> (Footprint, u64) {
-        let solving = self.solving::<P>(geometry);
         let reading = self.reading::<P>(geometry, sets, threads, writes);
+        if self.exact {
+            let asking = work_bytes(sets.len() as u64) + EXACT_BYTES * CHUNK.min(geometry.domain().volume());
+            return (self.tables::<P>(geometry, sets).and(reading).and(Footprint::of_thread(asking)), 0);
+        }
+        let solving = self.solving::<P>(geometry);
         let at_once =
             if writes == Writes::FieldsMeanwhile { solving.and(reading) } else { solving.or(reading, threads as u64) };
         let later = if writes == Writes::FieldsMeanwhile {
@@ -170,7 +182,7 @@ impl DistanceSettings {
         let triangles = sets.mesh.len() as u64;
         let copies = triangles * TRIANGLE_COPIES * size_of::<Triangle>() as u64;
         let inside = if self.signed { WindingTree::bytes(triangles) + triangles * CLOSED_BYTES } else { 0 };
-        let trees = if self.looks_closer::<P>(sets) { tree_bytes(sets) } else { 0 };
+        let trees = if self.exact || self.looks_closer::<P>(sets) { tree_bytes(sets) } else { 0 };
         let outside = if count_outside(geometry, sets) > 0 { tree_bytes(sets) } else { 0 };
         let of_sources = sets.len() as u64 * SOURCE_BYTES + copies + inside + trees + outside;
         Footprint::of_all(bricks.saturating_mul(BRICK_BYTES).saturating_add(of_sources))
@@ -208,6 +220,9 @@ impl DistanceSettings {
     /// Temporary fields.
     fn scratch<P: Precision>(&self, grid: &BrickGrid) -> u64 {
         let (brick, faces) = (grid.brick_len() as u64, 6 * (self.brick * self.brick) as u64);
+        if self.exact {
+            return 0;
+        }
         let row = self.method.solver::<P>();
         let apart = if self.keeps_sources() { row.source_bytes } else { 0 };
         let element = row.state_bytes + apart;

@@ -27,6 +27,7 @@ fn drawn(engine: &Engine, labels: LabelMode, method: Method) -> Result<Vec<u64>>
         labels: true,
         closest_point: false,
         brick: 16,
+        exact: false,
     };
     let settings = MiddleSettings { distance, surface: SurfaceKind::Exact, labels };
     let mut mesh = TriangleMesh::default();

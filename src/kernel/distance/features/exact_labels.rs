@@ -5,6 +5,7 @@
 //! with a handful of sources each.
 
 use super::culling::{Around, Candidate, Culling};
+use super::halves::halves;
 use super::labelled_shapes::LabelledShapes;
 use super::source_trees::SourceTrees;
 use crate::grid::{Box3, Geometry};
@@ -85,14 +86,4 @@ impl ExactLabels<'_> {
         let nearest = ranked.reduce(|best, next| if next < best { next } else { best });
         nearest.map(|(_, label, source)| (source, label))
     }
-}
-
-/// The two halves of a box along its longest axis.
-fn halves(part: &Box3) -> [Box3; 2] {
-    let shape = part.shape();
-    let axis = (0..3).rev().max_by_key(|&a| shape[a]).unwrap_or(0);
-    let cut = part.lo[axis] + shape[axis] / 2;
-    let (mut lower, mut upper) = (*part, *part);
-    (lower.hi[axis], upper.lo[axis]) = (cut, cut);
-    [lower, upper]
 }

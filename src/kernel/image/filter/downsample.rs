@@ -109,7 +109,9 @@ pub fn mode<T: Element>(source: &[T], source_shape: [i64; 3], factors: [i64; 3],
             let start = x * blocks.factors[0];
             let part = start..start + blocks.width(x);
             block.clear();
-            rows.iter().for_each(|row| block.extend_from_slice(&row[part.clone()]));
+            for row in &rows {
+                block.extend_from_slice(&row[part.clone()]);
+            }
             *value = most_frequent(&block);
         }
     }
