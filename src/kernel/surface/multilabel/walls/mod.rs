@@ -30,7 +30,7 @@ use crate::grid::Box3;
 
 /// What 2 n - w grows by in one width s across a flat wall: 2 / sqrt(2 pi) - 1 / (2 sqrt(2 pi)).
 const SLOPE: f64 = 0.598_413_42;
-/// With so much of other labels the wider Gaussians have no say.
+/// With so much of other labels the wider Gaussians have no say, and labels are weighed in full.
 const THIRDS: f64 = 0.2;
 
 /// The walls in one box; keeps its working memory between boxes.
@@ -116,9 +116,8 @@ impl Sides for Walls {
 /// both allows the wider Gaussians.
 fn lead(seen: &Seen, coarse: f64) -> f64 {
     let [fine, middle, wide] = seen;
-    let thirds = ((1.0 - middle[0] - middle[1]) / THIRDS).clamp(0.0, 1.0);
     let narrow = by_both(fine, middle);
-    narrow + coarse * (1.0 - thirds) * (2.0 * by_both(middle, wide) - narrow)
+    narrow + coarse * (1.0 - thirds(middle)) * (2.0 * by_both(middle, wide) - narrow)
 }
 
 /// The same by a Gaussian n and one twice as wide, w: what 2 n - w of either label says of its own end, where it is a half, each as
@@ -127,6 +126,12 @@ fn by_both(narrow: &[f64; 2], wide: &[f64; 2]) -> f64 {
     let beyond = |n: usize| 2.0 * narrow[n] - wide[n] - 0.5;
     let short = [0, 1].map(|n: usize| (0.5 - wide[n]).max(0.0));
     let all = short[0] + short[1];
-    let [of_first, of_second] = if all > 0.0 { [short[1] / all, short[0] / all] } else { [0.5; 2] };
-    (of_first * beyond(0) - of_second * beyond(1)) / SLOPE
+    // Where there is little of others, which of the two is nearer to a half is a matter of voxels.
+    let uneven = if all > 0.0 { thirds(wide) * (short[1] / all - 0.5) } else { 0.0 };
+    ((0.5 + uneven) * beyond(0) - (0.5 - uneven) * beyond(1)) / SLOPE
+}
+
+/// How much there is of other labels, as a part of what counts in full.
+fn thirds(seen: &[f64; 2]) -> f64 {
+    ((1.0 - seen[0] - seen[1]) / THIRDS).clamp(0.0, 1.0)
 }
