@@ -79,6 +79,8 @@ def main():
         for name, command in commands(settings, place).items():
             if settings.only and name not in settings.only:
                 continue
+            # No run waits for what others have written to reach the disk.
+            os.sync()
             watcher, seconds = watch(program, command, place / "watched.zarr")
             faults = watcher.faults()
             failed |= bool(faults)
@@ -88,6 +90,7 @@ def main():
             for fault in faults[:10]:
                 print(f"    {fault}")
             shutil.rmtree(place / "watched.zarr")
+            os.sync()
             pairs = [[timed(program, command, place / "timed.zarr", *flags) for flags in ([], ["--live"])] for _ in range(settings.pairs)]
             if pairs:
                 plain, live = (statistics.median(times) for times in zip(*pairs, strict=True))
