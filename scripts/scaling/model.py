@@ -7,7 +7,8 @@
 
 Bricks are shared out in runs of the grid's order, so a rank has a slab: as long as it is thicker than a brick it sends two faces of
 the grid's width, thinner ones send as much to more ranks. The front passes through slabs, so not all are busy at all times: the
-slowest has `unevenness` times the mean, which is measured with as many slabs as bricks are on top of each other, and kept beyond.
+slowest takes `unevenness` times the mean. It is measured, by what ranks wait where each has a core, else by their bricks, and kept
+beyond.
 """
 
 import math
@@ -49,7 +50,7 @@ def seconds(measured, machine, edge, ranks):
     bricks = math.ceil(edge / measured.brick_edge) ** 3
     own = math.ceil(bricks / ranks) * unevenness(measured, ranks)
     solving = own * measured.visits_per_brick * measured.seconds_per_visit / machine.cores
-    writing = edge**3 / ranks * measured.seconds_per_voxel_written / machine.cores
+    writing = edge**3 / ranks * unevenness(measured, ranks) * measured.seconds_per_voxel_written / machine.cores
     digits = math.ceil(math.log2(ranks)) if ranks > 1 else 0
     agreeing = (
         measured.rounds_per_edge * edge / measured.brick_edge * measured.messages_per_round * digits * machine.latency
