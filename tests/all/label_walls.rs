@@ -229,9 +229,13 @@ fn many_cells_are_closed_and_fill_what_they_fill_together() {
         let number = euler(&mesh, label.label);
         let (own, its) = (label.volume.unwrap(), volume.volume_of(label.label));
         // Half spaces and a ball share one piece without a hole; of slivers voxels may leave several that touch along edges.
-        if found.label_voxels[&label.label] > 500 {
+        let is_sliver = found.label_voxels[&label.label] < 500;
+        if !is_sliver {
             assert_eq!(number, 2, "label {} of {} voxels", label.label, found.label_voxels[&label.label]);
-            assert!((own / its - 1.0).abs() < 0.03, "label {}: {own} of {its}", label.label);
+        }
+        if found.label_voxels[&label.label] > 300 {
+            let most = if is_sliver { 0.06 } else { 0.03 };
+            assert!((own / its - 1.0).abs() < most, "label {}: {own} of {its}", label.label);
         }
         let walls = found.pairs.iter().filter(|pair| pair.labels.contains(&label.label));
         assert!((walls.map(|pair| pair.area).sum::<f64>() / label.area - 1.0).abs() < 1e-12);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::exec::{Hold, Stage, Workers};
 use crate::grid::{Box3, BrickGrid, BrickId};
-use crate::kernel::distance::features::exact_labels::ExactLabels;
+use crate::kernel::distance::features::exact_sources::ExactSources;
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::{DistanceWithSource, Solved};
 use crate::store::BoxSource;
@@ -98,7 +98,7 @@ impl<P: Precision> DistanceWithSource<P> for Corrected<'_, P> {
 /// When what is remembered does not fit the memory, or the run is interrupted.
 pub(super) fn with_exact_labels<'a, P: Precision>(
     stage: &Stage<'_>,
-    exact: &ExactLabels<'_>,
+    exact: &ExactSources<'_>,
     (grid, bricks): (&BrickGrid, Vec<BrickId>),
     solved: Solved<'a, P>,
 ) -> Result<Solved<'a, P>> {

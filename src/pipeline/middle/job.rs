@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::{Box3, BrickGrid, BrickId, DataSets, Geometry};
 use crate::io::ome_zarr::StoreWriter;
-use crate::kernel::distance::features::exact_labels::ExactLabels;
+use crate::kernel::distance::features::exact_sources::ExactSources;
 use crate::kernel::distance::features::labelled_shapes::LabelledShapes;
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::distance::repair::bends::MARGIN;
@@ -114,7 +114,7 @@ pub fn middle_kept<P: Precision>(
             let stage = engine.stage("exact labels", 0);
             stage.voxels(geometry.domain().volume());
             let farthest = distance.farthest.unwrap_or(f64::INFINITY);
-            let exact = ExactLabels { geometry, shapes: &shapes, trees: &trees, farthest };
+            let exact = ExactSources { geometry, shapes: &shapes, trees: &trees, farthest };
             solved = with_exact_labels(&stage, &exact, (set.grid(), bricks), solved)?;
             stage.finish();
         }

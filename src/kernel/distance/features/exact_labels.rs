@@ -4,33 +4,12 @@
 //! that are left have one label, or until the half is a voxel. Only near the borders of labels this goes down to voxels,
 //! with a handful of sources each.
 
-use super::culling::{Around, Candidate, Culling};
+use super::culling::{Around, Candidate};
+use super::exact_sources::{ExactSources, Work};
 use super::halves::halves;
-use super::labelled_shapes::LabelledShapes;
-use super::source_trees::SourceTrees;
-use crate::grid::{Box3, Geometry};
+use crate::grid::Box3;
 
-/// What is compared with what.
-#[derive(Clone, Copy, Debug)]
-pub struct ExactLabels<'a> {
-    /// The grid.
-    pub geometry: &'a Geometry,
-    /// All sources.
-    pub shapes: &'a LabelledShapes<'a>,
-    /// The same, sorted.
-    pub trees: &'a SourceTrees,
-    /// Voxels that are farther from all of them have no label. Physical.
-    pub farthest: f64,
-}
-
-/// Work buffers.
-#[derive(Clone, Debug, Default)]
-struct Work {
-    candidates: Vec<Candidate>,
-    culling: Culling,
-}
-
-impl ExactLabels<'_> {
+impl ExactSources<'_> {
     /// The voxels of a box whose sources, dense over it, have a label that is not the nearest; each with its nearest
     /// source. Of equal distances the lower label wins, then the lower source. Where all of a part of the box is farther away
     /// than counts, nothing is looked for; of other parts some voxels beyond may be among them.
@@ -39,11 +18,11 @@ impl ExactLabels<'_> {
         let mut found = Vec::new();
         let around = Around::centres(self.geometry, part);
         let mut work = Work { candidates: self.trees.near_all(&around), ..Work::default() };
-        self.settle(part, &mut work, 0, &mut |voxels, left| {
+        self.settle_labels(part, &mut work, 0, &mut |voxels, left| {
             for (y, z) in voxels.rows() {
                 for voxel in (voxels.lo[0]..voxels.hi[0]).map(|x| [x, y, z]) {
                     if self.shapes.label(sources[part.offset_of(voxel)]) != left[0].1 {
-                        found.extend(self.nearest(voxel, left).map(|(source, _)| (voxel, source)));
+                        found.extend(self.nearest_of(voxel, left).map(|nearest| (voxel, nearest.source)));
                     }
                 }
             }
@@ -53,14 +32,14 @@ impl ExactLabels<'_> {
 
     /// Tells for all voxels of a box whose they are: calls `report` with boxes of voxels and sources of one label, which
     /// those nearest to the voxels are among. The candidates from `first` on hold all that can be nearest.
-    fn settle(&self, part: &Box3, work: &mut Work, first: usize, report: &mut impl FnMut(&Box3, &[Candidate])) {
+    fn settle_labels(&self, part: &Box3, work: &mut Work, first: usize, report: &mut impl FnMut(&Box3, &[Candidate])) {
         let left = work.candidates.len();
         if part.is_empty() || first == left {
             return;
         }
         if part.len() == 1 {
-            let nearest = self.nearest(part.lo, &work.candidates[first..]);
-            return nearest.into_iter().for_each(|nearest| report(part, &[nearest]));
+            let nearest = self.nearest_of(part.lo, &work.candidates[first..]);
+            return nearest.into_iter().for_each(|nearest| report(part, &[(nearest.source, nearest.label)]));
         }
         let around = Around::centres(self.geometry, part);
         let nearest = work.culling.keep(self.shapes, &around, &mut work.candidates, first);
@@ -72,18 +51,9 @@ impl ExactLabels<'_> {
             report(part, kept);
         } else {
             for half in halves(part) {
-                self.settle(&half, work, left, report);
+                self.settle_labels(&half, work, left, report);
             }
         }
         work.candidates.truncate(left);
-    }
-
-    /// The nearest of some sources.
-    fn nearest(&self, voxel: [i64; 3], among: &[Candidate]) -> Option<Candidate> {
-        let here = self.geometry.position(voxel);
-        let rank = |&(source, label): &Candidate| (self.shapes.distance_squared(here, source), label, source);
-        let ranked = among.iter().map(rank);
-        let nearest = ranked.reduce(|best, next| if next < best { next } else { best });
-        nearest.map(|(_, label, source)| (source, label))
     }
 }

@@ -28,8 +28,15 @@ pub struct ExactSources<'a> {
 /// Work buffers.
 #[derive(Clone, Debug, Default)]
 pub struct Work {
-    candidates: Vec<Candidate>,
-    culling: Culling,
+    pub(super) candidates: Vec<Candidate>,
+    pub(super) culling: Culling,
+}
+
+/// The nearest of some sources, its label, and the squared distance to it.
+pub(super) struct Nearest {
+    pub(super) source: u32,
+    pub(super) label: u32,
+    squared: f64,
 }
 
 /// Bytes that the buffers take with so many sources: all of them, and what of them is left in the halves of boxes.
@@ -48,8 +55,8 @@ impl ExactSources<'_> {
         }
         work.candidates = self.trees.near_all(&Around::centres(self.geometry, part));
         self.settle(part, work, 0, &mut |voxel, among: &[Candidate]| {
-            if let Some((squared, source)) = self.nearest_of(voxel, among) {
-                report(part.offset_of(voxel), source, squared);
+            if let Some(nearest) = self.nearest_of(voxel, among) {
+                report(part.offset_of(voxel), nearest.source, nearest.squared);
             }
         });
     }
@@ -73,11 +80,12 @@ impl ExactSources<'_> {
         work.candidates.truncate(left);
     }
 
-    fn nearest_of(&self, voxel: [i64; 3], among: &[Candidate]) -> Option<(f64, u32)> {
+    /// The nearest of some sources to a voxel.
+    pub(super) fn nearest_of(&self, voxel: [i64; 3], among: &[Candidate]) -> Option<Nearest> {
         let here = self.geometry.position(voxel);
         let rank = |&(source, label): &Candidate| (self.shapes.distance_squared(here, source), label, source);
         let nearest = among.iter().map(rank).reduce(|best, next| if next < best { next } else { best });
-        nearest.map(|(squared, _, source)| (squared, source))
+        nearest.map(|(squared, label, source)| Nearest { source, label, squared })
     }
 }
 
