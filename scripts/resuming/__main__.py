@@ -7,6 +7,9 @@ damage a clear refusal will do. Exit code 1 when one had not.
 
 A full disk has a random share of the room that a run takes which nobody ends, as one of them shows. With ../shared/data
 there is one more command, embryo-like.
+
+With --ranks all runs but the one that nobody ends are those of several ranks (mpirun; a build with the feature mpi), and gone on
+with on another number of them: SIGKILL and a panic hit one rank, SIGTERM mpirun; all have to end within 10 seconds.
 """
 
 import argparse
@@ -21,7 +24,7 @@ from pathlib import Path
 
 from interrupting import runs
 
-from . import cost, trials
+from . import cost, on_ranks, trials
 
 HOWS = ("kill", "term", "disk", "damage")
 
@@ -33,9 +36,10 @@ def arguments():
     parser.add_argument("--times", type=int, default=10, help="trials of each command and each way (10)")
     parser.add_argument("--seed", type=int, default=1, help="of the moments (1)")
     parser.add_argument("--only", action="append", metavar="NAME", help="this command alone; repeatable")
-    parser.add_argument("--how", action="append", choices=HOWS, help="this way alone; repeatable")
+    parser.add_argument("--how", action="append", choices=sorted({*HOWS, *on_ranks.HOWS}), help="this way alone; repeatable")
     parser.add_argument("--folder", type=Path, help="where inputs and outputs are made, a few GB [default: $TMPDIR]")
     parser.add_argument("--large", action="store_true", help="a distance of 512^3 voxels instead of 192^3")
+    parser.add_argument("--ranks", action="store_true", help="runs on several ranks, by mpirun")
     parser.add_argument(
         "--cost", type=int, metavar="EDGE", help="no trial, but what checkpoints cost a distance of EDGE^3 voxels"
     )
@@ -75,9 +79,9 @@ def wait_while(file):
         time.sleep(2)
 
 
-def full(program, arguments_, place, numbers, wanted, needed):
+def full(kind, program, arguments_, place, numbers, wanted, needed):
     """A run on a disk that is too small by a random share, gone on with when it has grown."""
-    trial = trials.Trial(program, arguments_, place, 0.0, "disk", numbers)
+    trial = kind(program, arguments_, place, 0.0, "disk", numbers)
     size = int(needed * numbers.uniform(0.05, 1.0)) + (1 << 20)
     shutil.rmtree(trial.folder)
     small = trials.full_disk(place, size)
@@ -109,6 +113,7 @@ def main():
     settings = arguments()
     program = str(Path(os.environ["STRANDLINE"]).resolve())
     root = Path(os.environ["STRANDLINE_ROOT"])
+    kind, hows = (on_ranks.RankTrial, on_ranks.HOWS) if settings.ranks else (trials.Trial, HOWS)
     bad = counted = 0
     with tempfile.TemporaryDirectory(prefix="strandline-resume-", dir=settings.folder) as folder:
         place = Path(folder)
@@ -120,16 +125,16 @@ def main():
                 continue
             wait_while(settings.pause_while)
             seconds, wanted = trials.whole(program, command, place)
-            for how in settings.how or HOWS:
+            for how in settings.how or hows:
                 numbers = random.Random(f"{settings.seed} {name} {how}")
                 needed = trials.needed(program, command, place) if how == "disk" else 0
                 found = []
                 for _ in range(settings.times):
                     wait_while(settings.pause_while)
                     if how == "disk":
-                        trial = full(program, command, place, numbers, wanted, needed)
+                        trial = full(kind, program, command, place, numbers, wanted, needed)
                     else:
-                        trial = trials.Trial(program, command, place, seconds, how, numbers).run(wanted)
+                        trial = kind(program, command, place, seconds, how, numbers).run(wanted)
                     found.append(trial)
                     for fault in trial.faults:
                         print(

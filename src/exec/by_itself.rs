@@ -13,9 +13,15 @@ pub(crate) struct ByItself<'a> {
 }
 
 impl Engine {
-    /// This engine for what a rank does by itself, without the others.
+    /// This engine for what a rank does by itself, without the others: most often what all ranks do alike, of which a rank of several
+    /// puts nothing by.
     pub(crate) fn by_itself(&self) -> ByItself<'_> {
-        ByItself { of: self, own: (self.comm().ranks() > 1).then(|| self.without_others()) }
+        ByItself { of: self, own: (self.comm().ranks() > 1).then(|| self.without_others(false)) }
+    }
+
+    /// The same for what this rank alone does, in stages that no other has by these names: it puts by what it solves.
+    pub(crate) fn alone(&self) -> ByItself<'_> {
+        ByItself { of: self, own: (self.comm().ranks() > 1).then(|| self.without_others(true)) }
     }
 }
 

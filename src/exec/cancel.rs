@@ -27,6 +27,9 @@ struct Saving {
 }
 
 impl Cancel {
+    /// In the flag in place of a signal: for trials, the run panics.
+    pub(crate) const PANIC: usize = 1 << 16;
+
     /// The number of the signal that asked for the end, or 0; a signal handler may store it there.
     #[must_use]
     pub fn flag(&self) -> Arc<AtomicUsize> {
@@ -47,6 +50,7 @@ impl Cancel {
     pub(super) fn end(&self) -> Result<()> {
         match self.flag.load(Relaxed) {
             0 => Ok(()),
+            Self::PANIC => panic!("a panic was asked for"),
             signal => Err(Error::interrupted(signal as i32)),
         }
     }
@@ -57,7 +61,17 @@ impl Cancel {
     }
 
     pub(super) fn is_asked(&self) -> bool {
-        self.flag.load(Relaxed) != 0
+        self.signal() != 0
+    }
+
+    /// The signal that asked for it, or 0.
+    pub(super) fn signal(&self) -> usize {
+        self.flag.load(Relaxed)
+    }
+
+    /// Another rank was asked to end, by a signal.
+    pub(super) fn ask(&self, signal: usize) {
+        let _ = self.flag.compare_exchange(0, signal, Relaxed, Relaxed);
     }
 
     /// Whether the end was asked for and a stage has yet time to put by what it has solved.

@@ -14,7 +14,7 @@ use super::memory::footprint::{Account, Footprint, Hold};
 use super::progress::heard::{OfRank, Progress};
 use super::progress::outlook::{Outlook, Running};
 use super::progress::report::{Reports, StageReport};
-use super::save_points::{SavePoint, SavePoints};
+use super::save_points::{By, SavePoint, SavePoints};
 use super::workers::Workers;
 use crate::error::{Error, ErrorKind, Result};
 use crate::store::checkpoint::{Identity, SavedField};
@@ -31,7 +31,6 @@ pub struct Engine {
     account: Arc<Account>,
     outlook: Arc<Outlook>,
     saving: Option<Arc<SavePoints>>,
-    identity: Option<Arc<Identity>>,
     reports: Reports,
 }
 
@@ -53,19 +52,7 @@ impl Engine {
         let account = Account::new(budget, scratch.clone());
         let (outlook, reports) = (Arc::default(), Reports::default());
         progress.look_out(&outlook);
-        Ok(Self {
-            pool,
-            cancel,
-            progress,
-            comm,
-            scratch,
-            budget,
-            account,
-            outlook,
-            saving: None,
-            identity: None,
-            reports,
-        })
+        Ok(Self { pool, cancel, progress, comm, scratch, budget, account, outlook, saving: None, reports })
     }
 
     /// The engine of one rank of a run of which all ranks do the same, each on its own part.
@@ -74,23 +61,16 @@ impl Engine {
         Self { comm, ..self }
     }
 
-    /// The engine of a run that puts by what it has solved; one rank alone does.
+    /// The engine of a run that puts by what it has solved.
     #[must_use]
     pub fn with_save_points(self, saving: Option<Arc<SavePoints>>) -> Self {
-        let is_alone = self.comm.ranks() == 1;
-        Self { saving: saving.filter(|_| is_alone), ..self }
-    }
-
-    /// The engine of a run of which is known what it was asked for and what its inputs hold, though it puts nothing by.
-    #[must_use]
-    pub fn known_as(self, identity: Option<Identity>) -> Self {
-        Self { identity: identity.map(Arc::new), ..self }
+        Self { saving, ..self }
     }
 
     /// What the run was asked for, and what its inputs hold, where somebody has looked.
     #[must_use]
     pub fn identity(&self) -> Option<&Identity> {
-        self.saving.as_ref().map(|saving| saving.identity()).or(self.identity.as_deref())
+        self.saving.as_ref().map(|saving| saving.identity())
     }
 
     /// The run is over: what was put by goes, unless the run ended by something that can be mended: a signal, a
@@ -118,15 +98,20 @@ impl Engine {
             account: self.account.clone(),
             outlook: self.outlook.clone(),
             saving: self.saving.clone(),
-            identity: self.identity.clone(),
             reports: Reports::default(),
         }
     }
 
-    /// The same without the other ranks, whose stages are told as those of this one.
-    pub(super) fn without_others(&self) -> Self {
+    /// The same without the other ranks, whose stages are told as those of this one, and which puts by what it solves or nothing.
+    pub(super) fn without_others(&self, saves: bool) -> Self {
         let (progress, comm) = (self.progress.clone(), Arc::new(SelfComm));
-        Self { progress, comm, saving: None, ..self.beside() }
+        let saving = self.saving.clone().filter(|_| saves);
+        Self { progress, comm, saving, ..self.beside() }
+    }
+
+    /// Whose stages those of this engine are.
+    fn by(&self) -> By<'_> {
+        By { cancel: &self.cancel, progress: self.progress.as_ref(), comm: self.comm.as_ref() }
     }
 
     /// Runs on this engine's threads.
@@ -237,7 +222,7 @@ impl Engine {
     /// with.
     #[must_use]
     pub fn save_point(&self, name: &str) -> Option<SavePoint<'_>> {
-        Some(self.saving.as_ref()?.begin(name, &self.cancel, self.progress.as_ref()))
+        Some(self.saving.as_ref()?.begin(name, self.by()))
     }
 
     /// Work on a field with which the first stage of a name has ended, and which it leaves as it is. Where the run is terminated in it,
@@ -247,7 +232,7 @@ impl Engine {
     /// Of the work, and when the run is to end.
     pub fn after<R>(&self, stage: &str, field: Option<&dyn SavedField>, work: impl FnOnce() -> Result<R>) -> Result<R> {
         match (&self.saving, field) {
-            (Some(saving), Some(field)) => saving.after(stage, field, (&self.cancel, self.progress.as_ref()), work),
+            (Some(saving), Some(field)) => saving.after(stage, field, self.by(), work),
             _ => work(),
         }
     }
@@ -369,9 +354,9 @@ impl<'a> Stage<'a> {
             Saves::Nothing => None,
             Saves::Counted => {
                 let name = &self.report.lock().unwrap_or_else(PoisonError::into_inner).name;
-                Some(saving.begin(name, &engine.cancel, engine.progress.as_ref()))
+                Some(saving.begin(name, engine.by()))
             }
-            Saves::Within(key) => Some(saving.begin_part(key, &engine.cancel, engine.progress.as_ref())),
+            Saves::Within(key) => Some(saving.begin_part(key, engine.by())),
         }
     }
 

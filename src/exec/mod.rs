@@ -5,8 +5,6 @@ mod by_itself;
 mod cancel;
 mod comm;
 mod copies;
-#[cfg(test)]
-pub(crate) mod ending;
 mod engine;
 mod exchange;
 mod fixed_point;
@@ -16,7 +14,7 @@ mod ownership;
 mod progress;
 mod ranks;
 mod relax;
-mod save_points;
+pub(crate) mod save_points;
 mod schedule;
 mod side_by_side;
 mod workers;

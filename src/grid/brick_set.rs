@@ -151,6 +151,13 @@ impl BrickSet {
         }
     }
 
+    /// The slot of a brick of any grid as large, or none where it is not in the set or is a ghost.
+    #[must_use]
+    pub fn own_slot(&self, id: BrickId) -> Option<Slot> {
+        let known = Some(id).filter(|&id| id < self.grid.len()).and_then(|id| self.slot(id));
+        known.filter(|slot| self.owned.contains(slot))
+    }
+
     /// The slot of the brick beside `slot`, or none where it is absent or beyond the domain.
     #[must_use]
     pub fn neighbour(&self, slot: Slot, offset: [i64; 3]) -> Option<Slot> {

@@ -12,7 +12,7 @@ use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals::wish;
 use crate::cli::terminal::text::bytes;
 use crate::error::{Error, Result, one_line};
-use crate::exec::{Engine, Progress, SavePoints};
+use crate::exec::{Engine, Progress, SavePoints, gather_records};
 use crate::io::ome_zarr::{LiveState, is_store, live};
 use crate::store::checkpoint::{Checkpoints, Identity, difference};
 
@@ -113,8 +113,7 @@ fn check_same(store: &Path, now: &Identity) -> Result<()> {
 }
 
 /// The engine of a run that puts by what it solves, and goes on from what was put by. What its inputs hold is looked at here where it is
-/// not `known` before. Several ranks take no checkpoints, which is told who asked for them; the first one looks at the inputs for what the store
-/// tells of them.
+/// not `known` before. Of several ranks the first one looks, and tells the others.
 ///
 /// # Errors
 /// When another run works there, what lies there is of another one, or an input cannot be read.
@@ -124,18 +123,22 @@ pub(crate) fn survivable(
     known: Option<&Identity>,
     console: &dyn Progress,
 ) -> Result<Engine> {
+    let (rank, ranks) = (engine.comm().rank(), engine.comm().ranks());
     let identity = || known.map_or_else(|| identity(typed), |known| Ok(Some(known.clone())));
-    if engine.comm().ranks() == 1 {
-        let found = checkpoints(output, identity, console)?;
-        let every = output.survive.checkpoint_every;
-        return Ok(engine.with_save_points(found.map(|found| Arc::new(SavePoints::new(found, every, wish())))));
+    // What others wait for is looked at when all of them have seen what is there.
+    engine.comm().any(false)?;
+    let mut found = if rank == 0 { checkpoints(output, identity, console)? } else { None };
+    if ranks > 1 {
+        let first = found.map(|found| found.of_first(ranks)).transpose()?;
+        let (own, shared) = first.unzip();
+        let shared = gather_records(engine.comm(), &shared)?.into_iter().next().flatten();
+        found = match (own, shared) {
+            (None, Some(shared)) => Some(Checkpoints::of_rank(shared, rank, ranks)?),
+            (own, _) => own,
+        };
     }
-    if output.survive.asks() {
-        console.note("runs on several ranks take no checkpoints, and go on from none: this one begins anew");
-    }
-    let is_told = engine.comm().rank() == 0 && output.store().is_some();
-    let is_told = is_told && output.survive.checkpoint != Some(Checkpoint::Off);
-    Ok(engine.known_as(if is_told { identity()? } else { None }))
+    let every = output.survive.checkpoint_every;
+    Ok(engine.with_save_points(found.map(|found| Arc::new(SavePoints::new(found, every, wish())))))
 }
 
 /// The checkpoints of a run, with what it goes on from; none where it takes none.
@@ -233,7 +236,7 @@ mod tests {
         let said = told(full(), 3 << 30);
         assert!(said.ends_with("; temporary fields and output of this run take up to 3 GiB of disk"), "{said}");
         let checkpoints = Checkpoints::begin(&checkpoints_of(&store), Vec::new(), false).unwrap();
-        checkpoints.save("moving", Vec::new(), (&[], &[]), &|| Ok(())).unwrap();
+        checkpoints.save("moving", Vec::new(), (&[], &[]), &|| Ok(()), None).unwrap();
         let said = told(full(), 3 << 30);
         assert!(said.contains("of disk; when there is room --resume goes on from the checkpoint in "), "{said}");
         assert!(said.ends_with("x.zarr.checkpoint"), "{said}");

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
 use signal_hook::flag;
 
+use super::fault::panic_where_asked;
 use crate::cli::tell;
 use crate::error::{Error, Result};
 use crate::exec::Cancel;
@@ -65,6 +66,7 @@ pub(crate) fn cancel_on_signals() -> Result<Cancel> {
         }
     };
     thread::Builder::new().spawn(watch).map_err(|error| Error::from_io("cannot listen to signals", &error))?;
+    panic_where_asked(&cancel)?;
     Ok(cancel)
 }
 

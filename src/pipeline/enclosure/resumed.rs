@@ -51,7 +51,8 @@ impl<'a> Progress<'a> {
     /// # Errors
     /// When a checkpoint cannot be understood.
     pub(super) fn begin(engine: &'a Engine, suffix: &str) -> Result<Self> {
-        let save_point = engine.save_point(&format!("enclosure{suffix}"));
+        // All ranks have the whole search.
+        let save_point = engine.save_point(&format!("enclosure{suffix}")).map(SavePoint::alike);
         let saved = save_point.as_ref().and_then(SavePoint::saved);
         let known = saved.as_ref().map(Saved::facts).transpose()?.unwrap_or_default();
         Ok(Self { save_point, saved, known })

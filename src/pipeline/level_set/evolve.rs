@@ -152,7 +152,11 @@ pub fn evolve(
     let mut next = second_level(stage, engine, &band.u)?;
     exchange.faces(&next, &owned)?;
     let mut save_point = stage.save_point();
-    let mut taken = Taken::resume(save_point.as_ref(), [&band.u, &next])?;
+    let mut taken = Taken::resume(save_point.as_ref(), engine.comm().rank() == 0, [&band.u, &next])?;
+    if taken.steps > 0 {
+        exchange.faces(&band.u, &owned)?;
+        exchange.faces(&next, &owned)?;
+    }
     let mut first = true;
     while !taken.ended && taken.steps < settings.max_steps {
         let solver = Solver {

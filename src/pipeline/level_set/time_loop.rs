@@ -72,13 +72,21 @@ pub(super) struct Taken {
 }
 
 impl Taken {
-    /// None, or those of an earlier run, which left the last two time levels.
-    pub(super) fn resume(save_point: Option<&SavePoint<'_>>, levels: [&BrickArray<f32>; 2]) -> Result<Self> {
+    /// None, or those of an earlier run, on any number of ranks, which left the last two time levels. What all ranks counted the first one
+    /// takes over.
+    pub(super) fn resume(
+        save_point: Option<&SavePoint<'_>>,
+        is_first: bool,
+        levels: [&BrickArray<f32>; 2],
+    ) -> Result<Self> {
         let Some(saved) = save_point.and_then(SavePoint::saved) else { return Ok(Self::default()) };
         for (n, level) in levels.into_iter().enumerate() {
             saved.restore(n, level)?;
         }
-        saved.facts()
+        let parts: Vec<Self> = saved.facts_of_all()?;
+        let counted = if is_first { parts.iter().map(|part| part.cell_iterations).sum() } else { 0 };
+        let first = parts.into_iter().next().unwrap_or_default();
+        Ok(Self { cell_iterations: counted, ..first })
     }
 
     pub(super) fn step(&mut self, (residual, limit): (f64, f64), cell_iterations: u64) {

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::exec::Engine;
-use crate::exec::ending::check_ended_anywhere;
+use crate::exec::save_points::ending::check_ended_anywhere;
 use crate::grid::{DataSets, Geometry, TriangleMesh};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::pipeline::distance::{DistanceSettings, Init, Method, Schedule};

@@ -76,7 +76,7 @@ pub(crate) fn in_batches<F: Serialize + DeserializeOwned>(
 ) -> Result<()> {
     let is_live = images.iter().any(|image| image.image().is_live());
     let all: Vec<usize> = (0..visits.len()).collect();
-    let Some(mut save_point) = (!is_live).then(|| stage.save_point()).flatten() else {
+    let Some(mut save_point) = (!is_live).then(|| stage.save_point()).flatten().map(SavePoint::each) else {
         stage.expect(visits.len() as u64);
         return take(&all, &Door(None), found);
     };
@@ -153,6 +153,10 @@ fn go_on<F: DeserializeOwned>(
     parts: usize,
 ) -> Result<Option<Known<F>>> {
     let Some(saved) = save_point.saved() else { return Ok(None) };
+    let Some(saved) = saved.of_this_rank() else {
+        save_point.forget("nothing that this one of as many ranks had written is known, and its part is written anew");
+        return Ok(None);
+    };
     let known: Known<F> = saved.facts()?;
     let is_same = known.images.iter().map(|known| known.form).eq(images.iter().map(|image| image.image().form()));
     let fault = if is_same && known.done.len() == parts {

@@ -4,6 +4,8 @@
 //! cloud -> grid -> distance -> flood -> band -> time loop -> u -> surface -> mesh, measures
 //! ```
 
+#[cfg(test)]
+mod ended;
 mod estimate;
 mod flat;
 mod grid;

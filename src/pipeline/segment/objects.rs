@@ -77,7 +77,7 @@ pub(super) fn solve_all<T: Element>(
             other => other.map(|solved| (n, Ok(solved))),
         }
     };
-    let found = engine.by_itself().side_by_side(&items, most, work)?;
+    let found = engine.alone().side_by_side(&items, most, work)?;
     let found = told_to_all(engine, found)?;
     let mut solved = Vec::new();
     for object in found {

@@ -2,65 +2,29 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::identity::{Identity, difference};
-use super::links::{LinkOf, Linked, link};
+use super::identity::Identity;
+use super::last_whole::{Chosen, last_whole, read_chosen};
+use super::links::{Linked, link};
 use super::lock::{LOCK, lock, worker};
-use super::names::{field_name, manifest_name, names, numbers};
-use super::payload::{self, SavedField};
+use super::manifest::{Entry, FileOf, Held, Manifest};
+use super::names::{Owner, field_name, manifest_name, manifests, names, number_and_owner};
+use super::payload::SavedField;
+use super::put::put;
 use super::record;
 use crate::error::{Error, Result, one_line};
 use crate::grid::digits::bytes;
+use crate::store::free_space;
 use crate::store::hidden::remove_abandoned;
-use crate::store::{HiddenFile, begin_writeback, free_space};
 
 /// So many manifests are kept, with what they name.
 const KEPT: usize = 2;
-/// Bytes that are handed to the disk at a time.
-const BUFFER: usize = 1 << 20;
-/// After so many bytes the disk is to begin with them.
-const FLOW: usize = 32 << 20;
-
-#[derive(Serialize, Deserialize)]
-struct Manifest {
-    identity: Identity,
-    /// By stage.
-    entries: BTreeMap<String, Entry>,
-}
-
-impl Manifest {
-    /// The files that it names.
-    fn files(&self) -> impl Iterator<Item = &FileOf> {
-        self.entries.values().flat_map(|entry| &entry.files)
-    }
-
-    /// The names of all that it needs.
-    fn needed(&self) -> BTreeSet<String> {
-        let links = self.entries.values().flat_map(|entry| &entry.links).map(|link| &link.name);
-        self.files().map(|file| &file.name).chain(links).cloned().collect()
-    }
-}
-
-/// What a stage has put by.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Entry {
-    /// What it knows, packed.
-    facts: Vec<u8>,
-    files: Vec<FileOf>,
-    links: Vec<LinkOf>,
-}
-
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct FileOf {
-    name: String,
-    bytes: u64,
-}
 
 /// What a checkpoint took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,9 +35,20 @@ pub struct Taken {
     pub linking: Duration,
 }
 
-/// What was found of a stage.
+/// What was found of a stage: of each rank that had put by something, in their order.
 #[derive(Clone, Debug)]
 pub struct Kept {
+    /// One at least.
+    pub parts: Vec<KeptPart>,
+}
+
+/// What a rank had put by of a stage.
+#[derive(Clone, Debug)]
+pub struct KeptPart {
+    /// The rank, of how many.
+    pub rank: usize,
+    /// See there.
+    pub ranks: usize,
     /// What it knew, packed.
     pub facts: Vec<u8>,
     /// The files of its fields.
@@ -91,11 +66,25 @@ pub struct Found {
     pub torn: Vec<String>,
 }
 
-/// The checkpoints of a run.
+/// The checkpoints of a run, or of one of its ranks.
 pub struct Checkpoints {
     folder: PathBuf,
     identity: Identity,
+    /// The rank that they are of, of how many.
+    rank: usize,
+    ranks: usize,
+    /// What has numbers up to this one was there when the run began.
+    since: u64,
     state: Mutex<State>,
+}
+
+/// What the first rank tells the others of the checkpoints in a folder.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Shared {
+    folder: PathBuf,
+    identity: Identity,
+    since: u64,
+    manifests: Vec<String>,
 }
 
 #[derive(Default)]
@@ -105,30 +94,79 @@ struct State {
     is_made: bool,
     /// Of the last manifest.
     number: u64,
-    entries: BTreeMap<String, Entry>,
-    /// Manifests that are kept, and the files that they name.
+    /// How many were taken by all ranks together.
+    together: u64,
+    entries: BTreeMap<String, Held>,
+    /// Manifests that are kept, with the names of what they need.
     kept: BTreeMap<u64, BTreeSet<String>>,
+    /// What the run went on from: the names of its manifests, and of all that these need.
+    manifests: Vec<String>,
+    inherited: BTreeSet<String>,
+}
+
+impl State {
+    fn of(chosen: Chosen, lock: Option<File>) -> Self {
+        let Chosen { last: number, manifests, needed: inherited, entries, .. } = chosen;
+        Self { lock, number, entries, manifests, inherited, ..Self::default() }
+    }
 }
 
 impl Checkpoints {
+    fn new(folder: &Path, identity: Identity, (rank, ranks): (usize, usize), state: State) -> Self {
+        let since = state.number;
+        Self { folder: folder.to_path_buf(), identity, rank, ranks, since, state: Mutex::new(state) }
+    }
+
     /// Those of a run that begins. The folder is made when there is something to put into it.
     ///
     /// # Errors
     /// When checkpoints of another run lie there, or one works there.
     pub fn begin(folder: &Path, identity: Identity, replace: bool) -> Result<Self> {
-        let there = numbers(folder);
-        if !there.is_empty() && !replace {
+        let are_there = Self::lie_in(folder);
+        if are_there && !replace {
             return Err(Self::would_be_lost(folder));
         }
         if folder.symlink_metadata().is_ok() && !folder.is_dir() {
             return Err(Error::usage("is no folder; name one for checkpoints").at(folder));
         }
         let state = State { lock: lock(folder)?, ..State::default() };
-        let checkpoints = Self { folder: folder.to_path_buf(), identity, state: Mutex::new(state) };
-        if !there.is_empty() {
+        let checkpoints = Self::new(folder, identity, (0, 1), state);
+        if are_there {
             checkpoints.clear();
         }
         Ok(checkpoints)
+    }
+
+    /// The same on the first of several ranks, which makes the folder and works there for all, and what it tells the others.
+    ///
+    /// # Errors
+    /// When the folder cannot be made.
+    pub fn of_first(self, ranks: usize) -> Result<(Self, Shared)> {
+        let first = Self { ranks, ..self };
+        let mut state = first.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let made = first.open(&mut state);
+        // The number of a checkpoint tells whose it is: nobody's may be below it. Nothing else has to stay.
+        first.remove(|name| !state.inherited.contains(name));
+        let manifests = std::mem::take(&mut state.manifests);
+        drop(state);
+        made.map_err(|error| Error::from_io("no checkpoint can be put there", &error).at(&first.folder))?;
+        let shared =
+            Shared { folder: first.folder.clone(), identity: first.identity.clone(), since: first.since, manifests };
+        Ok((first, shared))
+    }
+
+    /// Those of another rank than the first.
+    ///
+    /// # Errors
+    /// When what the first one found cannot be read here.
+    pub fn of_rank(shared: Shared, rank: usize, ranks: usize) -> Result<Self> {
+        let Shared { folder, identity, since, manifests } = shared;
+        let chosen = Chosen { last: since, ..read_chosen(&folder, &manifests)? };
+        Ok(Self::new(&folder, identity, (rank, ranks), State::of(chosen, None)))
+    }
+
+    fn owner(&self) -> Owner {
+        Owner::new(self.rank, self.ranks)
     }
 
     /// Who makes them.
@@ -140,7 +178,7 @@ impl Checkpoints {
     /// Whether checkpoints of a run that was ended lie in a folder.
     #[must_use]
     pub fn lie_in(folder: &Path) -> bool {
-        !numbers(folder).is_empty()
+        !manifests(folder).is_empty()
     }
 
     /// What is said where they would go without leave.
@@ -156,55 +194,31 @@ impl Checkpoints {
     /// # Errors
     /// When they are of other settings, inputs or another version, which are named, or a run works there.
     pub fn resume(folder: &Path, identity: Identity) -> Result<(Self, Found)> {
-        let mut state = State { lock: lock(folder)?, ..State::default() };
-        let mut found = Found::default();
-        for number in numbers(folder).into_iter().rev() {
-            state.number = state.number.max(number);
-            let path = folder.join(manifest_name(number));
-            let manifest = match record::read::<Manifest>(&path) {
-                Ok(manifest) => manifest,
-                Err(error) => {
-                    found.torn.push(format!("{}: {error}", path.display()));
-                    continue;
-                }
-            };
-            if let Some(difference) = difference(&manifest.identity, &identity) {
-                let what = format!(
-                    "this run is not the one that was ended: {difference}; give what was given then, or leave --resume out and choose another output"
-                );
-                return Err(Error::usage(what).at(folder));
-            }
-            // Of those before the one that is taken nothing is read.
-            if state.entries.is_empty()
-                && let Some((name, error)) =
-                    manifest.files().find_map(|file| Some((&file.name, whole(folder, file).err()?)))
-            {
-                found.torn.push(format!("{}: {error}", folder.join(name).display()));
-                continue;
-            }
-            state.kept.insert(number, manifest.needed());
-            if state.entries.is_empty() {
-                found.stages = manifest.entries.len();
-                state.entries = manifest.entries;
-            }
-        }
-        Ok((Self { folder: folder.to_path_buf(), identity, state: Mutex::new(state) }, found))
+        let lock = lock(folder)?;
+        let mut chosen = last_whole(folder, &identity)?;
+        let found = Found { stages: chosen.entries.len(), torn: std::mem::take(&mut chosen.torn) };
+        Ok((Self::new(folder, identity, (0, 1), State::of(chosen, lock)), found))
     }
 
     /// What a stage has put by.
     #[must_use]
     pub fn entry(&self, key: &str) -> Option<Kept> {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = state.entries.get(key)?;
-        let files = entry.files.iter().map(|file| self.folder.join(&file.name)).collect();
-        let links = entry.links.iter().map(|link| self.folder.join(&link.name)).collect();
-        Some(Kept { facts: entry.facts.clone(), files, links })
+        let part = |entry: &Entry| KeptPart {
+            rank: entry.rank,
+            ranks: entry.ranks,
+            facts: entry.facts.clone(),
+            files: entry.files.iter().map(|file| self.folder.join(&file.name)).collect(),
+            links: entry.links.iter().map(|link| self.folder.join(&link.name)).collect(),
+        };
+        Some(Kept { parts: state.entries.get(key)?.parts.iter().map(part).collect() })
     }
 
     /// Whether there is one, of this run or of the one that it goes on with.
     #[must_use]
     pub fn are_there(&self) -> bool {
-        !self.state.lock().unwrap_or_else(PoisonError::into_inner).kept.is_empty()
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        !state.kept.is_empty() || !state.inherited.is_empty()
     }
 
     /// What a stage has put by is of no use: the next checkpoint names nothing of it.
@@ -214,32 +228,51 @@ impl Checkpoints {
 
     /// What a stage knows now, without files: the next checkpoint tells it.
     pub fn know(&self, key: &str, facts: Vec<u8>) {
-        let entry = Entry { facts, files: Vec::new(), links: Vec::new() };
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).entries.insert(key.to_owned(), entry);
+        let held = Held::own(self.made(facts));
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).entries.insert(key.to_owned(), held);
+    }
+
+    /// What this rank knows of a stage, without files.
+    fn made(&self, facts: Vec<u8>) -> Entry {
+        Entry { rank: self.rank, ranks: self.ranks, facts, files: Vec::new(), links: Vec::new() }
     }
 
     /// Puts by what a stage knows, in place of what it did before. `goes_on` is asked between bricks, and between files that are
-    /// linked.
+    /// linked. Where all ranks do at the same time, `all` tells whether each could.
     ///
     /// # Errors
-    /// When it cannot be written, or is not to go on: then the checkpoint before stands.
+    /// When it cannot be written, or is not to go on, here or on another of these ranks: then the checkpoint before stands.
     pub fn save(
         &self,
         key: &str,
         facts: Vec<u8>,
-        (fields, linked): (&[&dyn SavedField], &[Linked]),
+        of: (&[&dyn SavedField], &[Linked]),
         goes_on: &dyn Fn() -> io::Result<()>,
+        all: Option<&dyn Fn(bool) -> io::Result<bool>>,
     ) -> io::Result<Taken> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        self.open(&mut state)?;
-        let needed = fields.iter().map(|field| field.saved_bytes()).sum();
-        self.make_room(&mut state, needed)?;
-        let taken = self.take(&mut state, key, facts, (fields, linked), goes_on);
-        if taken.is_err() {
-            // What there is of one that is not whole takes room that the run may need.
+        let needed = of.0.iter().map(|field| field.saved_bytes()).sum();
+        let opened = self.open(&mut state).and_then(|()| self.make_room(&mut state, needed));
+        let taken = opened.and_then(|()| self.take(&mut state, key, facts, of, goes_on, all.is_some()));
+        let is_whole = all.map_or(Ok(taken.is_ok()), |all| all(taken.is_ok()));
+        let adopted = match (taken, is_whole) {
+            (Ok((taken, manifest)), Ok(true)) => {
+                let mut needed = manifest.needed();
+                needed.insert(manifest_name(self.owner(), state.number));
+                let number = state.number;
+                state.kept.insert(number, needed);
+                (state.entries, state.together) = (manifest.entries, manifest.together);
+                Ok(taken)
+            }
+            (Err(error), _) | (_, Err(error)) => Err(self.explained(error, needed)),
+            (Ok(_), Ok(false)) => Err(io::Error::other("another rank could not put by its part")),
+        };
+        // Also of one that is not whole: what there is of it takes room that the run may need. What lies there without this run's lock is
+        // another one's.
+        if self.rank > 0 || state.lock.is_some() {
             self.drop_older(&mut state);
         }
-        taken.map_err(|error| self.explained(error, needed))
+        adopted
     }
 
     /// Writes a checkpoint.
@@ -250,40 +283,51 @@ impl Checkpoints {
         facts: Vec<u8>,
         (fields, linked): (&[&dyn SavedField], &[Linked]),
         goes_on: &dyn Fn() -> io::Result<()>,
-    ) -> io::Result<Taken> {
-        let number = state.number + 1;
+        is_together: bool,
+    ) -> io::Result<(Taken, Manifest)> {
+        let (owner, number) = (self.owner(), state.number + 1);
         // What a number that was not finished has left must not stand in the way of the next.
         state.number = number;
         let started = Instant::now();
-        let before = state.entries.get(key).map(|entry| entry.links.as_slice()).unwrap_or_default();
-        let links = link(&self.folder, number, before, linked, goes_on)?;
+        let is_own = |part: &&Entry| (part.rank, part.ranks) == (self.rank, self.ranks);
+        let own = state.entries.get(key).and_then(|held| held.parts.iter().find(is_own));
+        let before = own.map(|part| part.links.as_slice()).unwrap_or_default();
+        let links = link(&self.folder, (owner, number), before, linked, goes_on)?;
         let linking = started.elapsed();
         let mut files = Vec::new();
         for (n, field) in fields.iter().enumerate() {
-            let name = field_name(number, n);
-            self.put(&name, &mut |out| field.save(out, goes_on))?;
+            let name = field_name(owner, number, n);
+            put(&self.folder.join(&name), &mut |out| field.save(out, goes_on))?;
             files.push(FileOf { name, bytes: field.saved_bytes() });
         }
         let bytes = files.iter().map(|file| file.bytes).sum();
         let mut entries = state.entries.clone();
-        entries.insert(key.to_owned(), Entry { facts, files, links });
-        let manifest = Manifest { identity: self.identity.clone(), entries };
-        self.put(&manifest_name(number), &mut |out| record::write(&mut &mut *out, &manifest))?;
+        entries.insert(key.to_owned(), Held::own(Entry { files, links, ..self.made(facts) }));
+        let manifest = Manifest {
+            identity: self.identity.clone(),
+            rank: self.rank,
+            ranks: self.ranks,
+            since: self.since,
+            together: state.together + u64::from(is_together),
+            entries,
+        };
+        let name = manifest_name(owner, number);
+        put(&self.folder.join(name), &mut |out| record::write(&mut &mut *out, &manifest))?;
         // A name is safe when its folder is.
         File::open(&self.folder).and_then(|folder| folder.sync_all())?;
-        state.kept.insert(number, manifest.needed());
-        state.entries = manifest.entries;
-        self.drop_older(state);
-        Ok(Taken { bytes, linking })
+        Ok((Taken { bytes, linking }, manifest))
     }
 
     /// Sees to it that a checkpoint may fit: of those before the last one alone stays, where there is too little room for both. The
     /// disk may be that of the output, which is not to fail because of a checkpoint.
     fn make_room(&self, state: &mut State, needed: u64) -> io::Result<()> {
         let has_room = || free_space(&self.folder).is_none_or(|free| free > needed);
-        if !has_room() && state.kept.len() > 1 {
+        if !has_room() && !state.kept.is_empty() {
             while state.kept.len() > 1 {
                 state.kept.pop_first();
+            }
+            if self.ranks == 1 {
+                state.inherited.clear();
             }
             self.drop_older(state);
         }
@@ -314,54 +358,52 @@ impl Checkpoints {
                 io::Error::new(error.kind(), format!("{}: cannot be made: {error}", self.folder.display()))
             };
             fs::create_dir_all(&self.folder).map_err(failed)?;
-            state.lock = lock(&self.folder).map_err(io::Error::other)?;
-            if !numbers(&self.folder).is_empty() {
+            // The first rank works there for all.
+            state.lock = if self.rank == 0 { lock(&self.folder).map_err(io::Error::other)? } else { None };
+            if self.ranks == 1 && Self::lie_in(&self.folder) {
                 state.lock = None;
                 return Err(io::Error::other("another run has put checkpoints into the same folder meanwhile"));
             }
         }
         // What somebody has removed is not named again.
         let is_there = |name: &str| self.folder.join(name).exists();
-        state.entries.retain(|_, entry| {
-            entry.files.iter().all(|file| is_there(&file.name)) && entry.links.iter().all(|link| is_there(&link.name))
-        });
+        state.entries.retain(|_, held| held.parts.iter().flat_map(Entry::names).all(|name| is_there(name)));
         Ok(())
     }
 
-    /// Writes a file beside, flushes it, and gives it its name.
-    fn put(&self, name: &str, write: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-        let (hidden, file) = HiddenFile::create(&self.folder.join(name), "")?;
-        let mut out = BufWriter::with_capacity(BUFFER, Flowing { file, waiting: 0 });
-        write(&mut out)?;
-        out.into_inner().map_err(io::IntoInnerError::into_error)?;
-        hidden.sync()?;
-        hidden.place(true)
-    }
-
-    /// Removes what no manifest names that is kept.
+    /// Removes what no manifest names that is kept. A rank of several has made what bears its name in this run; of what was there before
+    /// others may go on.
     fn drop_older(&self, state: &mut State) {
         while state.kept.len() > KEPT {
             state.kept.pop_first();
         }
-        let is_kept = |name: &str| {
-            let is_manifest = state.kept.keys().any(|&number| name == manifest_name(number));
-            is_manifest || state.kept.values().any(|files| files.contains(name))
+        if self.ranks == 1 && state.kept.len() == KEPT {
+            state.inherited.clear();
+        }
+        let is_own = |name: &str| {
+            self.ranks == 1 || number_and_owner(name).is_some_and(|(n, of)| n > self.since && of == self.owner())
         };
-        for name in names(&self.folder).into_iter().filter(|name| !is_kept(name)) {
-            // What cannot be removed takes room and is in nobody's way.
+        let is_kept =
+            |name: &str| state.inherited.contains(name) || state.kept.values().any(|needed| needed.contains(name));
+        self.remove(|name| is_own(name) && !is_kept(name));
+    }
+
+    /// Removes files of checkpoints. What cannot be removed takes room and is in nobody's way.
+    fn remove(&self, is_to_go: impl Fn(&str) -> bool) {
+        for name in names(&self.folder).into_iter().filter(|name| is_to_go(name)) {
             let _ = fs::remove_file(self.folder.join(name));
         }
     }
 
-    /// Removes all of them, for a run that is done, and the folder where nothing else lies in it.
+    /// Removes all of them, for a run that is done, and the folder where nothing else lies in it. Of several ranks the first does.
     pub fn clear(&self) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        (state.entries, state.kept) = (BTreeMap::new(), BTreeMap::new());
+        (state.entries, state.kept, state.inherited) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
         // What lies there without this run's lock is another one's.
         if state.lock.is_none() {
             return;
         }
-        self.drop_older(&mut state);
+        self.remove(|_| true);
         remove_abandoned(&self.folder);
         let _ = fs::remove_file(self.folder.join(LOCK));
         if state.is_made || self.folder.extension().is_some_and(|ending| ending == "checkpoint") {
@@ -369,37 +411,6 @@ impl Checkpoints {
         }
         state.lock = None;
     }
-}
-
-/// A file of which the disk gets what was written while the rest still is: it is waited for in the end.
-struct Flowing {
-    file: File,
-    waiting: usize,
-}
-
-impl Write for Flowing {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.file.write(bytes)?;
-        self.waiting += written;
-        if self.waiting >= FLOW {
-            begin_writeback(&self.file);
-            self.waiting = 0;
-        }
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
-}
-
-/// Checks a file of bricks from its beginning to its end.
-fn whole(folder: &Path, file: &FileOf) -> io::Result<()> {
-    let opened = File::open(folder.join(&file.name))?;
-    if opened.metadata()?.len() != file.bytes {
-        return Err(io::Error::new(io::ErrorKind::InvalidData, "has not the length that it had"));
-    }
-    payload::check(&mut BufReader::with_capacity(BUFFER, opened), file.bytes)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::names::link_name;
+use super::names::{Owner, link_name};
 
 /// A file of the output that will not change.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub(super) struct LinkOf {
 /// `before`, and hands them to the disk. `goes_on` is asked between them.
 pub(super) fn link(
     folder: &Path,
-    number: u64,
+    (owner, number): (Owner, u64),
     before: &[LinkOf],
     linked: &[Linked],
     goes_on: &dyn Fn() -> io::Result<()>,
@@ -43,7 +43,7 @@ pub(super) fn link(
             return Ok(LinkOf { name: name.to_owned(), of: of.clone() });
         }
         goes_on()?;
-        let name = link_name(number, n);
+        let name = link_name(owner, number, n);
         second_name(path, &folder.join(&name))?;
         Ok(LinkOf { name, of: of.clone() })
     };

@@ -12,16 +12,23 @@
 //! written beside, flushed and renamed, never in place; the last two manifests are kept with what they name. A torn one is known
 //! by its checksums, and the one before is taken; what files of the output hold is looked at by the stage, which knows their
 //! checksums.
+//!
+//! Each rank of several has manifests and files of its own in the same folder. What all ranks work on they put by together, at places
+//! that all of them reach; what one has solved by itself it puts by when it likes. A later run, on any number of ranks, goes on from
+//! the last that all had put by together, with what each has added since.
 
 mod folder;
 mod identity;
+mod last_whole;
 mod links;
 mod lock;
+mod manifest;
 mod names;
 mod payload;
+mod put;
 mod record;
 
-pub use folder::{Checkpoints, Found, Kept, Taken};
+pub use folder::{Checkpoints, Found, Kept, KeptPart, Shared, Taken};
 pub use identity::{Identity, difference};
 pub use links::Linked;
 pub use payload::{SavedField, SomeBricks, restore};

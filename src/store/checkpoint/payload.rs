@@ -1,17 +1,18 @@
-//! The bricks of a field in a file: a head, then of each stored brick that was written its slot, the CRC-32C of slot and values, and
-//! its values, little-endian, as they lie in it. Of a field that has faces alone it is these.
+//! The bricks of a field in a file: a head, then of each stored brick that was written its number, the CRC-32C of number and values,
+//! and its values, little-endian, as they lie in it. Of a field that has faces alone it is these. A rank of several writes the bricks
+//! that it owns, and takes those that it owns out of the files of all.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, Write};
 
-use crate::grid::{BrickSet, FACES, Slot};
+use crate::grid::{BrickId, BrickSet, FACES, Slot};
 use crate::store::{BrickArray, Element};
 
 /// What the files begin with.
 const MAGIC: [u8; 8] = *b"slbricks";
-/// Magic, digest of the bricks that are stored, name of the type, values of a brick, bricks in the file, checksum.
+/// Magic, digest of the grid, name of the type, values of a brick, bricks in the file, checksum.
 const HEAD: usize = 8 + 4 + 8 + 8 + 8 + 4;
-/// Slot and checksum.
-const BRICK_HEAD: usize = 4 + 4;
+/// Number and checksum.
+const BRICK_HEAD: usize = 8 + 4;
 
 /// A field that can be put into a checkpoint.
 pub trait SavedField: Sync {
@@ -85,8 +86,9 @@ fn save<T: Element>(
         } else {
             field.read(slot, |values| T::append_bytes(values, &mut bytes));
         }
-        out.write_all(&slot.to_le_bytes())?;
-        out.write_all(&checksum(slot, &bytes).to_le_bytes())?;
+        let id = field.set().id(slot);
+        out.write_all(&id.to_le_bytes())?;
+        out.write_all(&checksum(id, &bytes).to_le_bytes())?;
         out.write_all(&bytes)?;
     }
     Ok(())
@@ -97,8 +99,8 @@ fn written<T: Element>(field: &BrickArray<T>) -> impl Iterator<Item = Slot> + '_
     field.set().owned().filter(|&slot| field.unwritten(slot).is_none())
 }
 
-fn checksum(slot: Slot, bytes: &[u8]) -> u32 {
-    crc32c::crc32c_append(crc32c::crc32c(&slot.to_le_bytes()), bytes)
+fn checksum(id: BrickId, bytes: &[u8]) -> u32 {
+    crc32c::crc32c_append(crc32c::crc32c(&id.to_le_bytes()), bytes)
 }
 
 fn head<T: Element>(field: &BrickArray<T>, count: u64) -> Vec<u8> {
@@ -114,13 +116,11 @@ fn head<T: Element>(field: &BrickArray<T>, count: u64) -> Vec<u8> {
     head
 }
 
-/// What tells one set of bricks from others.
+/// What tells one grid of bricks from others.
 fn digest(set: &BrickSet) -> u32 {
     let grid = set.grid();
-    let numbers =
-        grid.shape().into_iter().chain([grid.edge(), i64::from(set.owned().start), i64::from(set.owned().end)]);
-    let start = numbers.fold(0, |sum, number| crc32c::crc32c_append(sum, &number.to_le_bytes()));
-    set.ids().fold(start, |sum, id| crc32c::crc32c_append(sum, &id.to_le_bytes()))
+    let numbers = grid.shape().into_iter().chain([grid.edge()]);
+    numbers.fold(0, |sum, number| crc32c::crc32c_append(sum, &number.to_le_bytes()))
 }
 
 /// Goes through a file of bricks and checks it.
@@ -148,34 +148,38 @@ pub(super) fn check(from: &mut dyn Read, bytes: u64) -> io::Result<()> {
     Ok(())
 }
 
-/// A brick's slot and its bytes out of a record whose checksum fits.
-fn take(record: &[u8]) -> io::Result<(Slot, &[u8])> {
-    let slot = Slot::from_le_bytes([record[0], record[1], record[2], record[3]]);
-    let bytes = &record[BRICK_HEAD..];
-    if record[4..8] != checksum(slot, bytes).to_le_bytes() {
+/// A brick's number and its bytes out of a record whose checksum fits.
+fn take(record: &[u8]) -> io::Result<(BrickId, &[u8])> {
+    let (head, bytes) = record.split_at(BRICK_HEAD);
+    let id = number(&head[..8]);
+    if head[8..] != checksum(id, bytes).to_le_bytes() {
         return Err(damaged("is damaged: the checksum of a brick does not fit"));
     }
-    Ok((slot, bytes))
+    Ok((id, bytes))
 }
 
-/// Puts the bricks of a file back where they were, with their faces where the field has some; others stay as they are.
+/// Puts the bricks of a file that the field owns back where they were, with their faces where the field has some; others stay as they
+/// are. Returns how many these were, and how many the file has.
 ///
 /// # Errors
 /// When the file is cut short or damaged, or is that of another field.
-pub fn restore<T: Element>(field: &BrickArray<T>, from: &mut dyn Read) -> io::Result<()> {
+pub fn restore<T: Element>(field: &BrickArray<T>, from: &mut (impl Read + Seek)) -> io::Result<[u64; 2]> {
     let mut there = [0; HEAD];
     from.read_exact(&mut there)?;
     let count = number(&there[28..36]);
     if there[..] != head(field, count)[..] {
         return Err(damaged("is of another field than that of this run"));
     }
-    let mut record = vec![0; BRICK_HEAD + values_of(field) * size_of::<T>()];
+    let (mut restored, mut record) = (0, vec![0; BRICK_HEAD + values_of(field) * size_of::<T>()]);
     for _ in 0..count {
-        from.read_exact(&mut record)?;
-        let (slot, bytes) = take(&record)?;
-        if !field.set().owned().contains(&slot) {
-            return Err(damaged("names a brick that the field has not"));
-        }
+        from.read_exact(&mut record[..BRICK_HEAD])?;
+        let Some(slot) = field.set().own_slot(number(&record[..8])) else {
+            from.seek_relative((record.len() - BRICK_HEAD) as i64)?;
+            continue;
+        };
+        from.read_exact(&mut record[BRICK_HEAD..])?;
+        let (_, bytes) = take(&record)?;
+        restored += 1;
         if is_faces_alone(field) {
             field.write_faces(slot, |values| T::fill_from_bytes(values, bytes));
             continue;
@@ -185,7 +189,7 @@ pub fn restore<T: Element>(field: &BrickArray<T>, from: &mut dyn Read) -> io::Re
             field.refresh_faces(slot);
         }
     }
-    Ok(())
+    Ok([restored, count])
 }
 
 fn number(bytes: &[u8]) -> u64 {
@@ -198,6 +202,7 @@ fn damaged(what: &str) -> io::Error {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
     use std::sync::Arc;
 
     use super::*;
@@ -223,7 +228,7 @@ mod tests {
         before.save(&mut file, &|| Ok(())).unwrap();
         assert_eq!(file.len() as u64, before.saved_bytes());
         check(&mut file.as_slice(), file.len() as u64).unwrap();
-        restore(&after, &mut file.as_slice()).unwrap();
+        assert_eq!(restore(&after, &mut Cursor::new(&file)).unwrap(), [3; 2]);
         for slot in before.set().owned() {
             assert_eq!(after.unwritten(slot), before.unwritten(slot));
             before.read(slot, |from| after.read(slot, |to| assert!(before.unwritten(slot).is_some() || from == to)));
@@ -242,7 +247,7 @@ mod tests {
         some.save(&mut file, &|| Ok(())).unwrap();
         assert_eq!(file.len() as u64, some.saved_bytes());
         check(&mut file.as_slice(), file.len() as u64).unwrap();
-        restore(&after, &mut file.as_slice()).unwrap();
+        assert_eq!(restore(&after, &mut Cursor::new(&file)).unwrap(), [2; 2]);
         for slot in before.set().owned() {
             let is_back = [1, 3].contains(&slot);
             assert_eq!(after.unwritten(slot).is_none(), is_back, "{slot}");
@@ -261,12 +266,40 @@ mod tests {
         before.save(&mut file, &|| Ok(())).unwrap();
         assert_eq!(file.len() as u64, before.saved_bytes());
         check(&mut file.as_slice(), file.len() as u64).unwrap();
-        restore(&after, &mut file.as_slice()).unwrap();
+        assert_eq!(restore(&after, &mut Cursor::new(&file)).unwrap(), [1; 2]);
         assert_eq!((after.unwritten(2), after.unwritten(1)), (None, Some(9.0)));
         for (n, face) in FACES.into_iter().enumerate() {
             after.read_face(2, face, |values| {
                 assert_eq!((values[0], values[255]), ((n * 256) as f32, (n * 256 + 255) as f32));
             });
+        }
+    }
+
+    /// What ranks own of a field, put by, comes back on any number of ranks.
+    #[test]
+    fn ranks_take_their_bricks_out_of_the_files_of_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let scratch = Scratch::new(dir.path(), 1 << 30);
+        let whole = field(&scratch).set().clone();
+        let part = |owned: std::ops::Range<BrickId>| {
+            let set = Arc::new(whole.part(&owned, &FACES.map(crate::grid::Face::offset)));
+            BrickArray::blank(&scratch, &set, 9.0_f32).unwrap()
+        };
+        let mut files = Vec::new();
+        for owned in [0..5, 5..12] {
+            let field = part(owned);
+            field.set().owned().for_each(|slot| field.write(slot, |brick| brick.fill(field.set().id(slot) as f32)));
+            let mut file = Vec::new();
+            field.save(&mut file, &|| Ok(())).unwrap();
+            files.push(file);
+        }
+        for owned in [0..12, 0..3, 3..9, 9..12] {
+            let field = part(owned);
+            let restored: u64 = files.iter().map(|file| restore(&field, &mut Cursor::new(file)).unwrap()[0]).sum();
+            assert_eq!(restored, field.set().owned().len() as u64);
+            for slot in field.set().owned() {
+                field.read(slot, |brick| assert!(brick.iter().all(|&value| value == field.set().id(slot) as f32)));
+            }
         }
     }
 
@@ -283,9 +316,11 @@ mod tests {
             damaged[at] ^= 1 << (at % 8);
             let is_seen = check(&mut damaged.as_slice(), damaged.len() as u64).is_err();
             assert!(is_seen, "a bit of byte {at}");
-            assert!(restore(&field(&scratch), &mut damaged.as_slice()).is_err(), "a bit of byte {at}");
+            let is_seen =
+                restore(&field(&scratch), &mut Cursor::new(damaged)).map_or(true, |[restored, _]| restored < 1);
+            assert!(is_seen, "a bit of byte {at}");
             assert!(check(&mut &whole[..at], at as u64).is_err(), "cut at {at}");
-            assert!(restore(&field(&scratch), &mut &whole[..at]).is_err(), "cut at {at}");
+            assert!(restore(&field(&scratch), &mut Cursor::new(&whole[..at])).is_err(), "cut at {at}");
         }
     }
 }

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::exec::Engine;
-use crate::exec::ending::check_ended_anywhere;
+use crate::exec::save_points::ending::{check_ended_anywhere, check_ended_on_ranks};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry, NO_SOURCE, PointBins};
 use crate::kernel::distance::state::neighbours::Neighbours;
-use crate::pipeline::distance::{Method, Options, Schedule, Sources, solve};
+use crate::pipeline::distance::{Method, Options, Reads, Schedule, Sources, solve_watched};
 
 const SHAPE: [i64; 3] = [60, 50, 55];
 
-/// Values and sources of all voxels, as bits.
+/// Values and sources of all voxels, as bits; every rank reads all.
 fn solved(engine: &Engine, method: Method, schedule: Schedule, options: Options) -> Result<(Vec<u32>, Vec<u32>)> {
     let geometry = Geometry::new(SHAPE, [1.0, 1.1, 0.9], [0.0; 3]);
     let cloud: Vec<[f64; 3]> = (0..40)
@@ -21,8 +21,9 @@ fn solved(engine: &Engine, method: Method, schedule: Schedule, options: Options)
     let bins = PointBins::new(*set.grid(), &geometry, &cloud);
     let stage = engine.resumable_stage("distance", 0);
     let sources = Sources::cloud(&geometry, &cloud, &bins);
-    let solved = solve::<f32>(&stage, &sources, &set, method, schedule, options)?;
     let part = Box3::from_shape(SHAPE);
+    let reads = Reads { boxes: &[part], ..Reads::default() };
+    let solved = solve_watched::<f32>(&stage, &sources, &set, (method, schedule), options, reads)?;
     let (mut values, mut nearest) = (vec![0.0; part.len()], vec![NO_SOURCE; part.len()]);
     solved.values.read_box(&part, &mut values)?;
     solved.sources.read_box(&part, &mut nearest)?;
@@ -30,23 +31,42 @@ fn solved(engine: &Engine, method: Method, schedule: Schedule, options: Options)
     Ok((values.into_iter().map(f32::to_bits).collect(), nearest))
 }
 
-#[test]
-fn a_distance_that_is_ended_anywhere_goes_on_with_the_same_bits() {
+type Run = (Method, Schedule, Neighbours, bool);
+
+fn runs() -> Vec<Run> {
     let sweep = Schedule::Sweep { iterations: 3 };
-    let all = (Method::VDT, Schedule::Front, Neighbours::All, true);
     let faces = |method, schedule, sources| (method, schedule, Neighbours::Faces, sources);
-    let runs = [
-        all,
+    vec![
+        (Method::VDT, Schedule::Front, Neighbours::All, true),
         faces(Method::VDT, Schedule::Front, true),
         faces(Method::FSM, Schedule::Front, false),
         faces(Method::FSM, Schedule::Front, true),
         faces(Method::FSM, sweep, false),
         faces(Method::FSM, sweep, true),
         faces(Method::VDT, sweep, true),
-    ];
-    for run in runs {
+    ]
+}
+
+fn options(neighbours: Neighbours, sources: bool) -> Options {
+    Options { neighbours, sources, ..Options::up_to(f64::INFINITY) }
+}
+
+#[test]
+fn a_distance_that_is_ended_anywhere_goes_on_with_the_same_bits() {
+    for run in runs() {
         let (method, schedule, neighbours, sources) = run;
-        let options = Options { neighbours, sources, ..Options::up_to(f64::INFINITY) };
+        let options = options(neighbours, sources);
         check_ended_anywhere(&format!("{run:?}"), 6, 1.0, &|engine| solved(engine, method, schedule, options));
+    }
+}
+
+#[test]
+fn a_distance_that_ranks_were_ended_in_goes_on_with_the_same_bits_on_other_numbers_of_them() {
+    for run in runs() {
+        let (method, schedule, neighbours, sources) = run;
+        let options = options(neighbours, sources);
+        let solved = |engine: &Engine| solved(engine, method, schedule, options);
+        let resumed = check_ended_on_ranks(&format!("{run:?}"), 5, &solved);
+        assert!(resumed >= 4, "{run:?}: {resumed} of 8 had something to go on from");
     }
 }

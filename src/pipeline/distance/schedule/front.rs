@@ -14,7 +14,7 @@ use super::passing::{Passing, Watch};
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Place, Reach, Relax, SavePoint, Stage, Until, Waves, Workers};
 use crate::exec::{checkerboard, corner_colours};
-use crate::grid::{Box3, BrickSet, FACES, NEIGHBOURS_26, Slot};
+use crate::grid::{Box3, BrickId, BrickSet, FACES, NEIGHBOURS_26, Slot};
 use crate::kernel::distance::state::method::DistanceMethod;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::tile_order::arrival::{outgoing, outgoing_anywhere};
@@ -67,7 +67,7 @@ pub(crate) fn advance_front<M: DistanceMethod>(
     for &slot in start {
         (front.arrival[slot as usize], front.unsent[slot as usize]) = (0.0, true);
     }
-    let within = front.resume()?;
+    let within = front.resume(exchange)?;
     let workers = &Workers::new(move || (HaloTile::new(edge), M::work(edge)));
     let width = ROUND_WIDTH * edge as f64 * spacing.iter().copied().fold(f64::INFINITY, f64::min);
     let waves = Waves { stage, exchange, workers, waves: &waves };
@@ -102,33 +102,49 @@ struct Front<'a, M: DistanceMethod> {
     save_point: Option<SavePoint<'a>>,
 }
 
-/// What the front knows beside its field.
+/// What the front of a rank knows beside its field, of the bricks that the rank owns.
 #[derive(Serialize, Deserialize)]
 struct Known {
     rounds: u64,
     /// The round that is under way; between two there is none.
     within: Option<Place>,
-    arrival: Vec<f64>,
-    unsent: Vec<bool>,
+    /// Bricks that something enters, and the smallest value that does.
+    due: Vec<(BrickId, f64)>,
+    unsent: Vec<BrickId>,
 }
 
 /// The smallest value that enters each brick beside one, in the order of `offsets`; infinite where none does.
 type Outgoing = [f64; NEIGHBOURS_26.len()];
 
 impl<M: DistanceMethod> Front<'_, M> {
-    /// Goes on where an earlier run was ended, and returns where in a round that was: the field, and what is due, are all that what
-    /// comes depends on. Bricks that had come to rest before that run ended are not shown as passed again; they are read out at
-    /// the end.
-    fn resume(&mut self) -> Result<Option<Place>> {
+    /// Goes on where an earlier run was ended, on as many ranks as that had, and returns where in a round that was: the field, and what
+    /// is due, are all that what comes depends on. Bricks that had come to rest before that run ended are not shown as passed again; they
+    /// are read out at the end.
+    fn resume(&mut self, exchange: &Exchange<'_>) -> Result<Option<Place>> {
         let Some(saved) = self.save_point.as_ref().and_then(SavePoint::saved) else { return Ok(None) };
-        let known: Known = saved.facts()?;
+        let (set, mut within) = (self.array.set().clone(), None);
+        self.arrival.fill(f64::INFINITY);
+        self.unsent.fill(false);
+        for known in saved.facts_of_all::<Known>()? {
+            // All were in the same round, and in the midst of one is a rank that is alone.
+            (self.rounds, within) = (known.rounds, known.within);
+            for (slot, arrival) in known.due.iter().filter_map(|&(id, arrival)| Some((set.own_slot(id)?, arrival))) {
+                self.arrival[slot as usize] = arrival;
+            }
+            known.unsent.iter().filter_map(|&id| set.own_slot(id)).for_each(|slot| self.unsent[slot as usize] = true);
+        }
         saved.restore(0, self.array)?;
-        (self.rounds, self.arrival, self.unsent, self.passing) = (known.rounds, known.arrival, known.unsent, None);
-        Ok(known.within)
+        exchange.faces(self.array, &set.owned().collect::<Vec<_>>())?;
+        self.passing = None;
+        Ok(within)
     }
 
     fn known(&self, within: Option<Place>) -> Known {
-        Known { rounds: self.rounds, within, arrival: self.arrival.clone(), unsent: self.unsent.clone() }
+        let set = self.array.set();
+        let due = set.owned().map(|slot| (set.id(slot), self.arrival[slot as usize]));
+        let unsent = set.owned().filter(|&slot| self.unsent[slot as usize]).map(|slot| set.id(slot));
+        let due = due.filter(|(_, arrival)| arrival.is_finite()).collect();
+        Known { rounds: self.rounds, within, due, unsent: unsent.collect() }
     }
 
     /// Between two rounds, or within one.
@@ -201,7 +217,8 @@ impl<M: DistanceMethod> Relax for Front<'_, M> {
 
     /// A brick that was visited is not due any more, so what is due tells which of a wave are still to come.
     fn pauses_after(&self) -> Option<usize> {
-        self.save_point.as_ref().map(|_| bricks_between_pauses(self.array.set()))
+        let save_point = self.save_point.as_ref().filter(|save_point| save_point.is_alone());
+        save_point.map(|_| bricks_between_pauses(self.array.set()))
     }
 
     fn paused(&mut self, at: Place) -> Result<()> {

@@ -7,7 +7,7 @@ use super::front::bricks_between_pauses;
 use crate::error::Result;
 use crate::exec::sweep_waves;
 use crate::exec::{Boundary, Exchange, HaloPlan, Place, Reach, Relax, SavePoint, Saved, Stage, Waves, Workers};
-use crate::grid::{BrickSet, FACES, Slot};
+use crate::grid::{BrickId, BrickSet, FACES, Slot};
 use crate::kernel::distance::state::method::OrderedSweeps;
 use crate::kernel::distance::state::neighbours::SWEEPS;
 use crate::store::BrickArray;
@@ -39,17 +39,17 @@ pub(crate) trait Companion<M: OrderedSweeps>: Sync {
         Ok(())
     }
 
-    /// What it knows for a checkpoint within a sweep: the fields of it, which follow that of the method, and what each brick was left
-    /// with.
-    fn known(&self) -> (Vec<&dyn SavedField>, Vec<Visit>) {
+    /// What it knows for a checkpoint within a sweep: the fields of it, which follow that of the method, and what this rank's bricks
+    /// were left with.
+    fn known(&self) -> (Vec<&dyn SavedField>, Vec<(BrickId, Visit)>) {
         (Vec::new(), Vec::new())
     }
 
-    /// Takes up what another run knew; its fields are those of a checkpoint from the `first` one on.
+    /// Takes up what another run knew; its fields are those of a checkpoint from the `first` one on. All ranks do.
     ///
     /// # Errors
-    /// When they cannot be read.
-    fn resume(&mut self, _saved: &Saved, _first: usize, _visits: Vec<Visit>) -> Result<()> {
+    /// When they cannot be read, or another rank is gone.
+    fn resume(&mut self, _saved: &Saved, _first: usize, _visits: Vec<(BrickId, Visit)>) -> Result<()> {
         Ok(())
     }
 
@@ -107,7 +107,7 @@ pub(crate) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
         sweeps.known.quiet[slot as usize] = false;
         sweeps.receive(slot, &[]);
     }
-    sweeps.resume()?;
+    sweeps.resume(exchange)?;
     stage.iterated(sweeps.known.iterations.into(), 0.0);
     while !sweeps.known.ended && sweeps.known.iterations < iterations {
         while sweeps.known.sweep < SWEEPS.len() {
@@ -132,8 +132,8 @@ pub(crate) fn sweep_all<M: OrderedSweeps, C: Companion<M>>(
     }
 }
 
-/// What sweeps know beside their fields.
-#[derive(Clone, Default, Serialize, Deserialize)]
+/// How far sweeps are.
+#[derive(Clone, Default)]
 struct Known {
     /// Iterations that are done, and sweeps of the one that is under way.
     iterations: u32,
@@ -146,6 +146,54 @@ struct Known {
     quiet: Vec<bool>,
     /// Bricks of the wave under way that were visited; before one begins there are none.
     visited: Vec<Slot>,
+    ended: bool,
+}
+
+impl Known {
+    /// What a checkpoint holds of it: the same of the bricks that this rank owns, by their numbers.
+    fn saved(&self, within: Option<Place>, set: &BrickSet, visits: Vec<(BrickId, Visit)>) -> SavedSweeps {
+        let ids = |slots: &mut dyn Iterator<Item = Slot>| slots.map(|slot| set.id(slot)).collect();
+        SavedSweeps {
+            iterations: self.iterations,
+            sweep: self.sweep,
+            changed: self.changed,
+            within,
+            due: ids(&mut set.owned().filter(|&slot| !self.quiet[slot as usize])),
+            visited: ids(&mut self.visited.iter().copied()),
+            visits,
+            ended: self.ended,
+        }
+    }
+
+    /// What ranks had put by, on those that this one owns.
+    fn of(saved: &[SavedSweeps], set: &BrickSet) -> Self {
+        let mut known = Self { quiet: vec![true; set.len()], ..Self::default() };
+        for part in saved {
+            let own = |ids: &[BrickId]| ids.iter().filter_map(|&id| set.own_slot(id)).collect::<Vec<_>>();
+            (known.iterations, known.sweep, known.within, known.ended) =
+                (part.iterations, part.sweep, part.within, part.ended);
+            known.changed |= part.changed;
+            known.visited.extend(own(&part.visited));
+            for slot in own(&part.due) {
+                known.quiet[slot as usize] = false;
+            }
+        }
+        known
+    }
+}
+
+/// What a checkpoint holds of the sweeps of a rank, beside their fields.
+#[derive(Serialize, Deserialize)]
+struct SavedSweeps {
+    iterations: u32,
+    sweep: usize,
+    changed: bool,
+    within: Option<Place>,
+    /// Bricks that are not quiet.
+    due: Vec<BrickId>,
+    visited: Vec<BrickId>,
+    /// What its bricks left with the companion.
+    visits: Vec<(BrickId, Visit)>,
     ended: bool,
 }
 
@@ -165,14 +213,15 @@ impl<M: OrderedSweeps, C: Companion<M>> Sweeps<'_, M, C> {
         SWEEPS[self.known.sweep]
     }
 
-    /// Goes on where an earlier run was ended.
-    fn resume(&mut self) -> Result<()> {
+    /// Goes on where an earlier run was ended, on as many ranks as that had.
+    fn resume(&mut self, exchange: &Exchange<'_>) -> Result<()> {
         let Some(saved) = self.save_point.as_ref().and_then(SavePoint::saved) else { return Ok(()) };
-        let (known, visits) = saved.facts()?;
+        let parts: Vec<SavedSweeps> = saved.facts_of_all()?;
+        let set = self.array.set();
         saved.restore(0, self.array)?;
-        self.companion.resume(&saved, 1, visits)?;
-        self.known = known;
-        Ok(())
+        exchange.faces(self.array, &set.owned().collect::<Vec<_>>())?;
+        self.known = Known::of(&parts, set);
+        self.companion.resume(&saved, 1, parts.into_iter().flat_map(|part| part.visits).collect())
     }
 
     /// Tells what changed since it was told last.
@@ -194,11 +243,11 @@ impl<M: OrderedSweeps, C: Companion<M>> Sweeps<'_, M, C> {
     fn with_all<R>(
         &self,
         within: Option<Place>,
-        take: impl FnOnce(&dyn Fn() -> (Known, Vec<Visit>), &[&dyn SavedField]) -> R,
+        take: impl FnOnce(&dyn Fn() -> SavedSweeps, &[&dyn SavedField]) -> R,
     ) -> R {
         let (of_companion, visits) = self.companion.known();
         let fields: Vec<&dyn SavedField> = std::iter::once(self.array as &dyn SavedField).chain(of_companion).collect();
-        take(&|| (Known { within, ..self.known.clone() }, visits.clone()), &fields)
+        take(&|| self.known.saved(within, self.array.set(), visits.clone()), &fields)
     }
 }
 
@@ -248,7 +297,8 @@ impl<M: OrderedSweeps, C: Companion<M>> Relax for Sweeps<'_, M, C> {
     }
 
     fn pauses_after(&self) -> Option<usize> {
-        self.save_point.as_ref().map(|_| bricks_between_pauses(self.array.set()))
+        let save_point = self.save_point.as_ref().filter(|save_point| save_point.is_alone());
+        save_point.map(|_| bricks_between_pauses(self.array.set()))
     }
 
     fn paused(&mut self, at: Place) -> Result<()> {

@@ -8,7 +8,7 @@ use super::sweep::{Companion, Swept, Visit};
 use super::trace::Missing;
 use crate::error::Result;
 use crate::exec::{Boundary, Exchange, HaloPlan, Reach, Saved, Stage, Until, Waves, Workers, corner_colours};
-use crate::grid::{FACES, Slot, SourceState};
+use crate::grid::{BrickId, FACES, Slot, SourceState};
 use crate::kernel::distance::methods::fast_sweeping::FastSweeping;
 use crate::kernel::distance::methods::sweep_sources::{Fell, Ghosts, SweepSources};
 use crate::kernel::distance::state::neighbours::SWEEPS;
@@ -137,14 +137,27 @@ impl<P: Precision> Companion<FastSweeping<P, f64>> for TrackedSweeps<'_> {
         Ok(())
     }
 
-    fn known(&self) -> (Vec<&dyn SavedField>, Vec<Visit>) {
-        (vec![self.states, &self.before], self.visits.clone())
+    fn known(&self) -> (Vec<&dyn SavedField>, Vec<(BrickId, Visit)>) {
+        let set = self.states.set();
+        let visits = set.owned().map(|slot| (set.id(slot), self.visits[slot as usize]));
+        (vec![self.states, &self.before], visits.filter(|(_, visit)| visit.changed || visit.left).collect())
     }
 
-    fn resume(&mut self, saved: &Saved, first: usize, visits: Vec<Visit>) -> Result<()> {
+    fn resume(&mut self, saved: &Saved, first: usize, visits: Vec<(BrickId, Visit)>) -> Result<()> {
         saved.restore(first, self.states)?;
         saved.restore(first + 1, &self.before)?;
-        self.visits = visits;
+        let set = self.states.set().clone();
+        let own: Vec<Slot> = set.owned().collect();
+        self.exchange.faces(&self.before, &own)?;
+        self.exchange.faces(self.states, &own)?;
+        self.visits.fill(Visit::default());
+        for (id, visit) in visits {
+            // Of a ghost is known whether it changed.
+            match set.own_slot(id) {
+                Some(slot) => self.visits[slot as usize] = visit,
+                None => set.slot(id).into_iter().for_each(|ghost| self.visits[ghost as usize].changed = visit.changed),
+            }
+        }
         Ok(())
     }
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use super::{Found, Search, Start, enclose, first_reach_for};
 use crate::error::Result;
 use crate::exec::Engine;
-use crate::exec::ending::check_ended_anywhere;
+use crate::exec::save_points::ending::check_ended_anywhere;
 use crate::grid::Geometry;
 use crate::pipeline::distance::Method;
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::*;
 use crate::error::Error;
-use crate::exec::ending::check_ended_anywhere;
+use crate::exec::save_points::ending::check_ended_anywhere;
 use crate::exec::{Budget, Cancel, Engine, Progress, SavePoints};
 use crate::grid::Geometry;
 use crate::io::ome_zarr::{Compression, Content, ImageSpec, StoreWriter};

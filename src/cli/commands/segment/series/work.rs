@@ -46,7 +46,7 @@ impl Work {
         };
         // From here on others find that somebody works there, and `--resume` whose times these are.
         let failed = |e: std::io::Error| Error::from_io("cannot make the folder of the checkpoints", &e).at(&folder);
-        checkpoints.save(TIMES, Vec::new(), (&[], &[]), &|| Ok(())).map_err(failed)?;
+        checkpoints.save(TIMES, Vec::new(), (&[], &[]), &|| Ok(()), None).map_err(failed)?;
         let path = folder.join(TIMES);
         if !output.survive.resume && path.exists() {
             fs::remove_dir_all(&path).map_err(failed)?;

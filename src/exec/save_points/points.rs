@@ -2,25 +2,24 @@
 //!
 //! A stage that can be gone on with asks for a [`SavePoint`] when it begins and tells it whenever what it has is consistent: at
 //! the end of a round, of a time step, of itself. There a checkpoint is taken if it is time for one, if a signal asked for it,
-//! or before the run ends by SIGTERM.
+//! or before the run ends by SIGTERM. Where several ranks work on a stage all of them tell at the same places, and take one together; what
+//! a rank does by itself it puts by without the others.
 
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::{self, BufReader};
-use std::path::PathBuf;
+use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 
-use super::cancel::Cancel;
-use super::progress::heard::Progress;
+use super::saved::Saved;
 use crate::error::{Error, ErrorKind, Result};
+use crate::exec::cancel::Cancel;
+use crate::exec::comm::messages::{Comm, SelfComm};
+use crate::exec::progress::heard::Progress;
 use crate::grid::digits::bytes;
-use crate::store::checkpoint::{Checkpoints, Identity, Kept, Linked, SavedField, Taken, pack, restore, unpack};
-use crate::store::{BrickArray, Element};
+use crate::store::checkpoint::{Checkpoints, Identity, Linked, SavedField, Taken, pack};
 
 /// How often checkpoints are taken where nobody says.
 const EVERY: Duration = Duration::from_mins(10);
@@ -88,7 +87,7 @@ impl SavePoints {
     }
 
     /// A run that was asked to end, and does so, says which checkpoint there is, where none was taken then.
-    pub(super) fn tell_of_last(&self, progress: &dyn Progress) {
+    pub(in crate::exec) fn tell_of_last(&self, progress: &dyn Progress) {
         if self.is_answered.swap(true, Relaxed) {
             return;
         }
@@ -104,44 +103,39 @@ impl SavePoints {
     ///
     /// # Errors
     /// Of the work, and when the run is to end.
-    pub(super) fn after<R>(
+    pub(in crate::exec) fn after<R>(
         &self,
         stage: &str,
         field: &dyn SavedField,
-        (cancel, progress): (&Cancel, &dyn Progress),
+        by: By<'_>,
         work: impl FnOnce() -> Result<R>,
     ) -> Result<R> {
         let key = format!("{stage} #1");
         let left = self.left.lock().unwrap_or_else(PoisonError::into_inner).remove(&key);
         let Some(Left { facts, stands }) = left else { return work() };
-        let mut save_point = self.begin_as(key, false, cancel, progress);
+        let mut save_point = self.begin_as(key, false, by);
         save_point.stands = stands;
         save_point.step_packed(|| Ok(facts), &[field], work)
     }
 
     /// The save point of a stage that begins.
-    pub(super) fn begin<'a>(&'a self, name: &str, cancel: &'a Cancel, progress: &'a dyn Progress) -> SavePoint<'a> {
+    pub(in crate::exec) fn begin<'a>(&'a self, name: &str, by: By<'a>) -> SavePoint<'a> {
         let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
         let count = stages.entry(name.to_owned()).or_default();
         *count += 1;
-        self.begin_as(format!("{name} #{count}"), false, cancel, progress)
+        self.begin_as(format!("{name} #{count}"), false, by)
     }
 
     /// That of a stage which is a part of what has one: it goes by the name that [`SavePoint::part`] gives it.
-    pub(super) fn begin_part<'a>(&'a self, key: &str, cancel: &'a Cancel, progress: &'a dyn Progress) -> SavePoint<'a> {
-        self.begin_as(key.to_owned(), true, cancel, progress)
+    pub(in crate::exec) fn begin_part<'a>(&'a self, key: &str, by: By<'a>) -> SavePoint<'a> {
+        self.begin_as(key.to_owned(), true, by)
     }
 
-    fn begin_as<'a>(
-        &'a self,
-        key: String,
-        is_part: bool,
-        cancel: &'a Cancel,
-        progress: &'a dyn Progress,
-    ) -> SavePoint<'a> {
-        cancel.begin_saving();
+    fn begin_as<'a>(&'a self, key: String, is_part: bool, by: By<'a>) -> SavePoint<'a> {
+        by.cancel.begin_saving();
         let (wishes, stands) = (self.wishes.load(Relaxed), self.checkpoints.entry(&key).is_some());
-        SavePoint { points: self, cancel, progress, key, is_part, stands, last: Instant::now(), wishes }
+        let rank = (by.comm.rank(), by.comm.ranks());
+        SavePoint { points: self, by, rank, key, is_part, is_alike: false, stands, last: Instant::now(), wishes }
     }
 
     /// How often a checkpoint was asked for.
@@ -169,12 +163,29 @@ impl SavePoints {
     }
 }
 
+/// Whose stage it is: what ends it, who hears of it, and the ranks that work on it.
+#[derive(Clone, Copy)]
+pub(in crate::exec) struct By<'a> {
+    pub(in crate::exec) cancel: &'a Cancel,
+    pub(in crate::exec) progress: &'a dyn Progress,
+    pub(in crate::exec) comm: &'a dyn Comm,
+}
+
+/// What somebody wants at a place where a checkpoint can be taken; of what ranks want the largest counts. What is larger is the end, by
+/// the signal of a number smaller by that.
+const NOTHING: f64 = 0.0;
+const DUE: f64 = 1.0;
+const WISHED: f64 = 2.0;
+
 /// Where a stage puts by what it has solved.
 pub struct SavePoint<'a> {
     points: &'a SavePoints,
-    cancel: &'a Cancel,
-    progress: &'a dyn Progress,
+    by: By<'a>,
+    /// This rank, of how many.
+    rank: (usize, usize),
     key: String,
+    /// All ranks have the same fields: the first one puts them by.
+    is_alike: bool,
     /// It belongs to another one, which puts by what it ends with.
     is_part: bool,
     /// A checkpoint holds what was there when this was reached last.
@@ -184,8 +195,29 @@ pub struct SavePoint<'a> {
 }
 
 impl SavePoint<'_> {
+    /// Of a stage whose fields all ranks have alike.
+    #[must_use]
+    pub fn alike(mut self) -> Self {
+        self.is_alike = true;
+        self
+    }
+
+    /// Of a stage of which each rank puts by what it has done without the others, though all work on it: it is gone on with by the same rank
+    /// of as many.
+    #[must_use]
+    pub fn each(mut self) -> Self {
+        self.by.comm = &SelfComm;
+        self
+    }
+
+    /// Whether one rank works on the stage, and may put by what it has wherever it is.
+    #[must_use]
+    pub fn is_alone(&self) -> bool {
+        self.by.comm.ranks() == 1
+    }
+
     /// What the save point of a part of this is called.
-    pub(super) fn part(&self, what: &str) -> String {
+    pub(in crate::exec) fn part(&self, what: &str) -> String {
         format!("{}, {what}", self.key)
     }
 
@@ -225,14 +257,15 @@ impl SavePoint<'_> {
         fields: &[&dyn SavedField],
         work: impl FnOnce() -> Result<R>,
     ) -> Result<R> {
-        self.cancel.go_no_farther();
+        self.by.cancel.go_no_farther();
         let done = work();
-        self.cancel.go_on();
+        self.by.cancel.go_on();
         let is_ended = |error: &Error| matches!(error.kind(), ErrorKind::Interrupted { .. });
-        if self.cancel.is_saving() && done.as_ref().is_err_and(is_ended) {
+        // Others may be in the midst of theirs, and cannot be asked to come along.
+        if self.is_alone() && self.by.cancel.is_saving() && done.as_ref().is_err_and(is_ended) {
             if self.stands {
                 self.points.is_answered.store(true, Relaxed);
-                self.progress.note("the last checkpoint holds what this stage began with; --resume goes on from it");
+                self.by.progress.note("the last checkpoint holds what this stage began with; --resume goes on from it");
             } else {
                 self.reached_packed(false, || Ok((facts()?, Vec::new())), fields)?;
             }
@@ -255,13 +288,14 @@ impl SavePoint<'_> {
     /// What the stage had put by in the run that this one goes on with.
     #[must_use]
     pub fn saved(&self) -> Option<Saved> {
-        self.points.checkpoints.entry(&self.key).map(Saved)
+        let kept = self.points.checkpoints.entry(&self.key)?;
+        Some(Saved::new(kept, self.rank.0, self.rank.1))
     }
 
     /// Whether the run is to end with the next checkpoint.
     #[must_use]
     pub fn is_last(&self) -> bool {
-        self.cancel.is_asked()
+        self.by.cancel.is_asked()
     }
 
     /// What the stage had put by is of no use to it: it begins anew, and says why.
@@ -273,7 +307,7 @@ impl SavePoint<'_> {
     /// Tells the user one line about the stage.
     pub fn note(&self, line: &str) {
         let name = self.key.split(" #").next().unwrap_or_default();
-        self.progress.note(&format!("{name}: {line}"));
+        self.by.progress.note(&format!("{name}: {line}"));
     }
 
     /// What the stage has is consistent: a checkpoint is taken if it is time, and at its end if it is not too dear.
@@ -312,17 +346,27 @@ impl SavePoint<'_> {
         known: impl FnOnce() -> io::Result<(Vec<u8>, Vec<Linked>)>,
         fields: &[&dyn SavedField],
     ) -> Result<()> {
-        let (is_last, wishes) = (self.cancel.is_asked(), self.points.wishes());
-        let is_wished = wishes != self.wishes;
-        if !is_last && !is_wished && !self.is_due(ended, fields) {
+        let wishes = self.points.wishes();
+        let wanted = self.by.comm.agree(self.wanted(ended, wishes, fields), f64::max)?;
+        if wanted <= NOTHING {
             self.stands = false;
             return Ok(());
         }
-        self.cancel.check()?;
+        let (is_wished, is_last) = (wanted >= WISHED, wanted > WISHED);
+        if is_last {
+            self.by.cancel.ask((wanted - WISHED) as usize);
+        }
+        self.by.cancel.check()?;
         let started = Instant::now();
-        let goes_on = || self.cancel.check().map_err(io::Error::other);
-        let saved = known()
-            .and_then(|(facts, linked)| self.points.checkpoints.save(&self.key, facts, (fields, &linked), &goes_on));
+        let goes_on = || self.by.cancel.check().map_err(io::Error::other);
+        let all = |is_whole: bool| Ok(!self.by.comm.any(!is_whole).map_err(io::Error::other)?);
+        let all: Option<&dyn Fn(bool) -> io::Result<bool>> = if self.by.comm.ranks() > 1 { Some(&all) } else { None };
+        let fields = if self.is_alike && self.rank.0 > 0 { &[] } else { fields };
+        let saved = match known() {
+            Ok((facts, linked)) => self.points.checkpoints.save(&self.key, facts, (fields, &linked), &goes_on, all),
+            // The others wait for this rank's word.
+            Err(error) => all.map_or(Ok(true), |all| all(false)).and(Err(error)),
+        };
         let Taken { bytes: written, linking } = *saved.as_ref().unwrap_or(&Taken::default());
         // What is flushed of the output is no cost of checkpoints: it has to reach the disk.
         self.points.spend(started.elapsed().saturating_sub(linking), written);
@@ -332,7 +376,7 @@ impl SavePoint<'_> {
             Ok(_) if is_last || is_wished => {
                 // What is linked to fields and shards that lie on the disk already takes none.
                 let of = if written > 0 { format!(" of {}", bytes(written)) } else { String::new() };
-                self.progress.note(&format!("a checkpoint{of} was taken; --resume goes on from it"));
+                self.by.progress.note(&format!("a checkpoint{of} was taken; --resume goes on from it"));
             }
             Ok(_) => {}
             Err(error) => {
@@ -341,16 +385,26 @@ impl SavePoint<'_> {
                     (_, true) => "no checkpoint could be taken, before the end",
                     _ => "no checkpoint could be taken, the run goes on without",
                 };
-                let is_late = is_last && self.cancel.check().is_err();
+                let is_late = is_last && self.by.cancel.check().is_err();
                 let why =
                     if is_late { "it takes longer than a run that is ended has".into() } else { error.to_string() };
                 // One that was asked for is answered each time.
                 if self.points.is_new(error.kind()) || is_wished || is_last {
-                    self.progress.note(&format!("{what}: {why}"));
+                    self.by.progress.note(&format!("{what}: {why}"));
                 }
             }
         }
-        self.cancel.end()
+        self.by.cancel.end()
+    }
+
+    /// What is wanted on this rank.
+    fn wanted(&self, ended: bool, wishes: usize, fields: &[&dyn SavedField]) -> f64 {
+        match self.by.cancel.signal() {
+            0 if wishes != self.wishes => WISHED,
+            0 if self.is_due(ended, fields) => DUE,
+            0 => NOTHING,
+            signal => WISHED + signal as f64,
+        }
     }
 
     fn is_due(&self, ended: bool, fields: &[&dyn SavedField]) -> bool {
@@ -366,39 +420,6 @@ impl SavePoint<'_> {
 
 impl Drop for SavePoint<'_> {
     fn drop(&mut self) {
-        self.cancel.end_saving();
-    }
-}
-
-/// What a stage had put by.
-pub struct Saved(Kept);
-
-impl Saved {
-    /// What it knew.
-    ///
-    /// # Errors
-    /// When that is something else.
-    pub fn facts<F: DeserializeOwned>(&self) -> Result<F> {
-        unpack(&self.0.facts).map_err(|error| {
-            Error::from_io("the checkpoint cannot be understood; leave --resume out to begin anew", &error)
-        })
-    }
-
-    /// The files of the output that were whole, as they are now, in the order in which the stage named them.
-    #[must_use]
-    pub fn linked(&self) -> &[PathBuf] {
-        &self.0.links
-    }
-
-    /// Puts the bricks of its `n`-th field back.
-    ///
-    /// # Errors
-    /// When they cannot be read, or are those of another field.
-    pub fn restore<T: Element>(&self, n: usize, field: &BrickArray<T>) -> Result<()> {
-        let Some(path) = self.0.files.get(n) else { return Err(Error::failed("the checkpoint has too few fields")) };
-        let read = || restore(field, &mut BufReader::with_capacity(1 << 20, File::open(path)?));
-        read().map_err(|error| {
-            Error::from_io("the checkpoint cannot be read; leave --resume out to begin anew", &error).at(path)
-        })
+        self.by.cancel.end_saving();
     }
 }
