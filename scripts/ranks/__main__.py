@@ -1,11 +1,13 @@
 """scripts/try_ranks: random jobs on several ranks, and whether their bits are those of one.
 
 Each job is run once on one rank, then on each number of ranks as threads (`--ranks N`) and, where `mpirun` is there and the
-program was built with the feature `mpi`, as processes (`mpirun -n N`). All files of the stores must be equal but reports, and of
+program was built with the feature `mpi`, as processes (`mpirun -n N`), or as processes in two network namespaces (`--how namespaces`,
+as root), which talk as two machines do. All files of the stores must be equal but reports, and of
 these the result. Exit code 1 when anything differs, fails or hangs.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import random
@@ -16,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from . import distances, reconstructions, segments
+from . import distances, namespaces, reconstructions, segments
 
 REPORTS = {"report.json", "report.html", "checksums.txt"}
 KINDS = {"distance": distances.job, "segment": segments.job, "reconstruct": reconstructions.job}
@@ -29,7 +31,7 @@ def arguments():
     parser.add_argument("--jobs", type=int, default=20, help="how many (20)")
     parser.add_argument("--seed", type=int, default=1, help="of the jobs (1)")
     parser.add_argument("--ranks", default="2,3,5,8", help="numbers of ranks (2,3,5,8)")
-    parser.add_argument("--how", choices=["both", "threads", "mpi"], default="both", help="what ranks are (both)")
+    parser.add_argument("--how", choices=["both", "threads", "mpi", "namespaces"], default="both", help="what ranks are: threads and mpi (both)")
     parser.add_argument("--only", choices=sorted(KINDS), help="jobs of one kind alone")
     parser.add_argument("--limit", type=float, default=120, metavar="SECONDS", help="end a run after this long (120)")
     parser.add_argument("--folder", type=Path, metavar="FOLDER", help="where jobs run (a temporary folder)")
@@ -65,7 +67,10 @@ def differences(one, other):
             yield f"{name}: {'missing' if name not in other else 'other bytes' if name in one else 'only there'}"
 
 
-def launches(ranks, how, program):
+def launches(ranks, how, program, apart):
+    if apart:
+        yield f"{ranks} processes in two namespaces", lambda words: [*apart(ranks), program, *words, "--threads", "1"]
+        return
     if how != "mpi":
         yield f"{ranks} threads", lambda words: [program, *words, "--ranks", str(ranks)]
     if how != "threads" and shutil.which("mpirun"):
@@ -78,7 +83,11 @@ def main():
     given = arguments()
     program = os.environ["STRANDLINE"]
     wrong = compared = 0
-    with tempfile.TemporaryDirectory(dir=given.folder, prefix="strandline-ranks-") as folder:
+    if given.how == "namespaces" and not namespaces.can_be_made():
+        sys.exit("namespaces need root, ip, unshare and mpirun")
+    with contextlib.ExitStack() as held:
+        folder = held.enter_context(tempfile.TemporaryDirectory(dir=given.folder, prefix="strandline-ranks-"))
+        apart = held.enter_context(namespaces.joined(folder)) if given.how == "namespaces" else None
         for number in range(given.jobs):
             place = Path(folder) / str(number)
             place.mkdir()
@@ -88,7 +97,7 @@ def main():
             if code not in (0, 3):
                 print(f"job {number} ended with {code} on one rank: {said[-200:]}\n  {' '.join(words)}", flush=True)
             for ranks in map(int, given.ranks.split(",")):
-                for name, launch in launches(ranks, given.how, program):
+                for name, launch in launches(ranks, given.how, program, apart):
                     started = time.monotonic()
                     again, found, told, said = run(launch(words), place, "many.zarr", given.limit)
                     faults = list(differences(expected, found)) + (["the result"] if told != result else [])

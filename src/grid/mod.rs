@@ -7,6 +7,7 @@ pub mod digits;
 
 mod box3;
 mod brick_grid;
+mod brick_lists;
 mod brick_set;
 mod geometry;
 mod mesh;

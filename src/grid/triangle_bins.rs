@@ -1,5 +1,6 @@
 //! `TriangleBins`: the triangles of a mesh sorted by the bricks whose voxels they may fix.
 
+use super::brick_lists::{BrickLists, bricks_meeting};
 use super::{Box3, BrickGrid, BrickId, BrickSet, Geometry, TriangleMesh, VoxelTriangle};
 
 /// For each brick of a grid, the triangles that cut a cell with a corner in the brick, in order of their index.
@@ -9,9 +10,8 @@ use super::{Box3, BrickGrid, BrickId, BrickSet, Geometry, TriangleMesh, VoxelTri
 #[derive(Clone, Debug)]
 pub struct TriangleBins {
     grid: BrickGrid,
-    /// Where each brick's triangles start in `order`; a large triangle lies in many bricks.
-    starts: Vec<usize>,
-    order: Vec<u32>,
+    /// A large triangle lies in many bricks.
+    lists: BrickLists,
 }
 
 impl TriangleBins {
@@ -28,26 +28,14 @@ impl TriangleBins {
             let bricks = grid.bricks_in(&triangle.voxels());
             bricks.filter(move |&id| triangle.meets(&cells_beside(&grid.brick_box(id))))
         };
-        let mut starts = vec![0_usize; grid.len() as usize + 1];
-        for brick in (0..mesh.len()).flat_map(bricks_of) {
-            starts[brick as usize + 1] += 1;
-        }
-        for n in 1..starts.len() {
-            starts[n] += starts[n - 1];
-        }
-        let mut next = starts.clone();
-        let mut order = vec![0; starts[starts.len() - 1]];
-        for (index, brick) in (0..mesh.len()).flat_map(|n| bricks_of(n).map(move |brick| (n, brick))) {
-            order[next[brick as usize]] = index as u32;
-            next[brick as usize] += 1;
-        }
-        Self { grid, starts, order }
+        let listed = || (0..mesh.len()).flat_map(|n| bricks_of(n).map(move |brick| (brick, n as u32)));
+        Self { grid, lists: BrickLists::new(listed) }
     }
 
     /// The triangles that may fix voxels of a brick.
     #[must_use]
     pub fn of(&self, brick: BrickId) -> &[u32] {
-        &self.order[self.starts[brick as usize]..self.starts[brick as usize + 1]]
+        self.lists.of(brick)
     }
 
     /// The bricks that hold a voxel within `reach` voxels (along each axis) of the box around what some brick's
@@ -57,22 +45,15 @@ impl TriangleBins {
     /// When `mesh` is not the one that was sorted.
     #[must_use]
     pub fn bricks_within(&self, geometry: &Geometry, mesh: &TriangleMesh, reach: [i64; 3]) -> BrickSet {
-        let mut keep = vec![false; self.grid.len() as usize];
-        for brick in 0..self.grid.len() {
+        let hull = |&brick: &BrickId| {
             let own = self.grid.brick_box(brick);
             let voxels = |&n: &u32| VoxelTriangle::new(geometry, mesh.corners(n as usize)).voxels().intersect(&own);
-            let hull = self.of(brick).iter().map(voxels).reduce(|a, b| Box3 {
+            self.of(brick).iter().map(voxels).reduce(|a, b| Box3 {
                 lo: std::array::from_fn(|i| a.lo[i].min(b.lo[i])),
                 hi: std::array::from_fn(|i| a.hi[i].max(b.hi[i])),
-            });
-            let Some(hull) = hull else { continue };
-            let grown = Box3 {
-                lo: std::array::from_fn(|i| hull.lo[i] - reach[i]),
-                hi: std::array::from_fn(|i| hull.hi[i] + reach[i]),
-            };
-            self.grid.bricks_in(&grown).for_each(|id| keep[id as usize] = true);
-        }
-        BrickSet::from_fn(self.grid, |id| keep[id as usize])
+            })
+        };
+        bricks_meeting(self.grid, self.lists.bricks().iter().filter_map(hull), reach)
     }
 }
 

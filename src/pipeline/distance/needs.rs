@@ -34,8 +34,8 @@ impl Needs {
         Self { scratch: self.scratch.saturating_add(Kept::<P>::bytes(geometry, sources)), ..self }
     }
 
-    /// The same for one of so many ranks of so many threads, each of which has its part of the fields, and of some bricks of others
-    /// copies; tables are of the whole grid.
+    /// The same for one of so many ranks of so many threads, each of which has its part of the fields and their tables, and of some bricks of
+    /// others copies.
     fn of_rank(self, ranks: u64, threads: u64) -> Self {
         if ranks == 1 {
             return self;
@@ -113,7 +113,7 @@ impl DistanceSettings {
         writes: Writes,
     ) -> Needs {
         let grid = BrickGrid::new(geometry.shape, self.brick);
-        let (footprint, later) = self.footprint::<P>(geometry, sets, threads, writes);
+        let (footprint, later) = self.footprint::<P>(geometry, sets, [threads, ranks], writes);
         let seconds = self.plan::<P>(geometry, threads, writes).iter().map(|(_, seconds)| seconds).sum();
         let held = footprint.bytes(threads as u64);
         let needs = Needs { footprint, held, later, scratch: self.scratch::<P>(&grid), waiting: 0, seconds };
@@ -157,13 +157,13 @@ impl DistanceSettings {
         &self,
         geometry: &Geometry,
         sets: &DataSets,
-        threads: usize,
+        [threads, ranks]: [usize; 2],
         writes: Writes,
     ) -> (Footprint, u64) {
         let reading = self.reading::<P>(geometry, sets, threads, writes);
         if self.exact {
             let asking = work_bytes(sets.len() as u64) + EXACT_BYTES * CHUNK.min(geometry.domain().volume());
-            return (self.tables::<P>(geometry, sets).and(reading).and(Footprint::of_thread(asking)), 0);
+            return (self.tables::<P>(geometry, sets, ranks).and(reading).and(Footprint::of_thread(asking)), 0);
         }
         let solving = self.solving::<P>(geometry);
         let at_once =
@@ -173,12 +173,13 @@ impl DistanceSettings {
         } else {
             at_once.bytes(threads as u64) - solving.bytes(threads as u64)
         };
-        (self.tables::<P>(geometry, sets).and(at_once), later)
+        (self.tables::<P>(geometry, sets, ranks).and(at_once), later)
     }
 
     /// What is kept from the start to the end.
-    fn tables<P: Precision>(&self, geometry: &Geometry, sets: &DataSets) -> Footprint {
-        let bricks = BrickGrid::new(geometry.shape, self.brick).len();
+    fn tables<P: Precision>(&self, geometry: &Geometry, sets: &DataSets, ranks: usize) -> Footprint {
+        let shares = ranks > 1 && self.heap_bytes::<P>(geometry) == 0;
+        let bricks = bricks_of_rank(&BrickGrid::new(geometry.shape, self.brick), if shares { ranks as u64 } else { 1 });
         let triangles = sets.mesh.len() as u64;
         let copies = triangles * TRIANGLE_COPIES * size_of::<Triangle>() as u64;
         let inside = if self.signed { WindingTree::bytes(triangles) + triangles * CLOSED_BYTES } else { 0 };
@@ -239,4 +240,12 @@ impl DistanceSettings {
             _ => 0,
         }
     }
+}
+
+/// Bricks that a rank has and knows the faces of: its share of the grid's, and of those before and after these a layer and what is left
+/// of another one.
+fn bricks_of_rank(grid: &BrickGrid, ranks: u64) -> u64 {
+    let [nx, ny, _] = grid.counts().map(i64::unsigned_abs);
+    let beside = if ranks > 1 { 2 * (nx * ny + nx + 1) } else { 0 };
+    grid.len().min(grid.len().div_ceil(ranks) + beside)
 }
