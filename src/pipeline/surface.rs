@@ -70,6 +70,9 @@ pub fn extract(
             Ok(patch)
         })?;
         for patch in &patches {
+            if let Some(kept) = welder.enter_layer(patch) {
+                measure.forget_but(&kept);
+            }
             welder.add(patch, sink)?;
             welder.triangles_of(patch).for_each(|(corners, positions)| measure.add(corners, positions));
         }

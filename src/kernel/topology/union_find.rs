@@ -2,12 +2,10 @@
 //!
 //! The smallest number of a tree is its root, so nothing that is told of a tree depends on the order of its joins.
 
-const ABSENT: u32 = u32::MAX;
-
 /// Trees over things that are numbered from 0.
 #[derive(Clone, Debug, Default)]
 pub struct Forest {
-    /// What is above each thing, itself at a root, [`ABSENT`] before it was entered.
+    /// What is above each thing, itself at a root.
     above: Vec<u32>,
 }
 
@@ -18,29 +16,7 @@ impl Forest {
         Self { above: (0..len as u32).collect() }
     }
 
-    /// What is held in memory: a place for each thing.
-    pub(crate) fn places(&self) -> &Vec<u32> {
-        &self.above
-    }
-
-    /// Enters a thing as a tree of its own; false when it is known.
-    ///
-    /// # Panics
-    /// When its number is `u32::MAX`.
-    pub fn enter(&mut self, thing: u32) -> bool {
-        assert!(thing != ABSENT, "a number must lie below 2^32 - 1");
-        let place = thing as usize;
-        if place >= self.above.len() {
-            self.above.resize(place + 1, ABSENT);
-        }
-        let is_new = self.above[place] == ABSENT;
-        if is_new {
-            self.above[place] = thing;
-        }
-        is_new
-    }
-
-    /// The root of a thing that was entered.
+    /// The root of a thing.
     pub fn root(&mut self, mut thing: u32) -> u32 {
         loop {
             let above = self.above[thing as usize];
@@ -60,7 +36,7 @@ impl Forest {
         a != b
     }
 
-    /// The roots of all things, in order; all must have been entered.
+    /// The roots of all things, in order.
     #[must_use]
     pub fn roots(&mut self) -> Vec<u32> {
         (0..self.above.len() as u32).map(|thing| self.root(thing)).collect()
@@ -80,13 +56,5 @@ mod tests {
             assert_eq!((joined, forest.roots()), ([true; 4], vec![0, 1, 1, 1, 1, 5, 1]));
             assert!(!forest.join(2, 3));
         }
-    }
-
-    #[test]
-    fn things_are_entered_once() {
-        let mut forest = Forest::default();
-        assert_eq!([5, 0, 5].map(|thing| forest.enter(thing)), [true, true, false]);
-        assert!(forest.join(5, 0));
-        assert_eq!(forest.root(5), 0);
     }
 }

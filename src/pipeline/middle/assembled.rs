@@ -68,6 +68,9 @@ impl Takes for Whole<'_> {
 
     fn take(&mut self, (patch, gaps, bending): &MadePatch) -> Result<()> {
         self.bendings.add(bending, patch.patch.cells.lo[2]);
+        if let Some(kept) = self.welder.enter_layer(&patch.patch) {
+            self.measure.forget_but(&kept);
+        }
         self.welder.add_valued(&patch.patch, gaps, self.sink)?;
         for (n, (corners, places)) in self.welder.triangles_of(&patch.patch).enumerate() {
             self.measure.add(corners, places);

@@ -68,8 +68,8 @@ impl Survey {
         listed.sort_unstable();
         listed.dedup();
         let filled = listed.chunk_by(|a, b| a.0 == b.0).map(|labels| {
-            let id = labels[0].0;
-            Filled { labels: labels.len(), touching: faces[id as usize], voxels: grid.brick_box(id).volume() }
+            let (id, part) = (labels[0].0, grid.brick_box(labels[0].0));
+            Filled { layer: part.lo[2], labels: labels.len(), touching: faces[id as usize], voxels: part.volume() }
         });
         Ok(Self { crowded: Crowded::of(filled) })
     }

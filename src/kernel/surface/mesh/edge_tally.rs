@@ -26,6 +26,13 @@ impl EdgeTally {
         }
     }
 
+    /// Forgets edges that no later triangle has: those of which an end is none of some vertices, in order of their numbers. If their
+    /// opposite has not come, they stay open.
+    pub fn forget_but(&mut self, kept: &[u32]) {
+        let is_kept = |vertex: &u32| kept.binary_search(vertex).is_ok();
+        self.waiting.retain(|(from, to), _| is_kept(from) && is_kept(to));
+    }
+
     /// Number of edges that still lack their opposite: 0 for a closed mesh.
     #[must_use]
     pub fn open(&self) -> u64 {

@@ -23,9 +23,9 @@ pub struct Growing {
 }
 
 impl Growing {
-    /// A list; as all lists it doubles.
-    pub(super) fn of_list<T>(list: &Vec<T>) -> Self {
-        Self::new((list.capacity() * size_of::<T>()) as u64, list.len(), list.capacity())
+    /// Chunks, of which another one is made when all are full: nothing is copied but what names them.
+    pub(super) fn of_chunks(bytes: u64) -> Self {
+        Self::new(bytes, 1, 1)
     }
 
     /// A table that had so many entries at most. Where entries go as well as come it may double when it is half full: their
@@ -70,22 +70,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists_take_what_they_take_and_double_when_they_are_full() {
-        let mut list: Vec<u64> = Vec::with_capacity(64);
-        list.extend(0..60);
-        let told = Growing::of_list(&list);
+    fn what_is_full_doubles() {
+        let told = Growing::new(512, 60, 64);
         assert_eq!((told.bytes(), told.grown(1.0), told.grown(64.0 / 60.0)), (512, 512, 512));
-        (60..65).for_each(|n| list.push(n));
-        assert_eq!(told.grown(65.0 / 60.0), (list.capacity() * 8) as u64);
-        (65..600).for_each(|n| list.push(n));
-        assert_eq!(told.grown(10.0), (list.capacity() * 8) as u64);
+        assert_eq!((told.grown(65.0 / 60.0), told.grown(10.0)), (1024, 8192));
         assert_eq!(
             Growing::on_the_way(&[told, told], 65.0 / 60.0),
             1024 + 1024 + 512,
             "one of two is copied at a time"
         );
         assert_eq!(Growing::on_the_way(&[told, told], 1.0), 1024);
-        assert_eq!(Growing::of_list(&Vec::<u64>::new()).grown(1e9), 0, "nothing is known of what holds nothing");
+        assert_eq!(Growing::new(0, 0, 0).grown(1e9), 0, "nothing is known of what holds nothing");
     }
 
     /// Against the table itself, with entries that come and go as those of edges do.

@@ -77,7 +77,13 @@ impl SurfaceMeasure {
         self.components.add(corners);
     }
 
-    /// What it holds in memory: edges of the layer that is drawn, and a number for each vertex.
+    /// No vertex so far but some, in order of their numbers, is the corner of a later triangle: what is known of others is forgotten.
+    pub fn forget_but(&mut self, kept: &[u32]) {
+        self.edges.forget_but(kept);
+        self.components.forget_but(kept);
+    }
+
+    /// What it holds in memory: edges of the layer that is drawn, and a number for each of its vertices.
     #[must_use]
     pub fn tables(&self) -> [Growing; 2] {
         [self.edges.table(), self.components.table()]

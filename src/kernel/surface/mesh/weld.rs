@@ -74,7 +74,7 @@ impl Welder {
     /// # Errors
     /// As [`Welder::add`].
     pub fn add_valued(&mut self, patch: &Patch, values: &[f64], sink: &mut dyn MeshSink) -> Result<()> {
-        self.enter_layer(patch.cells.lo[2]);
+        self.enter_layer(patch);
         self.numbers.clear();
         self.world.clear();
         for (n, (&key, &position)) in patch.keys.iter().zip(&patch.positions).enumerate() {
@@ -99,13 +99,19 @@ impl Welder {
         patch.triangles.iter().map(|t| (t.map(|v| self.numbers[v as usize]), t.map(|v| self.world[v as usize])))
     }
 
-    /// Forgets what lies below a new layer of cells.
-    fn enter_layer(&mut self, layer: i64) {
+    /// Forgets what lies below the layer of cells of the next patch, where that is a new one: then the numbers of the vertices so far that
+    /// later patches may share are returned, in order.
+    pub fn enter_layer(&mut self, patch: &Patch) -> Option<Vec<u32>> {
+        let layer = patch.cells.lo[2];
         debug_assert!(layer >= self.layer, "patches must come in the order of their bricks");
-        if layer != self.layer {
-            self.shared.retain(|key, _| key.layer() >= layer);
-            self.layer = layer;
+        if layer == self.layer {
+            return None;
         }
+        self.shared.retain(|key, _| key.layer() >= layer);
+        self.layer = layer;
+        let mut kept: Vec<u32> = self.shared.values().copied().collect();
+        kept.sort_unstable();
+        Some(kept)
     }
 
     /// The number of a vertex: the one a former patch gave it, or the next one.
