@@ -52,6 +52,7 @@ impl Default for Task<'_> {
                 closest_point: false,
                 brick: method.solver::<f32>().brick,
                 exact: false,
+                timed: false,
             },
             run: Run::default(),
         }
@@ -70,7 +71,7 @@ impl Task<'_> {
         let note = |text: &str| self.run.note(&mut notes, text);
         let Gathered { sets, volume } = Gathered::new(&self.given, settings.signed, &self.run.cancel, note)?;
         let geometry = self.lay(&sets, volume)?;
-        if let Some(text) = outside_note(&geometry, &sets) {
+        if let Some(text) = outside_note(&geometry, &sets, settings.timed) {
             self.run.note(&mut notes, &text);
         }
         if self.brick.is_none() {
