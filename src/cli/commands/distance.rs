@@ -138,7 +138,7 @@ impl Job {
             console.note(&note);
         }
         if args.job.resources.brick.is_none() {
-            settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
+            settings.brick = settings.brick_for(geometry.shape);
         }
         let typed = typed.to_vec();
         Ok(Self {

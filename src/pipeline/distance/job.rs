@@ -65,11 +65,22 @@ pub struct DistanceSettings {
     pub timed: bool,
 }
 
+/// Edge of the bricks that times through an image of speeds are solved in.
+const TIMED_BRICK: i64 = 32;
+
 impl DistanceSettings {
     /// Whether anything asked for is made of sources.
     #[must_use]
     pub fn keeps_sources(&self) -> bool {
         self.labels || self.closest_point
+    }
+
+    /// Edge of the bricks that a grid is cut into where nobody asks for another.
+    #[must_use]
+    pub fn brick_for(&self, shape: [i64; 3]) -> i64 {
+        let edge = self.method.solver::<f32>().brick_for(shape);
+        // In a large brick ways that bend take many sweeps.
+        if self.timed { edge.min(TIMED_BRICK) } else { edge }
     }
 
     /// Whether labels are looked at closer, for which sources are sorted.
