@@ -67,7 +67,7 @@ fn times_lie_on_the_grid_of_the_image_and_are_told_as_times() {
     let store = bench.json("out/t.zarr/zarr.json");
     assert_eq!(store["attributes"]["ome"]["multiscales"][0]["name"], "travel time");
     bench.succeed("verify out/t.zarr --rerun");
-    let report = bench.succeed("distance a.xyz -o none --spacing 0.5");
+    let report = bench.succeed("distance a.xyz b.xyz -o none --spacing 0.5");
     assert!(report.contains("largest distance"), "{report}");
 }
 
@@ -87,7 +87,7 @@ fn ranks_threads_and_memory_change_no_bit() {
             contents(&bench.path("out/t.zarr"))
         };
         let one = run("--threads 1");
-        for flags in ["--ranks 2", "--ranks 5 --threads 5", "--threads 3 --memory 130MiB"] {
+        for flags in ["--ranks 2", "--ranks 5 --threads 5", "--threads 2 --memory 150MiB"] {
             same(&one, &run(flags), &format!("{order} {flags}"));
         }
     }

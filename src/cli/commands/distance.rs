@@ -381,7 +381,7 @@ impl Job {
     fn evidence(&self) -> Evidence<'_> {
         let middle = self.geometry.shape.map(|n| n / 2);
         Evidence {
-            root: Root::Distance,
+            root: if self.settings.timed { Root::Times } else { Root::Distance },
             measure: Measure::Thickness,
             sources: &self.sets,
             centre: self.geometry.position(middle),

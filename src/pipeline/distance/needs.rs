@@ -8,6 +8,7 @@ use crate::kernel::distance::features::exact_sources::work_bytes;
 use crate::kernel::distance::repair::descent::remembered_bytes;
 use crate::kernel::distance::seeding::outside::count_outside;
 use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::geometry::rim::Rim;
 use crate::kernel::geometry::triangle::Triangle;
 use crate::kernel::geometry::winding_number::WindingTree;
 use crate::store::VolumeSource;
@@ -97,8 +98,8 @@ const CHUNK: u64 = 64 * 64 * 64;
 const READ_SOURCE_BYTES: u64 = 4 + 4 + 24;
 /// Bytes of a voxel that is read with those around: border, source and label once more, in a box a voxel wider.
 const READ_BORDER_BYTES: u64 = 4 + 10;
-/// Bytes of a voxel whose side is told: whether it is fixed, known, inside; the flood's list.
-const READ_SIDE_BYTES: u64 = 3 + 24;
+/// Bytes of a voxel whose side is told: whether it is fixed, known, inside; the flood's lists.
+const READ_SIDE_BYTES: u64 = 3 + 2 * 24;
 /// Seconds of one thread to read out a voxel, and more where it is written: its distance, its label, a coordinate.
 const READ_SECONDS: f64 = 8e-9;
 const WRITE_SECONDS: [f64; 3] = [25e-9, 8e-9, 20e-9];
@@ -196,7 +197,11 @@ impl DistanceSettings {
         let bricks = BrickGrid::new(geometry.shape, self.brick).len();
         let triangles = sets.mesh.len() as u64;
         let copies = triangles * TRIANGLE_COPIES * size_of::<Triangle>() as u64;
-        let inside = if self.signed { WindingTree::bytes(triangles) + triangles * CLOSED_BYTES } else { 0 };
+        let inside = if self.signed {
+            WindingTree::bytes(triangles) + Rim::bytes(triangles) + triangles * CLOSED_BYTES
+        } else {
+            0
+        };
         let trees = if self.exact || self.looks_closer::<P>(sets) { tree_bytes(sets) } else { 0 };
         let outside = if count_outside(geometry, sets) > 0 { tree_bytes(sets) } else { 0 };
         let of_sources = sets.len() as u64 * SOURCE_BYTES + copies + inside + trees + outside;
