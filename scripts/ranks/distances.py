@@ -27,6 +27,22 @@ def box(rng, path):
     path.write_text("\n".join(lines) + "\n")
 
 
+def speeds(rng, path, shape):
+    """An image of speeds, rough or of a few kinds, with or without walls."""
+    voxels = rng.uniform(0.1, 3, shape[::-1]) if rng.random() < 0.5 else rng.choice([0.5, 1, 4], shape[::-1])
+    voxels[rng.random(voxels.shape) < rng.choice([0, 0.02, 0.2])] = 0
+    head = f"NRRD0004\ntype: float\ndimension: 3\nsizes: {' '.join(map(str, shape))}\nendian: little\nencoding: raw\n\n"
+    path.write_bytes(head.encode() + voxels.astype("<f4").tobytes())
+
+
+def as_times(pick, words, has_meshes):
+    """The same sources and grid for travel times."""
+    left_out = ["--signed"] + ["--closest-point"] * has_meshes
+    kept = [word for word in words if word not in left_out]
+    kept[kept.index("--method") + 1] = pick.choice(["fsm", "fmm"])
+    return kept + ["--speed", "speed.nrrd"]
+
+
 def job(pick, folder):
     """The arguments of a random distance or middle surface, whose inputs are made."""
     rng = np.random.default_rng(pick.getrandbits(32))
@@ -57,6 +73,9 @@ def job(pick, folder):
     limited = "front" in words and pick.random() < 0.25
     words += ["--max-distance", f"{pick.uniform(0.3, 2):.3g}"] if limited else []
     words += ["--ome", "0.4"] if pick.random() < 0.2 else []
+    if pick.random() < 0.25:
+        speeds(rng, folder / "speed.nrrd", shape)
+        return as_times(pick, words, any(name.endswith("obj") for name in sources))
     return as_middle(pick, words) if pick.random() < 0.4 else words
 
 

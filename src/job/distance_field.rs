@@ -3,6 +3,7 @@
 use super::field::{Field, check_part};
 use super::run::{finish_store, run_setters};
 use super::task::{Ready, Task, task_setters};
+use super::volume::Image;
 use super::words::in_builders_words;
 use crate::error::{Error, Result};
 use crate::grid::NO_SOURCE;
@@ -10,8 +11,8 @@ use crate::grid::{Box3, DataSets, Geometry};
 use crate::kernel::distance::features::source_labels;
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::geometry::triangle::Triangle;
-use crate::pipeline::distance::{DistanceFound, Kept, Writes, distance_kept};
-use crate::store::{BoxSource, BrickArray};
+use crate::pipeline::distance::{DistanceFound, Kept, Writes, distance_kept, travel_times};
+use crate::store::{BoxSource, BrickArray, Sample, VolumeSource};
 
 /// The distance to points, triangle meshes and the borders of labels.
 ///
@@ -64,6 +65,15 @@ impl<'a> DistanceField<'a> {
         self
     }
 
+    /// Not distances but travel times through a volume of speeds, which lies on a grid of its shape; that grid is then that of
+    /// the times. Each voxel holds the speed F at which a front passes it, a length by a time, 0 where nothing passes, and
+    /// `|grad T| = 1/F` is solved by [`Method::FMM`](crate::Method) or [`Method::FSM`](crate::Method). Times are infinite
+    /// where no front comes, and labels are told along the ways of the fronts.
+    pub fn speed<T: Sample + 'a>(mut self, speeds: impl BoxSource<T> + Send + 'a, grid: Geometry) -> Self {
+        self.task.speeds = Some((Box::new(Image::new(speeds)), grid));
+        self
+    }
+
     run_setters!(task.run);
 
     /// Computes the distance, in single precision.
@@ -89,11 +99,17 @@ impl<'a> DistanceField<'a> {
         let writes = if self.task.run.store.is_some() { Writes::Fields } else { Writes::Nothing };
         let needs = settings.needs::<P>(geometry, sets, [resources.threads, 1], writes);
         let needs = needs.keeping::<P>(geometry, settings.keeps_sources());
+        let speeds = self.task.speeds.as_ref().map(|(speeds, _)| speeds.as_ref() as &dyn VolumeSource);
+        let needs = speeds.map_or(needs, |speeds| needs.reading(speeds, resources.threads));
         let engine = self.task.run.engine(resources, needs.held)?;
         self.task.run.check_disk(&self.task.disk::<P>((resources, geometry, settings), &needs, false)?, notes)?;
         let store = self.task.run.begin_store()?;
         let kept = Kept::new(&engine, geometry, settings.keeps_sources())?;
-        let found = distance_kept(&engine, geometry, sets, settings, store.as_ref(), Some(&kept))?;
+        let (to, kept_to) = (store.as_ref(), Some(&kept));
+        let found = match speeds {
+            Some(speeds) => travel_times(&engine, geometry, sets, (settings, speeds), to, kept_to)?,
+            None => distance_kept(&engine, geometry, sets, settings, to, kept_to)?,
+        };
         finish_store(&engine, store)?;
         Ok(SolvedDistance::new(ready, found, kept))
     }
@@ -140,7 +156,7 @@ impl<P: Precision> SolvedDistance<P> {
         &self.notes
     }
 
-    /// The distances, lengths.
+    /// The distances, lengths; or times, through a volume of speeds.
     #[must_use]
     pub fn distance(&self) -> Field<'_, P> {
         Field::new(&self.geometry, &self.kept.values)

@@ -4,13 +4,14 @@ use super::disk::Disk;
 use super::given::{Gathered, Given};
 use super::resources::Resources;
 use super::run::Run;
-use super::volume::PlacedLabels;
+use super::volume::{PlacedLabels, check_shape};
 use crate::error::{Error, Result};
 use crate::grid::{DataSets, Geometry};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
-use crate::pipeline::distance::{DistanceSettings, Init, Method, Needs, Schedule, outside_note};
+use crate::pipeline::distance::{DistanceSettings, Init, Method, Needs, Schedule, check_timed_sources, outside_note};
 use crate::pipeline::laying::{around, check_grid, check_spacing};
+use crate::store::VolumeSource;
 
 /// What was said so far.
 pub(super) struct Task<'a> {
@@ -19,6 +20,9 @@ pub(super) struct Task<'a> {
     pub(super) spacing: Option<[f64; 3]>,
     pub(super) padding: Option<f64>,
     pub(super) brick: Option<i64>,
+    pub(super) method: Option<Method>,
+    /// What fronts go through, on its grid, where times are asked for.
+    pub(super) speeds: Option<(Box<dyn VolumeSource + Send + 'a>, Geometry)>,
     pub(super) settings: DistanceSettings,
     pub(super) run: Run,
 }
@@ -41,6 +45,8 @@ impl Default for Task<'_> {
             spacing: None,
             padding: None,
             brick: None,
+            method: None,
+            speeds: None,
             settings: DistanceSettings {
                 method,
                 schedule: Schedule::Front,
@@ -52,6 +58,7 @@ impl Default for Task<'_> {
                 closest_point: false,
                 brick: method.solver::<f32>().brick,
                 exact: false,
+                timed: false,
             },
             run: Run::default(),
         }
@@ -62,6 +69,8 @@ impl Task<'_> {
     /// Checks everything, and lays the grid.
     pub(super) fn ready<P: Precision>(&self) -> Result<Ready> {
         let mut settings = self.settings;
+        settings.timed = self.speeds.is_some();
+        settings.method = self.method.unwrap_or(if settings.timed { Method::FMM } else { settings.method });
         settings.brick = self.brick.unwrap_or(settings.method.solver::<f32>().brick);
         settings.check()?;
         let resources = self.run.resources()?;
@@ -70,11 +79,12 @@ impl Task<'_> {
         let note = |text: &str| self.run.note(&mut notes, text);
         let Gathered { sets, volume } = Gathered::new(&self.given, settings.signed, &self.run.cancel, note)?;
         let geometry = self.lay(&sets, volume)?;
-        if let Some(text) = outside_note(&geometry, &sets) {
+        if let Some(text) = outside_note(&geometry, &sets, settings.timed) {
             self.run.note(&mut notes, &text);
         }
+        check_timed_sources(&settings, &sets)?;
         if self.brick.is_none() {
-            settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
+            settings.brick = settings.brick_for(geometry.shape);
         }
         settings.check_on::<P>(&geometry, &sets)?;
         Ok(Ready { sets, geometry, settings, resources, notes })
@@ -102,6 +112,16 @@ impl Task<'_> {
 
     fn check_grid(&self) -> Result<()> {
         check_spacing("--spacing", self.spacing)?;
+        if let Some((speeds, grid)) = &self.speeds {
+            if self.grid.is_some() || self.spacing.is_some() || self.padding.is_some() {
+                return Err(Error::usage(
+                    "--speed gives the grid of the times; leave out --grid, --spacing and --padding",
+                ));
+            }
+            check_shape(speeds.shape(), grid)?;
+            check_grid(grid)?;
+            return check_spacing("the grid's spacing", Some(grid.spacing));
+        }
         let Some(grid) = &self.grid else { return Ok(()) };
         if self.spacing.is_some() || self.padding.is_some() {
             return Err(Error::usage("--grid says all of the grid; leave out --spacing and --padding"));
@@ -112,6 +132,9 @@ impl Task<'_> {
 
     /// The grid that was given, that of a label volume, or one around the sources.
     fn lay(&self, sets: &DataSets, volume: Option<Geometry>) -> Result<Geometry> {
+        if let Some((_, grid)) = &self.speeds {
+            return Ok(grid.clone());
+        }
         let volume = volume.filter(|_| self.spacing.is_none() && self.padding.is_none());
         if let Some(grid) = self.grid.clone().or(volume) {
             return Ok(grid);
@@ -173,9 +196,9 @@ macro_rules! task_setters {
             self
         }
 
-        /// The method; the vector distance transform where this is left out.
+        /// The method; where this is left out the vector distance transform, or fast marching through a volume of speeds.
         pub fn method(mut self, method: $crate::pipeline::distance::Method) -> Self {
-            self.task.settings.method = method;
+            self.task.method = Some(method);
             self
         }
 

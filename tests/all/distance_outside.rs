@@ -79,6 +79,7 @@ pub(crate) fn settings(method: Method, schedule: Schedule, brick: i64) -> Distan
         closest_point: false,
         brick,
         exact: false,
+        timed: false,
     }
 }
 

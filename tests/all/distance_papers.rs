@@ -104,6 +104,7 @@ fn pair(lab: &Lab, h: f64, method: Method, schedule: Schedule, init: Init, label
         closest_point: false,
         brick: 32,
         exact: false,
+        timed: false,
     };
     run_distance::<f32>(&lab.engine, &grid_around(&clouds.concat(), h), &sets, &settings, None)
 }
@@ -188,6 +189,7 @@ fn subsets_of_the_cube_share_its_voxels_evenly() {
         closest_point: false,
         brick: 16,
         exact: false,
+        timed: false,
     };
     let found = run_distance::<f32>(&Lab::new(2).engine, &geometry, &sets, &settings, None).expect("a distance");
     let mut voxels = [vec![], vec![], vec![]];

@@ -130,6 +130,7 @@ fn a_job_of_the_library_refuses_a_budget_that_is_too_small() {
         closest_point: false,
         brick: 32,
         exact: false,
+        timed: false,
     };
     let error = distance::<f32>(&engine, &geometry, &sets, &settings, None).unwrap_err().to_string();
     assert!(error.contains("give at least --memory 1"), "{error}");

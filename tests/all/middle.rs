@@ -39,6 +39,7 @@ fn settings(method: Method, surface: SurfaceKind, labels: LabelMode, brick: i64)
         closest_point: false,
         brick,
         exact: false,
+        timed: false,
     };
     MiddleSettings { distance, surface, labels }
 }

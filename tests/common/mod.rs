@@ -22,6 +22,7 @@ pub(crate) mod stores;
 pub(crate) mod textbook;
 pub(crate) mod tiff_bytes;
 pub(crate) mod tiff_planes;
+pub(crate) mod times;
 pub(crate) mod zarr_files;
 
 use std::io::Write;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::ArgPredicate;
 use clap::{Args, ValueEnum};
 
 use super::common::{OutputArgs, ResourceArgs};
@@ -20,6 +21,11 @@ pub(crate) struct DistanceJobArgs {
     pub(crate) job: FieldJobArgs,
     #[command(flatten)]
     pub(crate) choice: ChoiceArgs,
+    /// Not distances but travel times through this image of speeds, a stack of any form that is read: each voxel holds the
+    /// speed F at which a front passes it (length by time, 0 where nothing passes), and |grad T| = 1/F is solved, with fmm
+    /// (where no method is named) or fsm. The grid is that of the image; what no front reaches is infinite; --labels follow the ways of the fronts
+    #[arg(long, value_name = "IMAGE", help_heading = "Distance")]
+    pub(crate) speed: Option<PathBuf>,
 }
 
 /// What is common to all that is made of a distance.
@@ -42,7 +48,8 @@ pub(crate) struct FieldJobArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Distance")]
 pub(crate) struct FieldArgs {
-    #[arg(long, value_name = "NAME", value_parser = parse_method, default_value = "vdt", help = solvers_help())]
+    #[arg(long, value_name = "NAME", value_parser = parse_method, default_value = "vdt",
+          default_value_if("speed", ArgPredicate::IsPresent, "fmm"), help = solvers_help())]
     pub(crate) method: Method,
     /// Order of the bricks: as distance reaches them; or the textbook's order, bit for bit: passes over all bricks
     /// (fsm, vdt), one heap over the whole volume in memory (fmm, dp)

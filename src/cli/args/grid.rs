@@ -20,7 +20,7 @@ pub(crate) struct GridArgs {
     /// The grid of this image: TIFF stack, folder of slices or OME-Zarr; that of a label volume is taken without being asked for
     #[arg(long, value_name = "IMAGE", conflicts_with_all = ["spacing", "padding", "origin", "shape"])]
     pub(crate) like: Option<PathBuf>,
-    /// Distance between voxel centres of label volumes and of --like, in place of what the file says
+    /// Distance between voxel centres of label volumes, of --like and of --speed, in place of what the file says
     #[arg(long, value_name = "H|HX,HY,HZ", value_parser = parse_spacing, allow_hyphen_values = true)]
     pub(crate) image_spacing: Option<[f64; 3]>,
     #[command(flatten)]

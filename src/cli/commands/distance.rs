@@ -12,6 +12,7 @@ use crate::cli::inputs::agreed::check_agreed;
 use crate::cli::inputs::grid;
 use crate::cli::inputs::settings;
 use crate::cli::inputs::sources::{Read, open_volume, read_sets};
+use crate::cli::inputs::speed::open_speed;
 use crate::cli::outputs::checks::Outputs;
 use crate::cli::outputs::drawing::{Drawing, Finished, ForViewers, ToFile};
 use crate::cli::outputs::files::{mesh_format, note_anchor};
@@ -35,16 +36,18 @@ use crate::grid::{DataSets, Geometry};
 use crate::io::geometry::write::formats::Values;
 use crate::io::ome_zarr::StoreWriter;
 use crate::io::stack::label_volume::{LabelVolume, is_label_volume};
+use crate::io::stack::volume::Stack;
 use crate::job::disk::Disk;
 use crate::job::resources::{Resources, Sharing};
 use crate::kernel::distance::state::precision::Precision;
 use crate::pipeline::distance::seeding::label_borders::Labels;
 use crate::pipeline::distance::{
-    DistanceSettings, Init, Needs, Schedule, Writes, check_iterations, distance, outside_note,
+    DistanceSettings, Init, Needs, Schedule, Writes, check_iterations, check_timed_sources, distance, outside_note,
+    travel_times,
 };
 use crate::pipeline::middle::{MiddleSettings, MiddleSources, check_sets, middle_kept, with_touching};
 use crate::pipeline::output::viewer_mesh::Segments;
-use crate::store::MeshSink;
+use crate::store::{MeshSink, VolumeSource};
 
 /// A distance that is ready to be computed: all inputs are read and checked.
 struct Job {
@@ -57,6 +60,8 @@ struct Job {
     geometry: Geometry,
     /// The label volume that all sources are from, if so.
     volume: Option<LabelVolume>,
+    /// The speeds that a front has, where times are asked for.
+    speeds: Option<Box<dyn Stack>>,
     console: Arc<Console>,
     cancel: Cancel,
     started: Instant,
@@ -96,7 +101,7 @@ impl Job {
         let mesh = middle.as_ref().map_or(&None, |choice| &choice.mesh);
         let output = &args.job.output;
         let outputs = Outputs {
-            inputs: args.sources.iter().chain(&args.job.grid.like).map(PathBuf::as_path).collect(),
+            inputs: args.sources.iter().chain(&args.job.grid.like).chain(&args.speed).map(PathBuf::as_path).collect(),
             store: output.store(),
             files: [&output.report, mesh].into_iter().flatten().map(PathBuf::as_path).collect(),
             overwrite: output.overwrite,
@@ -107,7 +112,12 @@ impl Job {
         let resources = settings::resources_of_rank(&job.resources, job.output.store(), job.ranks)?;
         let console = Arc::new(Console::new(Voice::of_rank(comm.as_ref(), &job.output)));
         let mut notes = Vec::new();
-        let given = grid::given(&args.job.grid, &mut notes)?;
+        let mut given = grid::given(&args.job.grid, &mut notes)?;
+        let mut speeds = None;
+        if let Some(path) = &args.speed {
+            let (stack, geometry) = open_speed(path, &args.job.grid, given, &mut notes)?;
+            (speeds, given) = (Some(stack), Some(geometry));
+        }
         for note in &notes {
             console.note(note);
         }
@@ -123,14 +133,29 @@ impl Job {
             args.sources.first().filter(|path| middle.is_some() && args.sources.len() == 1 && is_label_volume(path));
         let quiet = Console::new(Voice::Quiet);
         let volume = sole.map(|path| open_volume(path, &args.job.grid, &quiet)).transpose()?;
-        if let Some(note) = outside_note(&geometry, &sets) {
+        check_timed_sources(&settings, &sets)?;
+        if let Some(note) = outside_note(&geometry, &sets, settings.timed) {
             console.note(&note);
         }
         if args.job.resources.brick.is_none() {
-            settings.brick = settings.method.solver::<f32>().brick_for(geometry.shape);
+            settings.brick = settings.brick_for(geometry.shape);
         }
         let typed = typed.to_vec();
-        Ok(Self { args, middle, typed, settings, resources, sets, geometry, volume, console, cancel, started, comm })
+        Ok(Self {
+            args,
+            middle,
+            typed,
+            settings,
+            resources,
+            sets,
+            geometry,
+            volume,
+            speeds,
+            console,
+            cancel,
+            started,
+            comm,
+        })
     }
 
     fn run_precise(&self) -> Result<()> {
@@ -238,7 +263,14 @@ impl Job {
                 let found = middle_kept::<P>(engine, geometry, &sources, &settings, (store, None), mesh)?;
                 Ok(Found::of_middle(&found, sets.count()))
             }
-            None => Ok(Found::new(&distance::<P>(engine, geometry, sets, &self.settings, store)?)),
+            None => match &self.speeds {
+                Some(speeds) => {
+                    let settings = (&self.settings, speeds.as_ref() as &dyn VolumeSource);
+                    let found = travel_times::<P>(engine, geometry, sets, settings, store, None)?;
+                    Ok(Found::new(&found).timed(geometry))
+                }
+                None => Ok(Found::new(&distance::<P>(engine, geometry, sets, &self.settings, store)?)),
+            },
         }
     }
 
@@ -262,7 +294,10 @@ impl Job {
                 let needs = middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes);
                 with_touching(needs, self.volume.as_ref().map(|volume| volume as &dyn Labels), threads)
             }
-            None => self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], self.writes()),
+            None => {
+                let needs = self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], self.writes());
+                self.speeds.as_ref().map_or(needs, |speeds| needs.reading(speeds.as_ref(), threads))
+            }
         }
     }
 
@@ -277,7 +312,7 @@ impl Job {
 
     fn writes(&self) -> Writes {
         match self.args.job.output.store() {
-            Some(_) if self.args.job.output.live => Writes::FieldsMeanwhile,
+            Some(_) if self.args.job.output.live && !self.settings.timed => Writes::FieldsMeanwhile,
             Some(_) => Writes::Fields,
             None => Writes::Nothing,
         }
@@ -346,7 +381,7 @@ impl Job {
     fn evidence(&self) -> Evidence<'_> {
         let middle = self.geometry.shape.map(|n| n / 2);
         Evidence {
-            root: Root::Distance,
+            root: if self.settings.timed { Root::Times } else { Root::Distance },
             measure: Measure::Thickness,
             sources: &self.sets,
             centre: self.geometry.position(middle),
@@ -398,6 +433,7 @@ fn settings(args: &DistanceJobArgs) -> Result<DistanceSettings> {
         closest_point: args.choice.closest_point,
         brick: args.job.resources.brick.unwrap_or(field.method.solver::<f32>().brick),
         exact: args.choice.exact,
+        timed: args.speed.is_some(),
     };
     settings.check()?;
     check_iterations(field.iterations)?;

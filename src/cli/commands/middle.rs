@@ -32,7 +32,7 @@ pub(crate) fn run(args: &MiddleArgs, typed: &[String]) -> Result<()> {
         mesh: surface.mesh,
     };
     let fields = ChoiceArgs { labels: true, ..ChoiceArgs::default() };
-    let job = DistanceJobArgs { sources, job, choice: fields };
+    let job = DistanceJobArgs { sources, job, choice: fields, speed: None };
     if has_walls_alone(&job, &choice)? { walls::run(job, &choice, typed) } else { run_middle(job, &choice, typed) }
 }
 

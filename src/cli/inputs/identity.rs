@@ -143,6 +143,10 @@ mod tests {
         assert_ne!(one, of(&["distance", cloud, "--spacing", "0.25", "-o", "a.zarr"]));
         fs::write(cloud, "0 0 1\n").unwrap();
         assert_ne!(one, of(&["distance", cloud, "--spacing", "0.5", "-o", "a.zarr"]));
+        let timed = of(&["distance", cloud, "--speed", cloud, "-o", "a.zarr"]);
+        fs::write(cloud, "0 0 2\n").unwrap();
+        assert_ne!(timed, of(&["distance", "b.xyz", "--speed", cloud, "-o", "a.zarr"]));
+        assert!(timed.iter().any(|(name, value)| name == "--speed" && value.contains("hash")), "{timed:?}");
         assert!(one.iter().any(|(name, value)| name == "--spacing" && value == "0.5"), "{one:?}");
     }
 

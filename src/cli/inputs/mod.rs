@@ -10,4 +10,5 @@ pub(crate) mod noted;
 pub(crate) mod over_time;
 pub(crate) mod settings;
 pub(crate) mod sources;
+pub(crate) mod speed;
 pub(crate) mod typed;

@@ -9,6 +9,7 @@ use super::table::cut;
 use crate::cli::args::distance::MiddleChoice;
 use crate::cli::args::distance::{DistanceJobArgs, PrecisionArg};
 use crate::cli::terminal::text::{grouped, number};
+use crate::grid::Geometry;
 use crate::job::resources::Resources;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::surface::{LabelMeasures, Pair};
@@ -18,8 +19,10 @@ use crate::pipeline::output::viewer_mesh::Simplified;
 
 /// What was found, in some lines; `whole_in` says where all labels are told, `pairs_in` all pairs of them.
 pub(crate) fn describe_found(found: &Found, whole_in: &str, pairs_in: &str) -> String {
+    let of = found.quantity.as_ref().map_or("distance", |told| told.quantity);
+    let unit = found.quantity.as_ref().map_or(String::new(), |told| format!(" ({})", told.quantity_unit));
     let mut lines = vec![format!(
-        "largest distance {}; {} voxels fixed by sources, {} not reached",
+        "largest {of} {}{unit}; {} voxels fixed by sources, {} not reached",
         number(found.max),
         grouped(found.fixed_voxels),
         grouped(found.unlabelled_voxels)
@@ -80,6 +83,9 @@ pub(crate) struct Settings {
     closest_point: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     exact: Option<bool>,
+    /// The image that times are asked for through; null where distances are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    speed: Option<Option<String>>,
     brick: i64,
     scratch: String,
 }
@@ -127,6 +133,7 @@ impl Settings {
             exact_labels: middle.map(|choice| choice.labels == LabelMode::Exact),
             closest_point: settings.closest_point,
             exact: middle.is_none().then_some(settings.exact),
+            speed: middle.is_none().then(|| args.speed.as_ref().map(|path| path.display().to_string())),
             brick: settings.brick,
             scratch: resources.scratch.display().to_string(),
         }
@@ -136,6 +143,9 @@ impl Settings {
 /// What was found.
 #[derive(Debug, Serialize)]
 pub(crate) struct Found {
+    /// What the field holds, where that is no distance.
+    #[serde(flatten)]
+    quantity: Option<Quantity>,
     max: f64,
     fixed_voxels: u64,
     unlabelled_voxels: u64,
@@ -146,9 +156,17 @@ pub(crate) struct Found {
     middle: Option<Middle>,
 }
 
+/// What a field holds, and in which unit.
+#[derive(Debug, Serialize)]
+struct Quantity {
+    quantity: &'static str,
+    quantity_unit: String,
+}
+
 impl Found {
     pub(crate) fn new(found: &DistanceFound) -> Self {
         Self {
+            quantity: None,
             max: found.max,
             fixed_voxels: found.fixed_voxels,
             unlabelled_voxels: found.unlabelled_voxels,
@@ -160,6 +178,13 @@ impl Found {
 
     pub(crate) fn of_middle(found: &MiddleFound, sets: usize) -> Self {
         Self { middle: Some(Middle::new(found, sets)), ..Self::new(&found.distance) }
+    }
+
+    /// The same of times through an image on a grid.
+    pub(crate) fn timed(self, geometry: &Geometry) -> Self {
+        let length = geometry.unit.as_deref().unwrap_or("unit of length");
+        let quantity_unit = format!("{length} / unit of the speeds");
+        Self { quantity: Some(Quantity { quantity: "travel time", quantity_unit }), ..self }
     }
 
     /// With the copy of a large surface.

@@ -1,6 +1,7 @@
 //! Triples, triangles and closed meshes: geometry in f64, without a grid.
 
 pub mod nearest_point;
+pub mod rim;
 pub mod solid;
 pub mod triangle;
 pub(crate) mod vector;

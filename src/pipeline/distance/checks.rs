@@ -1,7 +1,7 @@
 //! Distances that cannot be computed, refused before anything is: settings that contradict each other, grids with too
 //! many bricks, lengths that the type of the field cannot hold.
 
-use super::{DistanceSettings, Init, Schedule, Textbook};
+use super::{DistanceSettings, Init, Schedule, Solver, Textbook};
 use crate::error::{Error, Result};
 use crate::grid::digits::{grouped, number};
 use crate::grid::{BrickGrid, DataSets, Geometry, Slot};
@@ -39,10 +39,34 @@ impl DistanceSettings {
         if self.exact && (sweeps || self.neighbours == Neighbours::All || self.init != Init::Cell) {
             return Err(Error::usage("exact distances need no method; leave --schedule, --neighbours and --init out"));
         }
+        if self.timed {
+            self.check_timed(row)?;
+        }
         if sweeps && self.farthest.is_some() {
             return Err(Error::usage("--max-distance needs --schedule front; leave one of the two out"));
         }
         Ok(())
+    }
+
+    /// Refuses what cannot be had of times through an image of speeds.
+    fn check_timed(&self, row: Solver<f32>) -> Result<()> {
+        let words = if self.exact {
+            "--exact measures straight ways, which a front at many speeds does not take; leave --exact or --speed out"
+                .into()
+        } else if row.tracks_sources() {
+            format!(
+                "--method {} measures straight ways, which a front at many speeds does not take; with --speed give fsm or fmm",
+                row.name
+            )
+        } else if self.signed {
+            "times through an image have no sign; leave --signed or --speed out".into()
+        } else if self.init == Init::Contiguous {
+            "--init contiguous fixes voxels far from the points as if the speed were the same on the way; with --speed leave it out"
+                .into()
+        } else {
+            return Ok(());
+        };
+        Err(Error::usage(words))
     }
 
     /// Refuses a grid on which these settings cannot be computed for fields stored as `P`: too many bricks, or distances
@@ -82,9 +106,37 @@ pub fn without_inside(what: &str) -> Error {
     Error::input(format!("holds {what}, which have no inside here; --signed needs triangle meshes"))
 }
 
-/// Says how many sources lie outside of the grid: it may not be where it was meant to be.
+/// Refuses an image of speeds that lies on another grid than the times.
+pub(super) fn check_shape(image: [i64; 3], geometry: &Geometry) -> Result<()> {
+    if image == geometry.shape {
+        return Ok(());
+    }
+    let told = |[x, y, z]: [i64; 3]| format!("{x} x {y} x {z}");
+    Err(Error::usage(format!(
+        "the image of speeds has {} voxels (x, y, z), and the grid of the times {}; both must have the same, so leave the grid out \
+         or give that of the image",
+        told(image),
+        told(geometry.shape)
+    )))
+}
+
+/// Refuses sources to which a way through an image of speeds has no closest point.
+///
+/// # Errors
+/// Where the closest points of triangles are wanted.
+pub fn check_timed_sources(settings: &DistanceSettings, sets: &DataSets) -> Result<()> {
+    if settings.timed && settings.closest_point && !sets.mesh.is_empty() {
+        return Err(Error::usage(
+            "--closest-point tells where a triangle is nearest as the crow flies, not where a front came from; with --speed and \
+             meshes leave it out",
+        ));
+    }
+    Ok(())
+}
+
+/// Says how many sources lie outside of the grid: it may not be where it was meant to be. `timed` as in the settings.
 #[must_use]
-pub fn outside_note(geometry: &Geometry, sets: &DataSets) -> Option<String> {
+pub fn outside_note(geometry: &Geometry, sets: &DataSets, timed: bool) -> Option<String> {
     let (outside, all) = (count_outside(geometry, sets), sets.len() as u64);
     let which = match outside {
         0 => return None,
@@ -93,6 +145,12 @@ pub fn outside_note(geometry: &Geometry, sets: &DataSets) -> Option<String> {
         1 => format!("1 of {} sources lies outside of the grid or reaches", grouped(all)),
         _ => format!("{} of {} sources lie outside of the grid or reach", grouped(outside), grouped(all)),
     };
+    if timed {
+        return Some(format!(
+            "{which} out of it, where no speed is known; what of them is outside counts for nothing (--origin and --image-spacing \
+             say where the image lies)"
+        ));
+    }
     Some(format!(
         "{which} out of it; such sources count like all others (--origin, --shape and --spacing say where it lies)"
     ))

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use super::checks::check_shape;
 use super::exact::exact;
-use super::ranks::{Reads, solve_watched};
+use super::medium::Medium;
+use super::ranks::{Reads, part_of_rank, solve_watched};
 use super::readout::early::Early;
 use super::readout::found::DistanceFound;
 use super::readout::images::Wanted;
@@ -21,6 +23,7 @@ use crate::kernel::distance::seeding::initialise::Cube;
 use crate::kernel::distance::seeding::outside::OutsideSources;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::Precision;
+use crate::store::VolumeSource;
 use crate::store::checkpoint::SavedField;
 
 /// Which voxels points fix at the start.
@@ -58,13 +61,26 @@ pub struct DistanceSettings {
     pub brick: i64,
     /// Without an error: each voxel asks the sources that can be nearest, and no method is used.
     pub exact: bool,
+    /// Through an image of speeds: not distances but the times that a front takes ([`travel_times`]).
+    pub timed: bool,
 }
+
+/// Edge of the bricks that times through an image of speeds are solved in.
+const TIMED_BRICK: i64 = 32;
 
 impl DistanceSettings {
     /// Whether anything asked for is made of sources.
     #[must_use]
     pub fn keeps_sources(&self) -> bool {
         self.labels || self.closest_point
+    }
+
+    /// Edge of the bricks that a grid is cut into where nobody asks for another.
+    #[must_use]
+    pub fn brick_for(&self, shape: [i64; 3]) -> i64 {
+        let edge = self.method.solver::<f32>().brick_for(shape);
+        // In a large brick ways that bend take many sweeps.
+        if self.timed { edge.min(TIMED_BRICK) } else { edge }
     }
 
     /// Whether labels are looked at closer, for which sources are sorted.
@@ -104,17 +120,46 @@ pub fn distance_kept<P: Precision>(
     store: Option<&StoreWriter>,
     kept: Option<&Kept<P>>,
 ) -> Result<DistanceFound> {
+    read_out_kept(engine, geometry, sets, (settings, None), store, kept)
+}
+
+/// Computes the times that fronts from `sets` take to each voxel through an image of speeds on the same grid, stored as `P`;
+/// `store` and `kept` get the fields. The settings say that they are timed.
+///
+/// # Errors
+/// As [`distance`], and when the image has another shape, or holds what is no speed.
+pub fn travel_times<P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    (settings, speeds): (&DistanceSettings, &dyn VolumeSource),
+    store: Option<&StoreWriter>,
+    kept: Option<&Kept<P>>,
+) -> Result<DistanceFound> {
+    check_shape(speeds.shape(), geometry)?;
+    read_out_kept(engine, geometry, sets, (settings, Some(speeds)), store, kept)
+}
+
+fn read_out_kept<P: Precision>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    (settings, speeds): (&DistanceSettings, Option<&dyn VolumeSource>),
+    store: Option<&StoreWriter>,
+    kept: Option<&Kept<P>>,
+) -> Result<DistanceFound> {
     let writes = match store {
         Some(_) if reads_early(settings, store) => Writes::FieldsMeanwhile,
         Some(_) => Writes::Fields,
         None => Writes::Nothing,
     };
     let needs = settings.needs::<P>(geometry, sets, [engine.threads(), engine.comm().ranks()], writes);
+    let needs = speeds.map_or(needs, |speeds| needs.reading(speeds, engine.threads()));
     let held = engine.reserve(needs.footprint)?;
     let lent = held.lend(needs.later);
     let trees = settings.looks_closer::<P>(sets).then(|| SourceTrees::new(sets));
     let wanted = Wanted { labels: settings.labels, borders: false, closest_point: settings.closest_point };
-    let read_out = ReadOut { geometry, sets, is_signed: settings.signed, wanted, kept };
+    let read_out = ReadOut { geometry, sets, is_signed: settings.signed, is_timed: settings.timed, wanted, kept };
     let reading = Reading::new(read_out, engine, store)?;
     if settings.exact {
         drop(lent);
@@ -126,7 +171,7 @@ pub fn distance_kept<P: Precision>(
     // Only who watches a store gains by seeing its bricks one by one.
     let early = reads_early(settings, store).then_some(&reading as &dyn Early<P>);
     let reads = Reads { early, boxes: &reading.reads() };
-    solve_sets_watched::<P, _>(engine, geometry, sets, trees.as_ref(), (settings, reads), |solved, _| {
+    solve_sets_through::<P, _>(engine, geometry, sets, trees.as_ref(), (settings, reads, speeds), |solved, _| {
         drop(lent);
         reading.finish(&solved)
     })
@@ -137,6 +182,7 @@ fn reads_early(settings: &DistanceSettings, store: Option<&StoreWriter>) -> bool
     store.is_some_and(|store| store.live().is_some())
         && !settings.exact
         && settings.schedule == Schedule::Front
+        && !settings.timed
         && settings.init != Init::Contiguous
 }
 
@@ -169,14 +215,31 @@ pub fn solve_sets_watched<P: Precision, R>(
     (settings, reads): (&DistanceSettings, Reads<'_, P>),
     then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
 ) -> Result<R> {
+    solve_sets_through(engine, geometry, sets, trees, (settings, reads, None), then)
+}
+
+/// The same, where it is timed through an image of speeds.
+fn solve_sets_through<P: Precision, R>(
+    engine: &Engine,
+    geometry: &Geometry,
+    sets: &DataSets,
+    trees: Option<&SourceTrees>,
+    (settings, reads, speeds): (&DistanceSettings, Reads<'_, P>, Option<&dyn VolumeSource>),
+    then: impl FnOnce(Solved<'_, P>, &Arc<BrickSet>) -> Result<R>,
+) -> Result<R> {
     settings.check_order()?;
     let grid = BrickGrid::new(geometry.shape, settings.brick);
     let set = Arc::new(BrickSet::dense(grid));
+    let order = (settings.method, settings.schedule);
+    let medium = speeds.map(|speeds| Medium::read(engine, &part_of_rank::<P>(engine.comm(), &set, order).1, speeds));
+    let medium = medium.transpose()?;
+    medium.as_ref().map_or(Ok(()), |medium| medium.check_range::<P>(geometry))?;
     let stage = engine.stage("sort sources", 0);
     let bins = PointBins::new(grid, geometry, &sets.positions);
     let triangles = (!sets.mesh.is_empty()).then(|| TriangleBins::new(grid, geometry, &sets.mesh));
     let cubes = cubes(geometry, sets, settings.init);
-    let outside = OutsideSources::new(geometry, sets);
+    // Nobody knows how fast a front is outside of an image.
+    let outside = if medium.is_none() { OutsideSources::new(geometry, sets) } else { None };
     let sources = Sources {
         geometry,
         positions: &sets.positions,
@@ -186,6 +249,7 @@ pub fn solve_sets_watched<P: Precision, R>(
         sets: Some(sets),
         trees,
         outside: outside.as_ref(),
+        medium: medium.as_ref(),
     };
     stage.finish();
     let stage = engine.resumable_stage("distance", set.len() as u64);
@@ -196,7 +260,6 @@ pub fn solve_sets_watched<P: Precision, R>(
         sources: settings.keeps_sources(),
         labels: settings.labels,
     };
-    let order = (settings.method, settings.schedule);
     let solved = solve_watched::<P>(&stage, &sources, &set, order, options, reads)?;
     stage.finish();
     let state = solved.state.clone();

@@ -8,6 +8,7 @@ mod checks;
 mod costs;
 mod exact;
 mod job;
+mod medium;
 mod needs;
 mod ranks;
 pub mod readout;
@@ -15,11 +16,13 @@ pub mod schedule;
 pub mod seeding;
 mod solvers;
 mod solving;
+mod through;
 
 use std::sync::Arc;
 
-pub use checks::{check_iterations, outside_note, without_inside};
-pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets, solve_sets_watched};
+pub use checks::{check_iterations, check_timed_sources, outside_note, without_inside};
+pub use job::{DistanceSettings, Init, distance, distance_kept, solve_sets, solve_sets_watched, travel_times};
+pub use medium::Medium;
 pub(crate) use needs::tree_bytes;
 pub use needs::{Needs, Writes};
 pub use ranks::{Reads, solve, solve_watched};

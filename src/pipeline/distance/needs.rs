@@ -1,14 +1,17 @@
 //! What a distance will take: memory that must be held, temporary fields, time. The job reserves what is told here.
 
+use super::costs::timed;
 use super::{DistanceSettings, Kept, Schedule, Textbook, Wanted};
 use crate::exec::{Footprint, Plan, ROUND_BYTES};
-use crate::grid::{BrickGrid, DataSets, Geometry};
+use crate::grid::{Box3, BrickGrid, DataSets, Geometry};
 use crate::kernel::distance::features::exact_sources::work_bytes;
 use crate::kernel::distance::repair::descent::remembered_bytes;
 use crate::kernel::distance::seeding::outside::count_outside;
 use crate::kernel::distance::state::precision::Precision;
+use crate::kernel::geometry::rim::Rim;
 use crate::kernel::geometry::triangle::Triangle;
 use crate::kernel::geometry::winding_number::WindingTree;
+use crate::store::VolumeSource;
 
 /// An estimate; sizes in bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +35,15 @@ impl Needs {
     #[must_use]
     pub fn keeping<P: Precision>(self, geometry: &Geometry, sources: bool) -> Self {
         Self { scratch: self.scratch.saturating_add(Kept::<P>::bytes(geometry, sources)), ..self }
+    }
+
+    /// The same where speeds are read of an image before, on so many threads.
+    #[must_use]
+    pub fn reading(self, speeds: &dyn VolumeSource, threads: usize) -> Self {
+        let natural = Box3::from_shape(speeds.natural_shape()).volume();
+        let box_bytes = natural.saturating_mul((speeds.element().size() + size_of::<f32>()) as u64);
+        let footprint = self.footprint.and(Footprint::of_thread(box_bytes.saturating_add(speeds.decoding_bytes())));
+        Self { footprint, held: footprint.bytes(threads as u64), ..self }
     }
 
     /// The same for one of so many ranks of so many threads, each of which has its part of the fields and their tables, and of some bricks of
@@ -86,11 +98,14 @@ const CHUNK: u64 = 64 * 64 * 64;
 const READ_SOURCE_BYTES: u64 = 4 + 4 + 24;
 /// Bytes of a voxel that is read with those around: border, source and label once more, in a box a voxel wider.
 const READ_BORDER_BYTES: u64 = 4 + 10;
-/// Bytes of a voxel whose side is told: whether it is fixed, known, inside; the flood's list.
-const READ_SIDE_BYTES: u64 = 3 + 24;
+/// Bytes of a voxel whose side is told: whether it is fixed, known, inside; the flood's lists.
+const READ_SIDE_BYTES: u64 = 3 + 2 * 24;
 /// Seconds of one thread to read out a voxel, and more where it is written: its distance, its label, a coordinate.
 const READ_SECONDS: f64 = 8e-9;
 const WRITE_SECONDS: [f64; 3] = [25e-9, 8e-9, 20e-9];
+
+/// How much longer times through an image of speeds take than distances: they are computed in f64, and ways bend.
+const TIMED: f64 = 3.0;
 
 /// Bytes of a voxel that was told exactly, and seconds of one thread for it.
 const EXACT_BYTES: u64 = 8 + 4;
@@ -128,6 +143,7 @@ impl DistanceSettings {
         // What is found apart from distances is found in a pass of its own; the textbook's order makes many.
         let apart = if self.keeps_sources() && !solver.tracks_sources() { 2.0 } else { 1.0 };
         let order = if self.schedule == Schedule::Front { 1.0 } else { 3.0 };
+        let order = if self.timed { TIMED * order } else { order };
         let [distance, label, coordinate] = WRITE_SECONDS;
         let labels = f64::from(u32::from(self.labels) + u32::from(writes == Writes::FieldsAndBorders));
         let places = if self.closest_point { 3.0 } else { 0.0 };
@@ -182,7 +198,11 @@ impl DistanceSettings {
         let bricks = bricks_of_rank(&BrickGrid::new(geometry.shape, self.brick), if shares { ranks as u64 } else { 1 });
         let triangles = sets.mesh.len() as u64;
         let copies = triangles * TRIANGLE_COPIES * size_of::<Triangle>() as u64;
-        let inside = if self.signed { WindingTree::bytes(triangles) + triangles * CLOSED_BYTES } else { 0 };
+        let inside = if self.signed {
+            WindingTree::bytes(triangles) + Rim::bytes(triangles) + triangles * CLOSED_BYTES
+        } else {
+            0
+        };
         let trees = if self.exact || self.looks_closer::<P>(sets) { tree_bytes(sets) } else { 0 };
         let outside = if count_outside(geometry, sets) > 0 { tree_bytes(sets) } else { 0 };
         let of_sources = sets.len() as u64 * SOURCE_BYTES + copies + inside + trees + outside;
@@ -194,8 +214,10 @@ impl DistanceSettings {
         let (edge, row) = (self.brick as usize, self.method.solver::<P>());
         let grown = (edge as u64 + 2).pow(3);
         let traced = if self.keeps_sources() && row.source_bytes > 0 { TRACE_BYTES * grown } else { 0 };
+        let traced = traced + if self.timed { size_of::<f32>() as u64 * grown } else { 0 };
         // A state is no larger than a distance in f64.
         let tile = (row.cost)(edge, self.schedule).bytes::<u64>(edge);
+        let tile = if self.timed { tile.max(timed(edge)) } else { tile };
         let seeding = SEED_BYTES * (edge as u64).pow(3);
         Footprint { held: self.heap_bytes::<P>(geometry), ..Footprint::of_thread(seeding.max(tile + traced)) }
     }
@@ -229,14 +251,18 @@ impl DistanceSettings {
         let element = row.state_bytes + apart;
         // Along with sweeps the faces of sources are kept a second time, as they were before.
         let swept = if matches!(self.schedule, Schedule::Sweep { .. }) { apart } else { 0 };
-        grid.len().saturating_mul((brick + faces) * element + faces * swept)
+        let speeds = if self.timed { brick * size_of::<f32>() as u64 } else { 0 };
+        grid.len().saturating_mul((brick + faces) * element + faces * swept + speeds)
     }
 
     /// What one heap over the whole volume takes, where these settings call for one.
     #[must_use]
     pub fn heap_bytes<P: Precision>(&self, geometry: &Geometry) -> u64 {
         match (self.schedule, self.method.solver::<P>().textbook) {
-            (Schedule::Sweep { .. }, Textbook::Heap { bytes }) => geometry.domain().volume().saturating_mul(bytes),
+            (Schedule::Sweep { .. }, Textbook::Heap { bytes }) => {
+                let bytes = bytes + if self.timed { size_of::<f32>() as u64 } else { 0 };
+                geometry.domain().volume().saturating_mul(bytes)
+            }
             _ => 0,
         }
     }

@@ -7,7 +7,7 @@ use super::readout::repair::looked_over;
 use super::solving::Solving;
 use super::{Method, Options, Schedule, Solved, Sources, Textbook};
 use crate::error::Result;
-use crate::exec::{HaloPlan, Ownership, Reach, Stage};
+use crate::exec::{Comm, HaloPlan, Ownership, Reach, Stage};
 use crate::grid::{Box3, BrickGrid, BrickId, BrickSet};
 use crate::kernel::distance::state::precision::Precision;
 
@@ -57,14 +57,24 @@ pub(super) fn solve_once<'a, P: Precision>(
     // Others' bricks are read when all ranks are done.
     let early = reads.early.filter(|_| comm.ranks() == 1);
     let solver = method.solver::<P>();
-    let one_heap = schedule != Schedule::Front && solver.textbook != Textbook::Sweeps;
+    let (ownership, own) = part_of_rank::<P>(comm, set, (method, schedule));
+    let borrows = reads.of_others(set.grid(), |id| ownership.owner(id) == comm.rank());
+    // What this rank reads is its own part and what it has borrowed.
+    (solver.solve)(&Solving { stage, engine, sources, set: &own, options, early, borrows: &borrows }, schedule)
+}
+
+/// Who owns which bricks of a set, and the part of this rank.
+pub(super) fn part_of_rank<P: Precision>(
+    comm: &dyn Comm,
+    set: &BrickSet,
+    (method, schedule): (Method, Schedule),
+) -> (Ownership, Arc<BrickSet>) {
+    let one_heap = schedule != Schedule::Front && method.solver::<P>().textbook != Textbook::Sweeps;
     let ownership = if one_heap { Ownership::first(set, comm.ranks()) } else { Ownership::balanced(set, comm.ranks()) };
     // Sources are found by all 26 neighbours even where distances are not.
     let plan = HaloPlan::new(*set.grid(), Reach::All);
     let own = Arc::new(ownership.part(set, comm.rank(), &plan));
-    let borrows = reads.of_others(set.grid(), |id| ownership.owner(id) == comm.rank());
-    // What this rank reads is its own part and what it has borrowed.
-    (solver.solve)(&Solving { stage, engine, sources, set: &own, options, early, borrows: &borrows }, schedule)
+    (ownership, own)
 }
 
 /// What is read of a solved distance by the rank that asks for it.

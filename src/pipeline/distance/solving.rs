@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use super::medium::Medium;
 use super::readout::early::Early;
 use super::readout::field::{Solved, Values};
 use super::readout::repair::looked_over;
@@ -13,8 +14,9 @@ use super::schedule::textbook::{Wanted, heap_dijkstra, heap_marching};
 use super::schedule::trace::{SourceField, trace_sources};
 use super::seeding::initialise::{Seeded, Start, initialise};
 use super::seeding::outside::search_outside;
+use super::through::Through;
 use super::{Options, Schedule, Sources};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::exec::{Engine, Stage, Workers, borrow_bricks};
 use crate::grid::{BrickId, BrickSet, DataSets, SourceState};
 use crate::kernel::distance::methods::all_neighbours::AllNeighbours;
@@ -68,6 +70,14 @@ impl<P: Precision> Watch for Reading<'_, '_, P> {
 /// Fast sweeping.
 pub(super) fn fast_sweeping<'a, P: Precision>(job: &Solving<'_, 'a, P>, schedule: Schedule) -> Result<Solved<'a, P>> {
     let spacing = job.sources.geometry.spacing;
+    if let Some(medium) = job.sources.medium {
+        // In f64 either way: what rounds to f32 then is the same in whatever order bricks come.
+        let method = Through { method: FastSweeping::<P, f64, true>::new(spacing), medium };
+        return match schedule {
+            Schedule::Front => job.front_then_sources::<_, UpwindSum>(method),
+            Schedule::Sweep { iterations } => job.sweeps_then_sources(method, iterations),
+        };
+    }
     match schedule {
         Schedule::Front => job.front_then_sources::<_, UpwindSum>(FastSweeping::<P, P::Fast>::new(spacing)),
         Schedule::Sweep { iterations } => job.sweeps_with_sources(FastSweeping::<P, f64>::new(spacing), iterations),
@@ -94,6 +104,10 @@ pub(super) fn vector_distance<'a, P: Precision>(job: &Solving<'_, 'a, P>, schedu
 pub(super) fn fast_marching<'a, P: Precision>(job: &Solving<'_, 'a, P>, schedule: Schedule) -> Result<Solved<'a, P>> {
     let (geometry, positions) = (job.sources.geometry, job.sources.positions);
     let method = FastMarching::<P, P::Fast>::new(geometry.spacing);
+    if let (Some(medium), Schedule::Front) = (job.sources.medium, schedule) {
+        let method = Through { method: FastMarching::<P, f64, true>::new(geometry.spacing), medium };
+        return job.front_then_sources::<_, UpwindSum>(method);
+    }
     match (schedule, job.sources.shapes()) {
         (Schedule::Front, _) => job.front_then_sources::<_, ShortestWay>(method),
         (_, Some(sets)) => job.heap_marching(method, &ShapeDistance::new(geometry, sets)),
@@ -134,10 +148,17 @@ impl<'j, 'a, P: Precision> Solving<'j, 'a, P> {
         Self { stage, engine, sources, set, options, early: None, borrows: &[] }
     }
 
+    /// Lengths of the sides of a voxel, or about the times that a front takes along them: what it is scheduled by.
+    fn steps(&self) -> [f64; 3] {
+        let slowness = self.sources.medium.map_or(1.0, Medium::slowness);
+        self.sources.geometry.spacing.map(|h| h * slowness)
+    }
+
     /// A method's start: its state with the voxels that sources fix.
     fn start<M: DistanceState>(&self, start: Start) -> Result<(BrickArray<M::State>, Seeded)> {
         let state = BrickArray::blank(self.engine.scratch(), self.set, M::UNKNOWN)?;
         let seeded = initialise::<M>(self.stage, self.sources, &state, None, (start, self.options.farthest))?;
+        self.check_begun(&seeded)?;
         Ok((state, seeded))
     }
 
@@ -147,7 +168,19 @@ impl<'j, 'a, P: Precision> Solving<'j, 'a, P> {
         let sources = BrickArray::blank(self.engine.scratch(), self.set, SourceState::FAR)?;
         let seeded =
             initialise::<M>(self.stage, self.sources, &state, Some(&sources), (Start::Fixed, self.options.farthest))?;
+        self.check_begun(&seeded)?;
         Ok((state, sources, seeded))
+    }
+
+    /// Refuses sources from which no front begins.
+    fn check_begun(&self, seeded: &Seeded) -> Result<()> {
+        if self.sources.medium.is_none() || self.stage.comm().any(!seeded.bricks.is_empty())? {
+            return Ok(());
+        }
+        Err(Error::input(
+            "no front begins: all sources lie outside of the image of speeds, or beside voxels whose speed is 0 alone; look at \
+             where they lie on its grid (--origin, --image-spacing, --points-in)",
+        ))
     }
 
     fn front<M: DistanceMethod + 'a>(&self, method: M) -> Result<Solved<'a, P>> {
@@ -156,10 +189,11 @@ impl<'j, 'a, P: Precision> Solving<'j, 'a, P> {
         // Where sources are looked at again, those beyond the last voxel that counts are asked too.
         let beyond = if M::trial(0).is_some() { geometry.length([REACH; 3]) } else { 0.0 };
         let farthest = self.options.farthest + beyond;
-        let bounds = (geometry.spacing, farthest);
+        let bounds = (self.steps(), farthest);
         let values = self.values(method, state);
         let (method, state) = (&values.method, &values.state);
-        match self.early.filter(|_| self.sources.outside.is_none()) {
+        // Nobody knows how long a detour around what nothing passes may take.
+        match self.early.filter(|_| self.sources.outside.is_none() && self.sources.medium.is_none()) {
             Some(early) => {
                 let solved = values.read::<P>(seeded.fixed_voxels, seeded.triangle_distances);
                 let tracks = M::trial(0).is_some();
@@ -186,16 +220,29 @@ impl<'j, 'a, P: Precision> Solving<'j, 'a, P> {
         if !self.options.sources {
             return self.sweeps(method, iterations);
         }
-        let (state, sources, seeded) = self.start_apart::<FastSweeping<P, f64>>()?;
         if self.labelled().is_some() {
             // An update that lowers nothing is none, so sweeps do not see that another label is as near.
-            let trace = || self.trace::<UpwindSum>(&state, &sources, &seeded);
-            sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations, trace)?;
-            return Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? });
+            return self.sweeps_then_sources(method, iterations);
         }
+        let (state, sources, seeded) = self.start_apart::<FastSweeping<P, f64>>()?;
         let mut tracked = TrackedSweeps::new(self.stage, self.engine.scratch(), &sources, &seeded.bricks)?;
         sweep_all(self.stage, &method, &state, &mut tracked, &seeded.bricks, iterations, nothing)?;
         drop(tracked);
+        Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
+    }
+
+    /// Distances by sweeps, and then their sources, where these are asked for.
+    fn sweeps_then_sources<M: OrderedSweeps<State = P> + 'a>(
+        &self,
+        method: M,
+        iterations: u32,
+    ) -> Result<Solved<'a, P>> {
+        if !self.options.sources {
+            return self.sweeps(method, iterations);
+        }
+        let (state, sources, seeded) = self.start_apart::<M>()?;
+        let trace = || self.trace::<UpwindSum>(&state, &sources, &seeded);
+        sweep_all(self.stage, &method, &state, &mut NoCompanion(self.set), &seeded.bricks, iterations, trace)?;
         Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
     }
 
@@ -205,8 +252,7 @@ impl<'j, 'a, P: Precision> Solving<'j, 'a, P> {
             return self.front(method);
         }
         let (state, sources, seeded) = self.start_apart::<M>()?;
-        let geometry = self.sources.geometry;
-        let bounds = (geometry.spacing, self.options.farthest);
+        let bounds = (self.steps(), self.options.farthest);
         let trace = || self.trace::<R>(&state, &sources, &seeded);
         advance_front(self.stage, &method, &state, &seeded.bricks, bounds, None, trace)?;
         Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
@@ -223,8 +269,8 @@ impl<'j, 'a, P: Precision> Solving<'j, 'a, P> {
         sources: &BrickArray<SourceState>,
         seeded: &Seeded,
     ) -> Result<()> {
-        let (geometry, labelled) = (self.sources.geometry, self.labelled());
-        trace_sources::<P, R>(self.stage, geometry, labelled, state, sources, &seeded.bricks)
+        let (through, labelled) = ((self.sources.geometry, self.sources.medium), self.labelled());
+        trace_sources::<P, R>(self.stage, through, labelled, state, sources, &seeded.bricks)
     }
 
     fn front_vector<S: DistanceMethod + TrackedSource + 'a>(&self, sources: S) -> Result<Solved<'a, P>> {
@@ -251,9 +297,15 @@ impl<'j, 'a, P: Precision> Solving<'j, 'a, P> {
         start: &S,
     ) -> Result<Solved<'a, P>> {
         let (sources, seeded) = self.start::<S>(Start::Fixed)?;
-        let state = BrickArray::new(self.engine.scratch(), self.set)?;
-        let wanted = Wanted { sources: self.options.sources, labelled: self.labelled() };
+        let state = BrickArray::blank(self.engine.scratch(), self.set, P::UNKNOWN)?;
+        let medium = self.sources.medium;
+        let along = self.options.sources && medium.is_none();
+        let wanted = Wanted { sources: along, labelled: self.labelled(), medium };
         heap_marching(self.engine, self.sources.geometry, start, wanted, &state, &sources)?;
+        if self.options.sources && medium.is_some() {
+            self.set.owned().for_each(|slot| state.refresh_faces(slot));
+            self.trace::<UpwindSum>(&state, &sources, &seeded)?;
+        }
         Ok(Solved { sources: self.source_field(sources)?, ..self.solved(method, state, &seeded)? })
     }
 

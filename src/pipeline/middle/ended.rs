@@ -28,6 +28,7 @@ fn drawn(engine: &Engine, labels: LabelMode, method: Method) -> Result<Vec<u64>>
         closest_point: false,
         brick: 16,
         exact: false,
+        timed: false,
     };
     let settings = MiddleSettings { distance, surface: SurfaceKind::Exact, labels };
     let mut mesh = TriangleMesh::default();

@@ -97,7 +97,7 @@ pub fn middle_kept<P: Precision>(
     let distance = DistanceSettings { labels: true, ..settings.distance };
     let trees = SourceTrees::new(sets);
     let wanted = Wanted { labels: true, borders: store.is_some(), closest_point: distance.closest_point };
-    let read_out = ReadOut { geometry, sets, is_signed: distance.signed, wanted, kept };
+    let read_out = ReadOut { geometry, sets, is_signed: distance.signed, is_timed: false, wanted, kept };
     let reading = Reading::new(read_out, engine, store)?;
     let boxes = Boxes::new(geometry, comm);
     let volume = volume.filter(|volume| volume.geometry() == geometry && settings.surface == SurfaceKind::Exact);

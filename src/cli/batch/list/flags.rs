@@ -155,8 +155,8 @@ impl Flags {
                 ([vec![args.image], args.points].concat(), writes.to_vec(), args.resources)
             }
             Command::Distance(args) => {
-                let like = args.job.grid.like.into_iter().collect();
-                ([args.sources, like].concat(), Vec::new(), args.job.resources)
+                let grids = args.job.grid.like.into_iter().chain(args.speed).collect();
+                ([args.sources, grids].concat(), Vec::new(), args.job.resources)
             }
             Command::Middle(args) => {
                 let like = args.job.grid.like.into_iter().collect();

@@ -125,7 +125,7 @@ fn inputs_are_there(report: &Value, store: &Path) -> Result<()> {
     }
     let settings = &report["settings"];
     let lists = ["points", "sources"].iter().flat_map(|key| settings[key].as_array().into_iter().flatten());
-    let single = ["image", "cloud"].iter().map(|key| &settings[key]);
+    let single = ["image", "cloud", "speed"].iter().map(|key| &settings[key]);
     for name in lists.chain(single).filter_map(Value::as_str) {
         let path = Path::new(name);
         if is_standard_input(path) {

@@ -13,6 +13,8 @@ pub(crate) enum Root {
     LevelSet,
     /// Distances.
     Distance,
+    /// Travel times.
+    Times,
 }
 
 /// What colours a surface.

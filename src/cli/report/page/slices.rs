@@ -87,7 +87,7 @@ fn label_image(folder: &Path, root: Root) -> Result<Option<ImageReader>> {
     let name = match root {
         Root::Image => "labels/segmentation",
         Root::LevelSet => return Ok(None),
-        Root::Distance | Root::Labels => "labels/nearest",
+        Root::Distance | Root::Times | Root::Labels => "labels/nearest",
     };
     let group = folder.join(name);
     if group.is_dir() { ImageReader::open(&group).map(Some) } else { Ok(None) }
@@ -120,7 +120,7 @@ impl Shown {
             Root::Image | Root::Labels => percentile_window(&all, 0.002, 0.998),
             // Grey enough for what is drawn over it to be seen.
             Root::LevelSet => [-0.2, 1.8],
-            Root::Distance => percentile_window(&all, 0.0, 1.0),
+            Root::Distance | Root::Times => percentile_window(&all, 0.0, 1.0),
         };
         let window = window.map(f64::from);
         Self { root, window, step: nice_step((window[1] - window[0]) / LINES) }
@@ -140,7 +140,7 @@ impl Shown {
             pixel_aspect: spacing[column] / spacing[row],
         };
         let mut picture = match self.root {
-            Root::Distance => field_panel(&flat, self.window, self.step, scale),
+            Root::Distance | Root::Times => field_panel(&flat, self.window, self.step, scale),
             _ => panel(&flat, self.window.map(|v| v as f32), scale),
         };
         let at = slice.part.lo[across];
@@ -191,6 +191,10 @@ pub(super) fn explained(evidence: &Evidence<'_>) -> String {
         Root::Distance => format!(
             "Distances from small (violet) to large (yellow), with lines of equal distance; white lines lie where the \
              nearest data set is another or the sign changes. {points}"
+        ),
+        Root::Times => format!(
+            "Travel times from small (violet) to large (yellow), with lines of equal time; white lines lie where the front \
+             of another data set comes first. {points}"
         ),
     }
 }

@@ -10,11 +10,14 @@
 //! equal spacing, and within 64 with spacings of 6 : 1, over random clouds (tests: `wavefront`). In and out: a grown
 //! tile of distances (physical units, infinity where nothing is known), the sign bit set on fixed voxels. Halo 1,
 //! faces. Scratch: about 12 bytes a voxel. Each voxel costs about two updates, whatever the shape of the front.
+//!
+//! `UNEVEN`, it is the same for `|grad T| = 1/F` (docs/algorithms.md, "Travel times"), as `fast_sweeping` has it. A bucket
+//! is then as wide as the tile's mean slowness makes it; a front that is not causal within one costs some updates more.
 
 use super::fast_sweeping::FastSweeping;
-use super::upwind::{Axes, godunov};
+use super::upwind::{Axes, godunov_at};
 use crate::grid::Box3;
-use crate::kernel::distance::state::method::{DistanceMethod, DistanceState};
+use crate::kernel::distance::state::method::{DistanceMethod, DistanceState, TakesSpeeds};
 use crate::kernel::distance::state::precision::{Precision, Real};
 use crate::kernel::distance::tile_order::buckets::{Buckets, LISTED_BYTES, QUEUE_BYTES};
 use crate::tile::{HaloTile, TileCost};
@@ -25,16 +28,16 @@ const LANES: usize = 8;
 /// Width of a bucket, in the smallest spacing.
 const WIDTH: f64 = 0.5;
 
-/// FMM stored as `P`, computed in `A`.
+/// FMM stored as `P`, computed in `A`; `UNEVEN` where each voxel has a speed of its own.
 #[derive(Clone, Copy, Debug)]
-pub struct FastMarching<P, A> {
+pub struct FastMarching<P, A, const UNEVEN: bool = false> {
     /// The same equation: what a state means and when it may fall.
     sweeping: FastSweeping<P, A>,
     axes: Axes<A>,
     spacing: [f64; 3],
 }
 
-impl<P: Precision, A: Real> FastMarching<P, A> {
+impl<P: Precision, A: Real, const UNEVEN: bool> FastMarching<P, A, UNEVEN> {
     /// For a grid of that spacing.
     #[must_use]
     pub fn new(spacing: [f64; 3]) -> Self {
@@ -54,10 +57,12 @@ pub struct Work<L> {
     /// Voxels that fell.
     fallen: Vec<u32>,
     taken: Vec<u32>,
+    /// Of the voxels, where these have any.
+    speeds: HaloTile<f32>,
 }
 
 impl<L: Real> Work<L> {
-    fn new(edge: usize) -> Self {
+    fn new(edge: usize, has_speeds: bool) -> Self {
         let len = (edge + 2).pow(3);
         Self {
             data: vec![L::default().marked(); len],
@@ -66,6 +71,7 @@ impl<L: Real> Work<L> {
             is_listed: vec![false; len],
             fallen: Vec::new(),
             taken: Vec::new(),
+            speeds: HaloTile::new(if has_speeds { edge } else { 0 }),
         }
     }
 
@@ -116,15 +122,23 @@ impl<L: Real> Work<L> {
 
 /// Updates the listed voxels, a vector at a time; leaves those that fell.
 #[inline(always)]
-fn update<P: Precision, A: Real, const ISOTROPIC: bool>(work: &mut Work<P::Lane>, strides: [usize; 3], k: &Axes<A>) {
-    let Work { data, listed, is_listed, fallen, .. } = work;
+fn update<P: Precision, A: Real, const ISOTROPIC: bool, const UNEVEN: bool>(
+    work: &mut Work<P::Lane>,
+    strides: [usize; 3],
+    k: &Axes<A>,
+) {
+    let Work { data, listed, is_listed, fallen, speeds, .. } = work;
     fallen.clear();
     for group in listed.chunks(LANES) {
         let mut places = [group[0]; LANES];
         places[..group.len()].copy_from_slice(group);
         let mut near = [[A::default(); LANES]; 3];
+        let mut speed = [A::default(); LANES];
         for i in 0..LANES {
             let place = places[i] as usize;
+            if UNEVEN {
+                speed[i] = A::of_lane(speeds.data()[place]);
+            }
             for a in 0..3 {
                 let (lower, upper) = (data[place - strides[a]], data[place + strides[a]]);
                 near[a][i] = A::of_lane(lower.magnitude().smaller(upper.magnitude()));
@@ -132,7 +146,8 @@ fn update<P: Precision, A: Real, const ISOTROPIC: bool>(work: &mut Work<P::Lane>
         }
         let mut value = [P::Lane::default(); LANES];
         for i in 0..LANES {
-            value[i] = P::round(godunov::<A, ISOTROPIC>([near[0][i], near[1][i], near[2][i]], k));
+            let near = [near[0][i], near[1][i], near[2][i]];
+            value[i] = P::round(godunov_at::<A, ISOTROPIC, UNEVEN>(near, k, speed[i]));
         }
         for (&place, &value) in group.iter().zip(&value) {
             is_listed[place as usize] = false;
@@ -148,13 +163,13 @@ fn update<P: Precision, A: Real, const ISOTROPIC: bool>(work: &mut Work<P::Lane>
 
 /// Marches until nothing falls; returns whether anything did.
 #[inline(always)]
-fn march<P: Precision, A: Real, const ISOTROPIC: bool>(
+fn march<P: Precision, A: Real, const ISOTROPIC: bool, const UNEVEN: bool>(
     work: &mut Work<P::Lane>,
     strides: [usize; 3],
     k: &Axes<A>,
     [width, range]: [f64; 2],
 ) -> bool {
-    update::<P, A, ISOTROPIC>(work, strides, k);
+    update::<P, A, ISOTROPIC, UNEVEN>(work, strides, k);
     if work.fallen.is_empty() {
         return false;
     }
@@ -171,32 +186,32 @@ fn march<P: Precision, A: Real, const ISOTROPIC: bool>(
             let place = work.taken[n] as usize;
             work.list_beside(place, work.data[place], strides);
         }
-        update::<P, A, ISOTROPIC>(work, strides, k);
+        update::<P, A, ISOTROPIC, UNEVEN>(work, strides, k);
     }
 }
 
 /// A march, compiled for each vector unit.
-struct March<'a, P: Precision, A> {
+struct March<'a, P: Precision, A, const UNEVEN: bool> {
     work: &'a mut Work<P::Lane>,
     strides: [usize; 3],
     axes: &'a Axes<A>,
     reach: [f64; 2],
 }
 
-impl<P: Precision, A: Real> pulp::NullaryFnOnce for March<'_, P, A> {
+impl<P: Precision, A: Real, const UNEVEN: bool> pulp::NullaryFnOnce for March<'_, P, A, UNEVEN> {
     type Output = bool;
 
     #[inline(always)]
     fn call(self) -> bool {
         if self.axes.isotropic {
-            march::<P, A, true>(self.work, self.strides, self.axes, self.reach)
+            march::<P, A, true, UNEVEN>(self.work, self.strides, self.axes, self.reach)
         } else {
-            march::<P, A, false>(self.work, self.strides, self.axes, self.reach)
+            march::<P, A, false, UNEVEN>(self.work, self.strides, self.axes, self.reach)
         }
     }
 }
 
-impl<P: Precision, A: Real> DistanceState for FastMarching<P, A> {
+impl<P: Precision, A: Real, const UNEVEN: bool> DistanceState for FastMarching<P, A, UNEVEN> {
     type State = P;
     const UNKNOWN: P = P::UNKNOWN;
 
@@ -221,17 +236,18 @@ impl<P: Precision, A: Real> DistanceState for FastMarching<P, A> {
     }
 }
 
-impl<P: Precision, A: Real> DistanceMethod for FastMarching<P, A> {
+impl<P: Precision, A: Real, const UNEVEN: bool> DistanceMethod for FastMarching<P, A, UNEVEN> {
     type Work = Work<P::Lane>;
 
     fn work(edge: usize) -> Self::Work {
-        Work::new(edge)
+        Work::new(edge, UNEVEN)
     }
 
     fn cost(edge: usize) -> TileCost {
         // Values and what is listed; the places that are listed, that fell and that are taken.
         let lists = 3 * LISTED_BYTES;
-        TileCost::grown(edge, (size_of::<P::Lane>() + size_of::<bool>()) as u64 + QUEUE_BYTES + lists)
+        let speed = if UNEVEN { size_of::<f32>() } else { 0 };
+        TileCost::grown(edge, (size_of::<P::Lane>() + size_of::<bool>() + speed) as u64 + QUEUE_BYTES + lists)
     }
 
     fn settle(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3) -> bool {
@@ -239,15 +255,37 @@ impl<P: Precision, A: Real> DistanceMethod for FastMarching<P, A> {
         let strides = [1, pitch, pitch * pitch];
         load(tile, &mut work.data);
         work.list_beside_fixed(tile);
-        let width = WIDTH * self.spacing.iter().copied().fold(f64::INFINITY, f64::min);
-        let range = (0..3).map(|a| self.spacing[a] * valid[a] as f64).sum();
-        let changed =
-            pulp::Arch::new().dispatch(March::<P, A> { work, strides, axes: &self.axes, reach: [width, range] });
+        let mut width = WIDTH * self.spacing.iter().copied().fold(f64::INFINITY, f64::min);
+        let mut range = (0..3).map(|a| self.spacing[a] * valid[a] as f64).sum::<f64>();
+        if UNEVEN {
+            let [mean, most] = slowness(&work.speeds, valid);
+            (width, range) = (width * mean, range * most);
+        }
+        let reach = [width, range];
+        let changed = pulp::Arch::new().dispatch(March::<P, A, UNEVEN> { work, strides, axes: &self.axes, reach });
         if changed {
             store(&work.data, tile);
         }
         changed
     }
+}
+
+impl<P: Precision, A: Real> TakesSpeeds for FastMarching<P, A, true> {
+    fn speeds(work: &mut Self::Work) -> &mut HaloTile<f32> {
+        &mut work.speeds
+    }
+}
+
+/// The mean and the largest slowness of the voxels of a tile that can be passed; 1 where none can.
+fn slowness(speeds: &HaloTile<f32>, [nx, ny, nz]: [usize; 3]) -> [f64; 2] {
+    let pitch = speeds.pitch();
+    let (mut sum, mut count, mut least) = (0.0, 0_u32, f32::INFINITY);
+    for row in (1..=nz).flat_map(|z| (1..=ny).map(move |y| (z * pitch + y) * pitch + 1)) {
+        for &speed in speeds.data()[row..][..nx].iter().filter(|speed| **speed > 0.0) {
+            (sum, count, least) = (sum + 1.0 / f64::from(speed), count + 1, least.min(speed));
+        }
+    }
+    if count == 0 { [1.0; 2] } else { [sum / f64::from(count), 1.0 / f64::from(least)] }
 }
 
 /// Copies a grown tile in; ghosts get the sign bit.

@@ -5,26 +5,29 @@
 //! (physical units, infinity where nothing is known); fixed voxels carry the sign bit and are never changed. Halo 1,
 //! faces. Tiles are swept along diagonals (`diagonals`). Where sources are wanted, a sweep also tells which voxels fell
 //! and from which neighbours (Alg. 7); `sweep_sources` makes sources of that.
+//!
+//! `UNEVEN`, it is the same for `|grad T| = 1/F` (docs/algorithms.md, "Travel times"): values are times, and a tile comes
+//! with the speed F of each of its voxels (length by time, 0 where nothing passes).
 
 use std::marker::PhantomData;
 
 use super::sweep_sources::Fell;
-use super::upwind::{Axes, Upwind, solve};
+use super::upwind::{Axes, Upwind, solve_at};
 use crate::grid::Box3;
-use crate::kernel::distance::state::method::{DistanceMethod, DistanceState, OrderedSweeps};
+use crate::kernel::distance::state::method::{DistanceMethod, DistanceState, OrderedSweeps, TakesSpeeds};
 use crate::kernel::distance::state::precision::{Precision, Real};
 use crate::kernel::distance::tile_order::diagonals::{Diagonals, MOST_LANES, has_wide_vectors};
 use crate::kernel::distance::tile_order::directions::{CHANGED, Swept, downhill, sweep_until_quiet};
 use crate::tile::{HaloTile, TileCost};
 
-/// FSM stored as `P`, computed in `A`.
+/// FSM stored as `P`, computed in `A`; `UNEVEN` where each voxel has a speed of its own.
 #[derive(Clone, Copy, Debug)]
-pub struct FastSweeping<P, A> {
+pub struct FastSweeping<P, A, const UNEVEN: bool = false> {
     axes: Axes<A>,
     stored: PhantomData<P>,
 }
 
-impl<P: Precision, A: Real> FastSweeping<P, A> {
+impl<P: Precision, A: Real, const UNEVEN: bool> FastSweeping<P, A, UNEVEN> {
     /// For a grid of that spacing.
     #[must_use]
     pub fn new(spacing: [f64; 3]) -> Self {
@@ -93,10 +96,10 @@ impl Record for Vec<Fell> {
     }
 }
 
-/// One ordered pass over a tile laid out along diagonals, `N` voxels at a time.
+/// One ordered pass over a tile laid out along diagonals, `N` voxels at a time; `speeds` are laid out alike.
 #[inline(always)]
-fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool>(
-    data: &mut [P::Lane],
+fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool, const UNEVEN: bool>(
+    (data, speeds): (&mut [P::Lane], &[f32]),
     layout: &Diagonals,
     upward: [bool; 2],
     k: &Axes<A>,
@@ -114,10 +117,14 @@ fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool>
                 let at = if R::ORDERED && !upward[0] { count - N - n } else { n };
                 let here = run.here[at..].first_chunk_mut::<N>();
                 let beside = run.beside.map(|side| side[at..].first_chunk::<N>());
-                if let (Some(here), [Some(xl), Some(xu), Some(yl), Some(yu), Some(zl), Some(zu)]) = (here, beside) {
+                let from = z * layout.plane + start + at;
+                let speeds = if UNEVEN { speeds[from..].first_chunk::<N>() } else { Some(&[1.0; N]) };
+                if let (Some(here), [Some(xl), Some(xu), Some(yl), Some(yu), Some(zl), Some(zu)], Some(speeds)) =
+                    (here, beside, speeds)
+                {
                     let place = Place { layout, z, at: start + at };
-                    let beside = [xl, xu, yl, yu, zl, zu];
-                    swept |= lower::<P, A, R, N, ISOTROPIC>(here, beside, passed, k, (place, record));
+                    let voxels = (here, [xl, xu, yl, yu, zl, zu], speeds);
+                    swept |= lower::<P, A, R, N, ISOTROPIC, UNEVEN>(voxels, passed, k, (place, record));
                 }
             }
         }
@@ -127,9 +134,8 @@ fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool>
 
 /// Lowers the voxels of one vector. Something is to be carried back to a side that was passed before and is larger.
 #[inline(always)]
-fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool>(
-    here: &mut [P::Lane; N],
-    beside: [&[P::Lane; N]; 6],
+fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool, const UNEVEN: bool>(
+    (here, beside, speeds): (&mut [P::Lane; N], [&[P::Lane; N]; 6], &[f32; N]),
     passed: [usize; 3],
     k: &Axes<A>,
     (place, record): (Place<'_>, &mut R),
@@ -138,7 +144,7 @@ fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool
     let (mut falls, mut more) = ([0_u32; N], [0_u32; N]);
     for i in 0..N {
         let near = |a: usize| A::of_lane(beside[2 * a][i].magnitude().smaller(beside[2 * a + 1][i].magnitude()));
-        let solution = solve::<A, ISOTROPIC>([near(0), near(1), near(2)], k);
+        let solution = solve_at::<A, ISOTROPIC, UNEVEN>([near(0), near(1), near(2)], k, A::of_lane(speeds[i]));
         let x = P::round(solution.value);
         more[i] = solution.more::<P>();
         // A fixed voxel is below zero and so below anything.
@@ -163,24 +169,27 @@ fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool
 }
 
 /// A pass, compiled for each vector unit.
-struct Pass<'a, P: Precision, A, R, const N: usize> {
+struct Pass<'a, P: Precision, A, R, const N: usize, const UNEVEN: bool> {
     data: &'a mut [P::Lane],
+    speeds: &'a [f32],
     layout: &'a Diagonals,
     upward: [bool; 2],
     axes: &'a Axes<A>,
     record: &'a mut R,
 }
 
-impl<P: Precision, A: Real, R: Record, const N: usize> pulp::NullaryFnOnce for Pass<'_, P, A, R, N> {
+impl<P: Precision, A: Real, R: Record, const N: usize, const UNEVEN: bool> pulp::NullaryFnOnce
+    for Pass<'_, P, A, R, N, UNEVEN>
+{
     type Output = Swept;
 
     #[inline(always)]
     fn call(self) -> Swept {
-        let Self { data, layout, upward, axes, record } = self;
+        let Self { data, speeds, layout, upward, axes, record } = self;
         if axes.isotropic {
-            pass::<P, A, R, N, true>(data, layout, upward, axes, record)
+            pass::<P, A, R, N, true, UNEVEN>((data, speeds), layout, upward, axes, record)
         } else {
-            pass::<P, A, R, N, false>(data, layout, upward, axes, record)
+            pass::<P, A, R, N, false, UNEVEN>((data, speeds), layout, upward, axes, record)
         }
     }
 }
@@ -190,9 +199,12 @@ impl<P: Precision, A: Real, R: Record, const N: usize> pulp::NullaryFnOnce for P
 pub struct Work<L> {
     data: Vec<L>,
     layout: Diagonals,
+    /// Where voxels have speeds, these as they were told, and laid out alike.
+    told: HaloTile<f32>,
+    speeds: Vec<f32>,
 }
 
-impl<P: Precision, A: Real> FastSweeping<P, A> {
+impl<P: Precision, A: Real, const UNEVEN: bool> FastSweeping<P, A, UNEVEN> {
     /// Brings the tile into the layout that sweeps of direction `upward` want.
     fn lay_out(work: &mut Work<P::Lane>, tile: &HaloTile<P>, upward: [bool; 3]) {
         let turned = upward[0] != upward[1];
@@ -202,16 +214,19 @@ impl<P: Precision, A: Real> FastSweeping<P, A> {
         }
         work.layout = Diagonals { valid: tile.valid(), turned, ..work.layout };
         work.layout.load(tile, &mut work.data, |v, ghost| if ghost { v.lane().marked() } else { v.lane() });
+        if UNEVEN {
+            work.layout.load(&work.told, &mut work.speeds, |speed, _| speed);
+        }
     }
 
     /// Sweeps the tile as it is laid out.
     fn sweep_layout<R: Record>(&self, work: &mut Work<P::Lane>, upward: [bool; 3], record: &mut R) -> Swept {
-        let Work { data, layout } = work;
+        let Work { data, layout, speeds, .. } = work;
         let (upward, axes) = ([upward[0], upward[2]], &self.axes);
         if has_wide_vectors() {
-            pulp::Arch::new().dispatch(Pass::<P, A, R, 16> { data, layout, upward, axes, record })
+            pulp::Arch::new().dispatch(Pass::<P, A, R, 16, UNEVEN> { data, speeds, layout, upward, axes, record })
         } else {
-            pulp::Arch::new().dispatch(Pass::<P, A, R, 8> { data, layout, upward, axes, record })
+            pulp::Arch::new().dispatch(Pass::<P, A, R, 8, UNEVEN> { data, speeds, layout, upward, axes, record })
         }
     }
 
@@ -244,7 +259,7 @@ impl<P: Precision, A: Real> FastSweeping<P, A> {
     }
 }
 
-impl<P: Precision, A: Real> DistanceState for FastSweeping<P, A> {
+impl<P: Precision, A: Real, const UNEVEN: bool> DistanceState for FastSweeping<P, A, UNEVEN> {
     type State = P;
     const UNKNOWN: P = P::UNKNOWN;
 
@@ -270,15 +285,19 @@ impl<P: Precision, A: Real> DistanceState for FastSweeping<P, A> {
     }
 }
 
-impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
+impl<P: Precision, A: Real, const UNEVEN: bool> DistanceMethod for FastSweeping<P, A, UNEVEN> {
     type Work = Work<P::Lane>;
 
     fn work(edge: usize) -> Self::Work {
-        Work { data: vec![P::Lane::default().marked(); Diagonals::len(edge)], layout: Diagonals::new(edge) }
+        let (told, places) = if UNEVEN { (HaloTile::new(edge), Diagonals::len(edge)) } else { (HaloTile::new(0), 0) };
+        let data = vec![P::Lane::default().marked(); Diagonals::len(edge)];
+        Work { data, layout: Diagonals::new(edge), told, speeds: vec![0.0; places] }
     }
 
     fn cost(edge: usize) -> TileCost {
-        TileCost { halo: 1, scratch: (Diagonals::len(edge) * size_of::<P::Lane>()) as u64 }
+        let places = Diagonals::len(edge);
+        let speeds = if UNEVEN { (places + (edge + 2).pow(3)) * size_of::<f32>() } else { 0 };
+        TileCost { halo: 1, scratch: (places * size_of::<P::Lane>() + speeds) as u64 }
     }
 
     fn settle(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3) -> bool {
@@ -298,7 +317,13 @@ impl<P: Precision, A: Real> DistanceMethod for FastSweeping<P, A> {
     }
 }
 
-impl<P: Precision, A: Real> OrderedSweeps for FastSweeping<P, A> {
+impl<P: Precision, A: Real> TakesSpeeds for FastSweeping<P, A, true> {
+    fn speeds(work: &mut Self::Work) -> &mut HaloTile<f32> {
+        &mut work.told
+    }
+}
+
+impl<P: Precision, A: Real, const UNEVEN: bool> OrderedSweeps for FastSweeping<P, A, UNEVEN> {
     fn sweep(&self, tile: &mut HaloTile<P>, work: &mut Self::Work, _: &Box3, upward: [bool; 3]) -> bool {
         self.sweep_tile(tile, work, upward, &mut Forget)
     }

@@ -1,4 +1,5 @@
-//! The upwind (Godunov) solution of `|grad d| = 1` at a voxel (docs/algorithms.md, "Upwind solution"), and which
+//! The upwind (Godunov) solution of `|grad d| = 1` at a voxel (docs/algorithms.md, "Upwind solution"), that of `|grad T| =
+//! 1/F` where a speed F is given (docs/algorithms.md, "Travel times"), and which
 //! neighbours it is made of, which says where the voxel's source comes from (Kósa & Mikula 2023, Alg. 7, lines 8 to 20;
 //! docs/algorithms.md, "Source tracking").
 //!
@@ -78,18 +79,32 @@ impl<A: Real> Solution<A> {
 }
 
 /// The upwind solution for the smaller neighbours `near` along the three axes; infinity when all of them are.
-///
-/// Values are counted from the smallest neighbour, so that nothing cancels. Without branches: every lane of a vector
-/// computes all three solutions and keeps the one that holds.
 #[inline(always)]
 pub(crate) fn solve<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>) -> Solution<A> {
+    solve_at::<A, ISOTROPIC, false>(near, k, k.one)
+}
+
+/// The same where values are times and a front passes the voxel at `speed`; at 0 it never does. Where not `UNEVEN`, values
+/// are distances and there is no speed.
+///
+/// Values are counted from the smallest neighbour, so that nothing cancels, and times are turned into lengths, so that
+/// nothing overflows. Without branches: every lane of a vector computes all three solutions and keeps the one that holds.
+#[inline(always)]
+pub(crate) fn solve_at<A: Real, const ISOTROPIC: bool, const UNEVEN: bool>(
+    near: [A; 3],
+    k: &Axes<A>,
+    speed: A,
+) -> Solution<A> {
+    let slowness = if UNEVEN { speed.inverse() } else { k.one };
+    let length = |time: A| if UNEVEN { time * speed } else { time };
+    let time = |length: A| if UNEVEN { length * slowness } else { length };
     let axis = |a: usize| (near[a], k.spacing[a], k.weight[a], k.without[a]);
     let mut axes = [axis(0), axis(1), axis(2)];
     order::<A, ISOTROPIC>(&mut axes, 0, 1);
     order::<A, ISOTROPIC>(&mut axes, 1, 2);
     order::<A, ISOTROPIC>(&mut axes, 0, 1);
     let [(first, h, w1, _), (second, _, w2, _), (third, _, w3, without_third)] = axes;
-    let (b, c) = (second - first, third - first);
+    let (b, c) = (length(second - first), length(third - first));
     let zero = A::default();
     // The larger root of sum w (x - a)^2 = 1 over two axes, then over three.
     let mean = w2 * b;
@@ -100,13 +115,19 @@ pub(crate) fn solve<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>) -
     let of_three = (mean3 + discriminant.larger(zero).root()) * k.total[1];
     let two = if h > b { of_two } else { h };
     let x = if two > c { of_three } else { two };
-    Solution { value: first + x, second: (second, first + h), third: (third, first + two) }
+    Solution { value: first + time(x), second: (second, first + time(h)), third: (third, first + time(two)) }
 }
 
 /// The upwind solution alone.
 #[inline(always)]
 pub(crate) fn godunov<A: Real, const ISOTROPIC: bool>(near: [A; 3], k: &Axes<A>) -> A {
     solve::<A, ISOTROPIC>(near, k).value
+}
+
+/// The upwind solution alone, at a speed.
+#[inline(always)]
+pub(crate) fn godunov_at<A: Real, const ISOTROPIC: bool, const UNEVEN: bool>(near: [A; 3], k: &Axes<A>, speed: A) -> A {
+    solve_at::<A, ISOTROPIC, UNEVEN>(near, k, speed).value
 }
 
 /// The neighbours that entered a voxel's upwind solution: bit a that the upper one along axis a counts, bit 3 + a that
@@ -190,6 +211,44 @@ mod tests {
             let found = of(beside);
             assert_eq!((found.sum(), found.first()), (sum, first), "{beside:?}");
             assert_eq!((found.first_alone().sum(), found.first_alone().first()), (first, first), "{beside:?}");
+        }
+    }
+
+    /// The solution is the root of its equation: checked against bisection, which knows nothing of cases.
+    #[test]
+    fn at_a_speed_the_gradient_is_the_slowness() {
+        let mut seed = 7_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        for _ in 0..2000 {
+            let spacing = [0.5 + random(), 0.5 + random(), 0.5 + random()];
+            let speed = 10_f64.powf(6.0 * random() - 3.0);
+            let near = [2.0 * random() / speed, 2.0 * random() / speed, 2.0 * random() / speed];
+            let excess = |x: f64| {
+                let sum: f64 = (0..3).map(|a| ((x - near[a]).max(0.0) / spacing[a]).powi(2)).sum();
+                sum - 1.0 / (speed * speed)
+            };
+            let (mut low, mut high) = (0.0, 10.0 / speed);
+            for _ in 0..200 {
+                let middle = f64::midpoint(low, high);
+                if excess(middle) < 0.0 { low = middle } else { high = middle }
+            }
+            let found = solve_at::<f64, false, true>(near, &Axes::new(spacing), speed).value;
+            assert!((found - low).abs() <= 1e-12 * low, "{found} {low} at {speed}");
+        }
+    }
+
+    #[test]
+    fn nothing_passes_where_the_speed_is_zero_and_speed_one_is_no_speed() {
+        const FAR: f64 = f64::INFINITY;
+        let axes = Axes::new([0.5, 1.0, 0.25]);
+        for near in [[1.0, 1.1, 1.2], [FAR, 1.0, FAR], [FAR, 1.0, 1.05], [FAR; 3]] {
+            assert_eq!(solve_at::<f64, false, true>(near, &axes, 0.0).value, FAR, "{near:?}");
+            let plain = solve::<f64, false>(near, &axes).value;
+            assert_eq!(solve_at::<f64, false, true>(near, &axes, 1.0).value, plain, "{near:?}");
+            assert_eq!(solve_at::<f64, false, true>(near.map(|a| 0.25 * a), &axes, 4.0).value, 0.25 * plain);
         }
     }
 }

@@ -73,3 +73,9 @@ pub trait OrderedSweeps: DistanceMethod {
     /// gives. Returns whether any voxel changed.
     fn sweep(&self, tile: &mut HaloTile<Self::State>, work: &mut Self::Work, part: &Box3, upward: [bool; 3]) -> bool;
 }
+
+/// A method that can be told how fast a front passes each voxel of a tile: its values are then times.
+pub trait TakesSpeeds: DistanceMethod {
+    /// Where the speeds of the tile that is relaxed next go; its ghosts need none.
+    fn speeds(work: &mut Self::Work) -> &mut HaloTile<f32>;
+}

@@ -36,6 +36,9 @@ pub trait Real:
     /// The square root.
     #[must_use]
     fn root(self) -> Self;
+    /// One over the value; infinite for 0.
+    #[must_use]
+    fn inverse(self) -> Self;
     /// The magnitude.
     #[must_use]
     fn magnitude(self) -> Self;
@@ -80,6 +83,10 @@ macro_rules! real {
             #[inline(always)]
             fn root(self) -> Self {
                 self.sqrt()
+            }
+            #[inline(always)]
+            fn inverse(self) -> Self {
+                1.0 / self
             }
             #[inline(always)]
             fn magnitude(self) -> Self {

@@ -2,9 +2,12 @@
 //! methods (docs/algorithms.md, "Source tracking"). A parent has a smaller distance, so chains of parents end at fixed
 //! voxels; `trace` follows them. A voxel in the middle between two sources may have several that are as good; of these
 //! the rules name the first, and say that there are others.
+//!
+//! Where voxels have speeds (docs/algorithms.md, "Travel times") there may be some that nothing passes, and a step to an
+//! edge or a corner may lead through where they touch: `UpwindSum` then takes only steps that faces lead to.
 
 use crate::grid::{Geometry, NEIGHBOURS_26};
-use crate::kernel::distance::methods::upwind::{Axes, Upwind, solve};
+use crate::kernel::distance::methods::upwind::{Axes, Upwind, solve_at};
 use crate::kernel::distance::state::precision::{Precision, Real};
 use crate::tile::HaloTile;
 
@@ -23,8 +26,8 @@ pub trait Parents: Clone + Send + Sync + 'static {
     fn new(geometry: &Geometry, edge: usize) -> Self;
 
     /// Looks at the rows of a grown tile of distances, halo 1, all 26 directions, that start at these places; sign bit
-    /// on fixed voxels.
-    fn find<P: Precision>(&mut self, _distance: &HaloTile<P>, _rows: &[usize]) {}
+    /// on fixed voxels. With speeds these are times; ghosts have none.
+    fn find<P: Precision>(&mut self, _distance: &HaloTile<P>, _speeds: Option<&HaloTile<f32>>, _rows: &[usize]) {}
 
     /// The parent of the voxel at a place of that tile.
     fn parent<P: Precision>(&self, distance: &[P], place: usize) -> Option<Parent>;
@@ -93,6 +96,8 @@ impl ShortestWay {
 #[derive(Clone, Debug)]
 pub struct UpwindSum {
     axes: Axes<f64>,
+    /// Whether there are speeds.
+    is_uneven: bool,
     /// For each voxel of the tile, which neighbours enter; and 1 where others might for them.
     from: Vec<Upwind>,
     tied: Vec<u8>,
@@ -108,6 +113,7 @@ impl Parents for UpwindSum {
         let steps = |code: u8| [Upwind(code).sum(), Upwind(code).first()].map(|offset| step(offset.map(i64::from)));
         Self {
             axes: Axes::new(geometry.spacing),
+            is_uneven: false,
             from: vec![Upwind::default(); (edge + 2).pow(3)],
             tied: vec![0; (edge + 2).pow(3)],
             along: [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(step),
@@ -115,16 +121,21 @@ impl Parents for UpwindSum {
         }
     }
 
-    fn find<P: Precision>(&mut self, distance: &HaloTile<P>, rows: &[usize]) {
-        let Self { axes, from, tied, .. } = self;
-        pulp::Arch::new().dispatch(FindParents { distance, rows, axes, from, tied });
+    fn find<P: Precision>(&mut self, distance: &HaloTile<P>, speeds: Option<&HaloTile<f32>>, rows: &[usize]) {
+        let Self { axes, from, tied, is_uneven, .. } = self;
+        *is_uneven = speeds.is_some();
+        pulp::Arch::new().dispatch(FindParents { distance, speeds, rows, axes, from, tied });
     }
 
     #[inline]
     fn parent<P: Precision>(&self, distance: &[P], place: usize) -> Option<Parent> {
         let here = distance[place].lane();
-        let beside = self.steps[usize::from(self.from[place].0)].map(|step| place.wrapping_add_signed(step));
-        let nearer = beside.into_iter().find(|&beside| distance[beside].lane().magnitude() < here)?;
+        let [sum, first] = self.steps[usize::from(self.from[place].0)].map(|step| place.wrapping_add_signed(step));
+        let is_nearer = |beside: &usize| distance[*beside].lane().magnitude() < here;
+        let along = self.from[place].sum();
+        let steps = std::array::from_fn(|a| self.along[a] * isize::from(along[a]));
+        let sum = Some(sum).filter(|sum| is_nearer(sum) && self.leads_by_faces(distance, place, steps));
+        let nearer = sum.or(Some(first).filter(is_nearer))?;
         Some(Parent { place: nearer, is_tied: self.tied[place] != 0 })
     }
 
@@ -138,14 +149,13 @@ impl Parents for UpwindSum {
             if step != 0 && value(step) == value(-step) { [step, -step] } else { [step; 2] }
         });
         list.clear();
-        let mut add = |step: isize| {
+        for n in 0..8 {
+            let steps: [isize; 3] = std::array::from_fn(|a| sides[a][n >> a & 1]);
+            let step = steps.iter().sum();
             let at = place.wrapping_add_signed(step);
-            if value(step) < here && !list.contains(&at) {
+            if value(step) < here && !list.contains(&at) && self.leads_by_faces(distance, place, steps) {
                 list.push(at);
             }
-        };
-        for n in 0..8 {
-            add((0..3).map(|a| sides[a][n >> a & 1]).sum());
         }
         if list.is_empty() {
             let steps = || sides.into_iter().flatten().filter(|&step| step != 0);
@@ -156,9 +166,23 @@ impl Parents for UpwindSum {
     }
 }
 
+impl UpwindSum {
+    /// Whether steps along the axes to neighbours that entered lead, one after the other in some order, only through voxels that
+    /// have a value. Two do, by way of either of these neighbours; three need one that shares an edge with the voxel.
+    #[inline]
+    fn leads_by_faces<P: Precision>(&self, distance: &[P], place: usize, steps: [isize; 3]) -> bool {
+        if !self.is_uneven || steps.contains(&0) {
+            return true;
+        }
+        let sum: isize = steps.iter().sum();
+        steps.iter().any(|step| distance[place.wrapping_add_signed(sum - step)].lane().magnitude() < P::Lane::INFINITY)
+    }
+}
+
 /// Which neighbours enter the update of each voxel, compiled for each vector unit.
 struct FindParents<'a, P> {
     distance: &'a HaloTile<P>,
+    speeds: Option<&'a HaloTile<f32>>,
     rows: &'a [usize],
     axes: &'a Axes<f64>,
     from: &'a mut [Upwind],
@@ -170,13 +194,18 @@ impl<P: Precision> pulp::NullaryFnOnce for FindParents<'_, P> {
 
     #[inline(always)]
     fn call(self) {
-        if self.axes.isotropic { self.all::<true>() } else { self.all::<false>() }
+        match (self.speeds, self.axes.isotropic) {
+            (None, true) => self.all::<true, false>(&[]),
+            (None, false) => self.all::<false, false>(&[]),
+            (Some(speeds), true) => self.all::<true, true>(speeds.data()),
+            (Some(speeds), false) => self.all::<false, true>(speeds.data()),
+        }
     }
 }
 
 impl<P: Precision> FindParents<'_, P> {
     #[inline(always)]
-    fn all<const ISOTROPIC: bool>(self) {
+    fn all<const ISOTROPIC: bool, const UNEVEN: bool>(self, speeds: &[f32]) {
         let (width, pitch) = (self.distance.valid()[0], self.distance.pitch());
         for &row in self.rows {
             let side = |place: usize| &self.distance.data()[place..][..width];
@@ -188,7 +217,8 @@ impl<P: Precision> FindParents<'_, P> {
                 let value = |side: &[P]| side[x].lane().magnitude();
                 let beside = [value(xl), value(xu), value(yl), value(yu), value(zl), value(zu)];
                 let near = |a: usize| beside[2 * a].smaller(beside[2 * a + 1]).f64();
-                let solution = solve::<f64, ISOTROPIC>([near(0), near(1), near(2)], self.axes);
+                let speed = if UNEVEN { f64::from(speeds[row + x]) } else { 1.0 };
+                let solution = solve_at::<f64, ISOTROPIC, UNEVEN>([near(0), near(1), near(2)], self.axes, speed);
                 *from = Upwind::new(beside, solution.more::<P>());
                 *tied = is_tied(beside, *from);
             }

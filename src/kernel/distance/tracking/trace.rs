@@ -38,18 +38,19 @@ impl<R: Parents> Tracer<R> {
     }
 
     /// Gives voxels their sources where the chain ends at a known one. Returns whether any got one, and whether any
-    /// that has a distance is left without. With the data sets, where their labels are wanted.
+    /// that has a distance is left without. With the data sets, where their labels are wanted; with speeds, where voxels
+    /// have these.
     pub fn trace<P: Precision>(
         &mut self,
         labelled: Option<&DataSets>,
-        distance: &HaloTile<P>,
+        (distance, speeds): (&HaloTile<P>, Option<&HaloTile<f32>>),
         state: &mut HaloTile<SourceState>,
     ) -> (bool, bool) {
         let ([nx, ny, nz], pitch) = (distance.valid(), distance.pitch());
         let rows = (1..=nz).flat_map(|z| (1..=ny).map(move |y| (z * pitch + y) * pitch + 1));
         self.rows.clear();
         self.rows.extend(rows.filter(|&row| lacks(&state.data()[row..][..nx])));
-        self.parents.find(distance, &self.rows);
+        self.parents.find(distance, speeds, &self.rows);
         for &row in &self.rows {
             self.followed[row..][..nx].fill(false);
         }

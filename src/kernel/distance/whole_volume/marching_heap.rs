@@ -7,11 +7,12 @@
 //! labels are wanted, else the first, z slowest. In and
 //! out: dense `[z][y][x]` arrays, distances in physical units, the sign bit set on fixed voxels. Computed in f64,
 //! rounded to `P` at every update. `fast_marching`, in a front of bricks, computes f32 fields in f32 and takes what a
-//! voxel's neighbours end with: the two differ by rounding alone.
+//! voxel's neighbours end with: the two differ by rounding alone. With speeds, values are times (docs/algorithms.md,
+//! "Travel times").
 
 use super::wavefront::Wavefront;
 use crate::grid::{DataSets, FACES, Geometry, NEIGHBOURS_26, NO_SOURCE, SourceState};
-use crate::kernel::distance::methods::upwind::{Axes, godunov};
+use crate::kernel::distance::methods::upwind::{Axes, godunov, godunov_at};
 use crate::kernel::distance::state::precision::{Precision, Real};
 
 /// Bytes of a voxel beside its distance and source: whether it is frozen, and its entries in the heap.
@@ -24,6 +25,8 @@ pub struct MarchingHeap<'a, P> {
     axes: Axes<f64>,
     values: &'a mut [P],
     sources: Option<&'a mut [SourceState]>,
+    /// Of each voxel, where a front is not equally fast everywhere.
+    speeds: Option<&'a [f32]>,
     /// What tells which label is lower.
     sets: Option<&'a DataSets>,
     /// Lengths of the 26 steps.
@@ -45,7 +48,13 @@ impl<'a, P: Precision> MarchingHeap<'a, P> {
             front.push(place, value.f64());
         }
         let steps = NEIGHBOURS_26.map(|offset| geometry.length(offset));
-        Self { front, axes: Axes::new(geometry.spacing), values, sources, sets, steps }
+        Self { front, axes: Axes::new(geometry.spacing), values, sources, speeds: None, sets, steps }
+    }
+
+    /// The same where voxels have speeds; sources are not followed there.
+    #[must_use]
+    pub fn through(self, speeds: Option<&'a [f32]>) -> Self {
+        Self { speeds, ..self }
     }
 
     /// Freezes up to `count` voxels; false when all that can be reached are frozen.
@@ -79,7 +88,10 @@ impl<'a, P: Precision> MarchingHeap<'a, P> {
             let side = |upper: usize| self.frozen(self.front.beside(voxel, FACES[2 * a + upper].offset()));
             side(0).min(side(1))
         });
-        let value = P::round(godunov::<f64, false>(near, &self.axes));
+        let value = P::round(match self.speeds {
+            Some(speeds) => godunov_at::<f64, false, true>(near, &self.axes, f64::from(speeds[place])),
+            None => godunov::<f64, false>(near, &self.axes),
+        });
         if value < kept {
             self.values[place] = P::of_lane(value);
             self.front.push(place, value.f64());

@@ -48,6 +48,7 @@ fn label_type(sets: &DataSets) -> ElementType {
 pub(crate) struct Images<'a, P: Element> {
     store: &'a StoreWriter,
     geometry: &'a Geometry,
+    name: &'static str,
     distance: Pyramid<P>,
     labels: Option<Box<dyn LabelImage>>,
     borders: Option<Box<dyn LabelImage>>,
@@ -73,12 +74,13 @@ impl<'a, P: Precision> Images<'a, P> {
     /// Begins all images that are wanted.
     pub(crate) fn new(
         engine: &Engine,
-        geometry: &'a Geometry,
+        (geometry, is_timed): (&'a Geometry, bool),
         sets: &DataSets,
         wanted: Wanted,
         store: &'a StoreWriter,
     ) -> Result<Self> {
-        let image = store.image("", &distance_spec::<P>(geometry, None))?;
+        let name = if is_timed { "travel time" } else { "distance" };
+        let image = store.image("", &distance_spec::<P>((name, geometry), None))?;
         let labels = |name, is_wanted: bool| is_wanted.then(|| label_image(engine, geometry, sets, name, store));
         let closest = wanted.closest_point.then(|| {
             Ok(if geometry.fits_single() {
@@ -90,6 +92,7 @@ impl<'a, P: Precision> Images<'a, P> {
         Ok(Self {
             store,
             geometry,
+            name,
             distance: Pyramid::new(engine, image, Reduce::Mean)?,
             labels: labels("nearest", wanted.labels).transpose()?,
             borders: labels("border", wanted.borders).transpose()?,
@@ -147,12 +150,12 @@ impl<'a, P: Precision> Images<'a, P> {
 
     /// Says which range of distances there is.
     pub(crate) fn describe(&self, range: [f64; 2]) -> Result<()> {
-        self.store.describe("", &distance_spec::<P>(self.geometry, Some(range)))
+        self.store.describe("", &distance_spec::<P>((self.name, self.geometry), Some(range)))
     }
 }
 
-fn distance_spec<P: Element>(geometry: &Geometry, window: Option<[f64; 2]>) -> ImageSpec<'_> {
-    ImageSpec { name: "distance", geometry, element: P::TYPE, content: Content::Field, window, extremes: window }
+fn distance_spec<'a, P: Element>((name, geometry): (&'a str, &'a Geometry), window: Option<[f64; 2]>) -> ImageSpec<'a> {
+    ImageSpec { name, geometry, element: P::TYPE, content: Content::Field, window, extremes: window }
 }
 
 fn coordinates<T: Element>(engine: &Engine, geometry: &Geometry, store: &StoreWriter) -> Result<[Pyramid<T>; 3]> {

@@ -62,7 +62,9 @@ impl<'a, P: Precision> Reading<'a, P> {
     /// When the output cannot be written or scratch runs out.
     pub(crate) fn new(what: ReadOut<'a, P>, engine: &'a Engine, store: Option<&'a StoreWriter>) -> Result<Self> {
         let (geometry, sets) = (what.geometry, what.sets);
-        let images = store.map(|store| Images::<P>::new(engine, geometry, sets, what.wanted, store)).transpose()?;
+        let images = store
+            .map(|store| Images::<P>::new(engine, (geometry, what.is_timed), sets, what.wanted, store))
+            .transpose()?;
         let threads = all_threads(engine.comm(), engine.threads())?;
         let finest = images.as_ref().map(Images::finest);
         let visits = match &finest {

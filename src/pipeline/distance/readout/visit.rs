@@ -25,6 +25,8 @@ pub(crate) struct ReadOut<'a, P: Precision> {
     pub(crate) sets: &'a DataSets,
     /// Distances are negative inside meshes.
     pub(crate) is_signed: bool,
+    /// They are times that fronts take.
+    pub(crate) is_timed: bool,
     pub(crate) wanted: Wanted,
     /// What stays with who asked for it.
     pub(crate) kept: Option<&'a Kept<P>>,

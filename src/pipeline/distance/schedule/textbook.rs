@@ -10,6 +10,7 @@ use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::kernel::distance::state::precision::{Precision, Real};
 use crate::kernel::distance::whole_volume::dijkstra_heap::DijkstraHeap;
 use crate::kernel::distance::whole_volume::marching_heap::MarchingHeap;
+use crate::pipeline::distance::medium::{Medium, time_squared};
 use crate::store::{BoxSource, BrickArray};
 
 /// Voxels frozen between two looks at whether the run was interrupted.
@@ -44,6 +45,8 @@ pub(crate) struct Wanted<'a> {
     pub(crate) sources: bool,
     /// The data sets whose labels they stand for.
     pub(crate) labelled: Option<&'a DataSets>,
+    /// Where a front is not equally fast everywhere; sources are not followed there.
+    pub(crate) medium: Option<&'a Medium>,
 }
 
 /// Marches from the fixed voxels among `states` into `distances`; where sources are `wanted`, `states` get them.
@@ -62,17 +65,20 @@ pub(crate) fn heap_marching<P: Precision, S: TrackedSource>(
     let mut dense = vec![SourceState::FAR; domain.len()];
     states.read_box(&domain, &mut dense)?;
     let mut values = vec![P::UNKNOWN; domain.len()];
+    let speeds = wanted.medium.map(Medium::whole).transpose()?;
     for (place, (y, z)) in (0..).step_by(domain.shape()[0] as usize).zip(domain.rows()) {
         for x in domain.lo[0]..domain.hi[0] {
-            let state = dense[place + x as usize];
+            let place = place + x as usize;
+            let state = dense[place];
             if S::is_fixed(state) {
-                let distance = P::round(start.distance(state, [x, y, z]));
-                values[place + x as usize] = P::of_lane(distance.marked());
+                let squared = start.distance_squared(state, [x, y, z]);
+                let squared = speeds.as_ref().map_or(squared, |speeds| time_squared(squared, speeds[place]));
+                values[place] = P::of_lane(P::round(squared.sqrt()).marked());
             }
         }
     }
     let sources = wanted.sources.then_some(dense.as_mut_slice());
-    let mut heap = MarchingHeap::new(geometry, &mut values, sources, wanted.labelled);
+    let mut heap = MarchingHeap::new(geometry, &mut values, sources, wanted.labelled).through(speeds.as_deref());
     while heap.advance(STRIDE) {
         engine.check()?;
     }

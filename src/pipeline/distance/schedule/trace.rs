@@ -16,6 +16,7 @@ use crate::grid::{Box3, DataSets, Geometry, NEIGHBOURS_26, Slot, SourceState};
 use crate::kernel::distance::state::precision::Precision;
 use crate::kernel::distance::tracking::parents::Parents;
 use crate::kernel::distance::tracking::trace::{Tracer, fill};
+use crate::pipeline::distance::medium::Medium;
 use crate::store::{BoxSource, BrickArray};
 use crate::tile::HaloTile;
 
@@ -23,7 +24,7 @@ use crate::tile::HaloTile;
 /// of the lowest label, where there are data sets with labels.
 pub(crate) fn trace_sources<P: Precision, R: Parents>(
     stage: &Stage<'_>,
-    geometry: &Geometry,
+    (geometry, medium): (&Geometry, Option<&Medium>),
     labelled: Option<&DataSets>,
     distances: &BrickArray<P>,
     states: &BrickArray<SourceState>,
@@ -36,16 +37,21 @@ pub(crate) fn trace_sources<P: Precision, R: Parents>(
     exchange.faces(distances, &set.owned().collect::<Vec<_>>())?;
     exchange.faces(states, start)?;
     let tracer = Tracer::<R>::new(geometry, edge);
-    let workers = &Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), tracer.clone()));
+    let of_speeds = if medium.is_some() { edge } else { 0 };
+    let workers =
+        &Workers::new(move || (HaloTile::new(edge), HaloTile::new(edge), HaloTile::new(of_speeds), tracer.clone()));
     let waves = &corner_colours(&set);
     let waves = Waves { stage, exchange, workers, waves };
     let gather = |distance: &mut HaloTile<P>, state: &mut HaloTile<SourceState>, slot: Slot| {
         plan.gather(distances, slot, Boundary::Constant(P::UNKNOWN), distance);
         plan.gather(states, slot, Boundary::Constant(SourceState::FAR), state);
     };
-    let trace = |(distance, state, tracer): &mut (_, _, Tracer<R>), slot| {
+    let trace = |(distance, state, speeds, tracer): &mut (_, _, _, Tracer<R>), slot| {
         gather(distance, state, slot);
-        let (found, left) = tracer.trace(labelled, distance, state);
+        if let Some(medium) = medium {
+            medium.put(slot, speeds);
+        }
+        let (found, left) = tracer.trace(labelled, (distance, medium.map(|_| &*speeds)), state);
         if found {
             plan.scatter(state, states, slot);
         }
@@ -55,14 +61,14 @@ pub(crate) fn trace_sources<P: Precision, R: Parents>(
     let mut missing = Missing::new(states, complete, trace);
     missing.far = middles(distances)?;
     missing.begin(start, true);
-    let window = edge as f64 * geometry.max_spacing();
+    let window = edge as f64 * geometry.max_spacing() * medium.map_or(1.0, Medium::slowness);
     waves.relax(&mut missing, Until { width: window, ..Until::QUIET })?;
     let complete = missing.complete;
     let left: Vec<Slot> = set.owned().filter(|&slot| !complete[slot as usize]).collect();
     if !stage.comm().any(!left.is_empty())? {
         return Ok(());
     }
-    let fill = |(distance, state, _): &mut (_, _, Tracer<R>), slot| {
+    let fill = |(distance, state, ..): &mut (_, _, HaloTile<f32>, Tracer<R>), slot| {
         gather(distance, state, slot);
         let (changed, left) = fill(distance, state);
         if changed {

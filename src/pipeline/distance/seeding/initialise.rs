@@ -3,14 +3,14 @@
 
 use crate::error::Result;
 use crate::exec::{Stage, Workers};
-use crate::grid::Slot;
-use crate::grid::SourceState;
+use crate::grid::{NO_SOURCE, Slot, SourceState};
 use crate::kernel::distance::methods::shape_distance::ShapeDistance;
 use crate::kernel::distance::seeding::initialise::fix_voxels;
 use crate::kernel::distance::seeding::seeds::{Seeds, write_states};
 use crate::kernel::distance::seeding::triangles;
 use crate::kernel::distance::state::method::DistanceState;
 use crate::pipeline::distance::Sources;
+use crate::pipeline::distance::medium::{Medium, time_squared};
 use crate::store::BrickArray;
 
 /// At most so far beyond the voxels that a point fixes others are told of it, in voxels: what that costs grows with it.
@@ -80,6 +80,9 @@ pub(crate) fn initialise<M: DistanceState>(
             let beside = sources.geometry.length([2; 3]);
             outside.fix_voxels(&part, edge, farthest + beside, fixed);
         }
+        if let Some(medium) = sources.medium {
+            turn_into_times(medium, slot, fixed);
+        }
         if spreads {
             let points = sources.points_seeding(id, margin);
             fix_voxels(sources.geometry, &part, edge, points, &mut told.squared, &mut told.source);
@@ -101,4 +104,18 @@ pub(crate) fn initialise<M: DistanceState>(
         fixed_voxels: counts.iter().map(|(fixed, _, _)| fixed).sum(),
         triangle_distances: counts.iter().map(|(_, _, distances)| distances).sum(),
     })
+}
+
+/// Makes the distances of fixed voxels the times that these take at the voxels' own speeds; what nothing passes is not fixed.
+fn turn_into_times(medium: &Medium, slot: Slot, fixed: &mut Seeds) {
+    medium.of(slot, |speeds| {
+        for ((squared, source), &speed) in fixed.squared.iter_mut().zip(&mut fixed.source).zip(speeds) {
+            if *source != NO_SOURCE {
+                *squared = time_squared(*squared, speed);
+            }
+            if speed == 0.0 {
+                *source = NO_SOURCE;
+            }
+        }
+    });
 }

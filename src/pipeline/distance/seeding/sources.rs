@@ -4,6 +4,7 @@ use crate::grid::{Box3, BrickId, DataSets, Geometry, PointBins, TriangleBins, Tr
 use crate::kernel::distance::features::source_trees::SourceTrees;
 use crate::kernel::distance::seeding::initialise::Cube;
 use crate::kernel::distance::seeding::outside::OutsideSources;
+use crate::pipeline::distance::medium::Medium;
 
 /// Points, and triangles where there are any, sorted by the bricks of a grid.
 #[derive(Clone, Copy, Debug)]
@@ -25,13 +26,15 @@ pub struct Sources<'a> {
     pub trees: Option<&'a SourceTrees>,
     /// The same, where some reach out of the grid and count there too.
     pub outside: Option<&'a OutsideSources<'a>>,
+    /// What a front goes through, where it is not equally fast everywhere.
+    pub medium: Option<&'a Medium>,
 }
 
 impl<'a> Sources<'a> {
     /// A cloud whose points fix the corners of their cells; those outside of the grid are left out.
     #[must_use]
     pub fn cloud(geometry: &'a Geometry, positions: &'a [[f64; 3]], bins: &'a PointBins) -> Self {
-        Self { geometry, positions, bins, cubes: &[], mesh: None, sets: None, trees: None, outside: None }
+        Self { geometry, positions, bins, cubes: &[], mesh: None, sets: None, trees: None, outside: None, medium: None }
     }
 
     /// Points and triangles as data sets, where there are triangles.
