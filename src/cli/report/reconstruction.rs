@@ -22,6 +22,8 @@ pub(crate) struct Settings {
     motion: Moves,
     /// Null when it was found; it is then in the result.
     beta: Option<f64>,
+    /// Null when it was told from the points; it is then in the result.
+    noise: Option<f64>,
     scratch: String,
 }
 
@@ -40,6 +42,7 @@ impl Settings {
             method: settings.method.name(),
             motion: Moves::new(&settings.motion, &found.geometry),
             beta: settings.beta,
+            noise: settings.noise,
             scratch: scratch.display().to_string(),
         }
     }
@@ -59,12 +62,16 @@ pub(crate) struct Found {
     hausdorff: Option<Hausdorff>,
     distances: Option<Distances>,
     cloud_points: u64,
-    /// Points farther from the surface than a voxel.
+    /// Points farther from the surface than a voxel, and than three times a noise that was followed.
     lost_points: u64,
     /// Points held as thin shells or slits.
     sheet_points: u64,
     spaces: usize,
     beta: f64,
+    /// Standard deviation of the points from the surface; null where they do not tell it.
+    noise: Option<f64>,
+    /// Points that were moved onto the surface around them.
+    moved_points: u64,
     hole: Option<Hole>,
     band_voxels: u64,
     #[serde(flatten)]
@@ -88,6 +95,8 @@ impl Found {
             sheet_points: found.sheet_points,
             spaces: found.spaces,
             beta: found.beta,
+            noise: found.noise.deviation,
+            moved_points: found.noise.moved,
             hole: found.hole.map(Into::into),
             band_voxels: found.band_voxels,
             moved: Moved::from(&found.evolution),

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::estimate::{BUFFERS, WRITING, begin, boxes};
 use super::flat::flat;
+use super::noise::{Noise, without_noise};
 use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
@@ -24,6 +25,9 @@ use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 /// Points farther from the solved surface than so many largest spacings have been left by it.
 const LEFT_VOXELS: f64 = 0.6;
 
+/// A point may be so many deviations of the noise off the surface.
+const OF_NOISE: f64 = 3.0;
+
 /// A cloud that is no thicker than this part of a spacing, root mean square, is flat.
 const FLAT_VOXELS: f64 = 0.1;
 
@@ -33,6 +37,8 @@ pub struct Reconstruction {
     pub geometry: Geometry,
     /// Where the start surface lay.
     pub beta: f64,
+    /// How the points scatter around the surface, and how many of them were moved onto it for that.
+    pub noise: Noise,
     /// The cloud's largest hole.
     pub hole: Option<Hole>,
     /// Number of spaces that the cloud encloses.
@@ -49,7 +55,7 @@ pub struct Reconstruction {
     pub hausdorff: Option<Hausdorff>,
     /// How many points are how far from it.
     pub spread: Option<Spread>,
-    /// Points farther from the surface than the largest spacing.
+    /// Points farther from the surface than the largest spacing and three times the noise.
     pub lost_points: u64,
     /// The solved fields.
     band: Band,
@@ -146,19 +152,24 @@ pub fn reconstruct_shown(
 ) -> Result<Reconstruction> {
     let _buffers = engine.reserve(BUFFERS)?;
     let held = engine.reserve(boxes(&begin(grid, cloud, settings), cloud))?;
-    let enclosure = enclosed(engine, grid, cloud, settings)?;
+    let (smooth, noise) = without_noise(engine, cloud, settings.noise)?;
+    // The surface is that of the smooth points; what is measured is how far it is from those that were given.
+    let points = smooth.as_deref().unwrap_or(cloud);
+    let enclosure = enclosed(engine, grid, points, settings)?;
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
     let window = enclosure.window;
     let larger_beta = enclosure.larger_beta();
     let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
     let (mut band, held_by_box) = enclosure.into_band(engine, "")?;
     let mut growing = Growing::of(shown_in, "surface", &geometry)?;
-    let evolution = solve(engine, &geometry, cloud, settings, (&mut band, &mut sheet), growing.as_mut())?;
+    let evolution = solve(engine, &geometry, points, settings, (&mut band, &mut sheet), growing.as_mut())?;
     drop(growing);
     let told = if settings.keeps_grid { grid.clone() } else { geometry.clone() };
     mesh.on_grid(&told)?;
     let is_first = engine.comm().rank() == 0;
-    let drawn = if is_first { draw(engine, (&band, &geometry), cloud, mesh)? } else { Drawn::default() };
+    let lost_beyond =
+        geometry.max_spacing() + noise.deviation.filter(|_| noise.moved > 0).map_or(0.0, |d| OF_NOISE * d);
+    let drawn = if is_first { draw(engine, (&band, &geometry), (cloud, lost_beyond), mesh)? } else { Drawn::default() };
     let Drawn { measures, hausdorff, spread, lost_points } = drawn;
     if is_first && (measures.triangles == 0 || lost_points == cloud.len() as u64) {
         return Err(vanished(settings, grid, larger_beta));
@@ -166,6 +177,7 @@ pub fn reconstruct_shown(
     Ok(Reconstruction {
         geometry: told,
         beta,
+        noise,
         hole,
         spaces,
         sheet_points: sheet.len() as u64,
@@ -185,7 +197,7 @@ pub fn reconstruct_shown(
 fn draw(
     engine: &Engine,
     (band, geometry): (&Band, &Geometry),
-    cloud: &[[f64; 3]],
+    cloud: (&[[f64; 3]], f64),
     mesh: &mut dyn MeshSink,
 ) -> Result<Drawn> {
     let stage = engine.stage("surface", 0);
