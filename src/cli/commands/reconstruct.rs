@@ -373,6 +373,16 @@ fn describe_found(found: &Reconstruction) -> String {
         let at = place(hole.place, 0.1 * hole.width);
         format!("largest hole of the cloud: {} wide, at {at}", number(hole.width))
     }));
+    if let Some(cap) = found.caps.first() {
+        let share = 100.0 * found.caps.iter().map(|cap| cap.area).sum::<f64>() / m.area;
+        lines.push(format!(
+            "holes closed without points: {}, {} % of the surface; the widest {} wide, at {}",
+            grouped(found.caps.len() as u64),
+            number(share),
+            number(cap.width),
+            place(cap.place, 0.1 * cap.width)
+        ));
+    }
     lines.push(format!(
         "start at {} from the points; {} steps, ended by {}",
         number(found.beta),

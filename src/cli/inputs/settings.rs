@@ -144,8 +144,8 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::pipeline::distance::Method;
     use crate::cli::args::command_line::{Cli, Command};
+    use crate::pipeline::distance::Method;
     use crate::pipeline::segment::FillGaps;
 
     fn typed(flags: &str) -> Box<SegmentArgs> {

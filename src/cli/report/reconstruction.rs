@@ -8,7 +8,7 @@ use super::run_report::{Distances, Hausdorff, Hole, SimplifiedCopy};
 use super::settings::{Moved, Moves};
 use crate::cli::args::reconstruct::ReconstructArgs;
 use crate::pipeline::output::viewer_mesh::Simplified;
-use crate::pipeline::reconstruct::{ReconstructSettings, Reconstruction};
+use crate::pipeline::reconstruct::{Cap, ReconstructSettings, Reconstruction};
 
 /// Every setting, also those that nobody gave; lengths physical.
 #[derive(Debug, Serialize)]
@@ -73,6 +73,8 @@ pub(crate) struct Found {
     /// Points that were moved onto the surface around them.
     moved_points: u64,
     hole: Option<Hole>,
+    /// Holes that were closed though no points are there, the widest first.
+    caps: Vec<CappedHole>,
     band_voxels: u64,
     #[serde(flatten)]
     moved: Moved,
@@ -98,8 +100,25 @@ impl Found {
             noise: found.noise.deviation,
             moved_points: found.noise.moved,
             hole: found.hole.map(Into::into),
+            caps: found.caps.iter().map(|cap| CappedHole::new(cap, found.measures.area)).collect(),
             band_voxels: found.band_voxels,
             moved: Moved::from(&found.evolution),
         }
+    }
+}
+
+/// A hole that was closed.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct CappedHole {
+    width: f64,
+    place_xyz: [f64; 3],
+    area: f64,
+    /// Its part of the surface.
+    share: f64,
+}
+
+impl CappedHole {
+    fn new(cap: &Cap, surface: f64) -> Self {
+        Self { width: cap.width, place_xyz: cap.place, area: cap.area, share: cap.area / surface }
     }
 }

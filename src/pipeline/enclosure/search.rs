@@ -60,6 +60,8 @@ pub struct Search<'a> {
     pub start: Start,
     /// The distance from the cloud within which the search begins.
     pub first_reach: f64,
+    /// Whether the search goes on, within twice the reach, where the first one finds too little.
+    pub grows: bool,
     /// What is added to the names of stages.
     pub suffix: &'a str,
 }
@@ -148,6 +150,8 @@ pub struct Enclosure {
 pub enum Found {
     /// Something enclosed.
     Enclosed(Box<Enclosure>),
+    /// Too little within the first reach, where the search was not to go on.
+    Open,
     /// Nothing at the beta that was asked for; a larger one would do.
     Leaks(Deepest),
     /// Nothing; at most a space that is not deep enough for its holes.
@@ -182,6 +186,9 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     loop {
         let around = Around::new(engine, search, farthest, &mut progress)?;
         let mut sides = around.sides_found(engine, search, &mut progress)?;
+        if !search.grows && (sides.basins.is_empty() || !enough(&sides)) {
+            return Ok(Found::Open);
+        }
         // No ball fits the box around the cloud that is larger.
         let all = 2.0 * farthest > search.extents().into_iter().fold(f64::INFINITY, f64::min) + grid.max_spacing();
         // Where balls were tried before, they were to be.

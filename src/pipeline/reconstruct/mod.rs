@@ -4,6 +4,7 @@
 //! cloud -> grid -> points without noise -> distance -> flood -> band -> time loop -> u -> surface -> mesh, measures
 //! ```
 
+mod caps;
 mod estimate;
 mod flat;
 mod grid;
@@ -14,6 +15,7 @@ mod output;
 mod settings;
 mod spacing;
 
+pub use caps::Cap;
 pub use estimate::{Estimate, estimate, plan, refuse_too_fine, spacing_memory};
 pub use grid::grid_for;
 pub use isolated::without_isolated;

@@ -119,7 +119,8 @@ impl Known<'_> {
             Ok(part.iter().map(place).collect::<Vec<_>>())
         })?;
         let found = || found.iter().flatten();
-        let cloud = self.points.iter().zip(found()).map(|(point, place)| place.map_or(*point, |place| place.to_array()));
+        let cloud =
+            self.points.iter().zip(found()).map(|(point, place)| place.map_or(*point, |place| place.to_array()));
         Ok((cloud.collect(), found().flatten().count() as u64))
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::caps::{Cap, Closing, close};
 use super::estimate::{BUFFERS, WRITING, begin, boxes};
 use super::flat::flat;
 use super::noise::{Noise, without_noise};
@@ -39,6 +40,8 @@ pub struct Reconstruction {
     pub beta: f64,
     /// How the points scatter around the surface, and how many of them were moved onto it for that.
     pub noise: Noise,
+    /// The holes that were closed by caps, the widest first.
+    pub caps: Vec<Cap>,
     /// The cloud's largest hole.
     pub hole: Option<Hole>,
     /// Number of spaces that the cloud encloses.
@@ -155,7 +158,8 @@ pub fn reconstruct_shown(
     let (smooth, noise) = without_noise(engine, cloud, settings.noise)?;
     // The surface is that of the smooth points; what is measured is how far it is from those that were given.
     let points = smooth.as_deref().unwrap_or(cloud);
-    let enclosure = enclosed(engine, grid, points, settings)?;
+    let Begun { enclosure, closed, caps } = enclosed(engine, grid, points, settings)?;
+    let points = closed.as_deref().unwrap_or(points);
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
     let window = enclosure.window;
     let larger_beta = enclosure.larger_beta();
@@ -178,6 +182,7 @@ pub fn reconstruct_shown(
         geometry: told,
         beta,
         noise,
+        caps,
         hole,
         spaces,
         sheet_points: sheet.len() as u64,
@@ -207,13 +212,16 @@ fn draw(
     Ok(drawn)
 }
 
-/// What the cloud encloses.
-fn enclosed(
-    engine: &Engine,
-    grid: &Geometry,
-    cloud: &[[f64; 3]],
-    settings: &ReconstructSettings,
-) -> Result<Box<Enclosure>> {
+/// What a search starts from, and what was found.
+struct Begun {
+    enclosure: Box<Enclosure>,
+    /// The points that close the cloud, behind its own.
+    closed: Option<Vec<[f64; 3]>>,
+    caps: Vec<Cap>,
+}
+
+/// What the cloud encloses: as it is where that is told near it, else with caps over its holes, else as far from it as is needed.
+fn enclosed(engine: &Engine, grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructSettings) -> Result<Begun> {
     let search = Search {
         grid,
         cloud,
@@ -221,15 +229,31 @@ fn enclosed(
         beta: settings.beta,
         start: Start::Watershed,
         first_reach: first_reach_for(grid, settings.beta),
+        grows: settings.beta.is_some(),
         suffix: "",
     };
-    match enclose(engine, &search)? {
-        Found::Enclosed(enclosure) => Ok(enclosure),
+    let begun = |enclosure, closed, caps| Ok(Begun { enclosure, closed, caps });
+    let mut found = enclose(engine, &search)?;
+    if let Found::Open = found {
+        let Closing { points, caps } = close(&engine.by_itself(), cloud)?;
+        if !points.is_empty() {
+            let closed = [cloud, &points].concat();
+            if let Found::Enclosed(enclosure) =
+                enclose(engine, &Search { cloud: &closed, suffix: " with caps", ..search })?
+            {
+                return begun(enclosure, Some(closed), caps);
+            }
+        }
+        found = enclose(engine, &Search { grows: true, suffix: " farther", ..search })?;
+    }
+    match found {
+        Found::Enclosed(enclosure) => begun(enclosure, None, Vec::new()),
         Found::Leaks(deepest) => Err(flat_cloud(grid, cloud).unwrap_or_else(|| leaks(settings, grid, &deepest))),
         Found::Nothing(deepest) => {
             let nothing = || encloses_nothing(settings, grid, deepest.as_ref());
             Err(flat_cloud(grid, cloud).unwrap_or_else(nothing))
         }
+        Found::Open => Err(encloses_nothing(settings, grid, None)),
     }
 }
 
