@@ -2,10 +2,10 @@
 //! "Holes").
 //!
 //! Normals are fitted and turned to one side, and each point stands for a small facet. The winding number of these facets is 1
-//! inside, 0 outside and 1/2 where the rims of a hole see as much of one side as of the other: there, on a lattice as fine as
-//! the points, new points are put. They are looked for near points, and where blocks of the lattice see both sides.
+//! inside, 0 outside and 1/2 where as much of one side is seen as of the other, as on a disc in its rim: there, on a lattice as
+//! fine as the points, new points are put. They are looked for beside rims, and followed from there.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 
 use glam::DVec3;
@@ -24,10 +24,12 @@ use crate::kernel::topology::union_find::Forest;
 const NEIGHBOURS: usize = 12;
 /// A cap is farther than so many edges of the square that a point has of the surface from all points.
 const BESIDE: f64 = 1.6;
-/// Steps of the lattice along a block.
-const BLOCK: i64 = 8;
-/// Blocks at most along all axes together: a few hundred along each.
-const MOST_BLOCKS: f64 = 2e6;
+/// Beside a rim that far beyond a point, where no other point is as near as that, the surface would go on.
+const BEYOND: f64 = 2.2;
+/// Caps of more than so many new points for each of the cloud's are no caps.
+const MOST_NEW: usize = 3;
+/// Points or nodes that one thread takes at a time.
+const AT_ONCE: usize = 256;
 /// The border between inside and outside.
 const HALF: f64 = 0.5;
 /// Bytes a point takes: its place, twice, node, normal, links, facet and its place in the winding number's tree.
@@ -75,31 +77,37 @@ pub(super) fn close(engine: &Engine, points: &[[f64; 3]]) -> Result<Closing> {
     let tree = RTree::<Numbered>::bulk_load(numbered);
     let around = Around::new(&stage, points, &tree)?;
     let facets = facets(points, &around);
-    let Some(lattice) = Lattice::new(points, around.apart) else { return Ok(Closing::default()) };
-    let known = Known { tree: &tree, winding: WindingTree::new(&facets), lattice };
-    let places = known.places(&stage, points)?;
+    let (first, step) = (DVec3::from(points.first().copied().unwrap_or_default()), around.apart);
+    let mut lattice = Lattice { tree: &tree, winding: WindingTree::new(&facets), first, step, known: HashMap::new() };
+    let rims = lattice.rims(&stage, points, &around)?;
+    let places = lattice.places(&stage, rims, MOST_NEW * points.len())?;
     stage.finish();
-    Ok(Closing { points: places.iter().map(|place| place.at.to_array()).collect(), caps: caps(&places, lattice.step) })
+    Ok(Closing { points: places.iter().map(|place| place.at.to_array()).collect(), caps: caps(&places, step) })
 }
 
 /// Normals of the points, turned to one side, and what part of the surface each has.
 struct Around {
     normals: Vec<DVec3>,
     areas: Vec<f64>,
+    /// Towards where each point has no neighbours, along the surface; unit length.
+    beyond: Vec<DVec3>,
     /// The edge of the square that a point has of the surface, the median.
     apart: f64,
 }
 
 impl Around {
     fn new(stage: &Stage<'_>, points: &[[f64; 3]], tree: &RTree<Numbered>) -> Result<Self> {
-        let parts: Vec<&[[f64; 3]]> = points.chunks(512).collect();
+        let parts: Vec<&[[f64; 3]]> = points.chunks(AT_ONCE).collect();
         let found = stage.run(&parts, &Workers::none(), |(), part| {
             let told = |p: &[f64; 3]| {
                 let near: Vec<_> = tree.nearest_neighbor_iter(*p).take(NEIGHBOURS).collect();
                 let places: Vec<DVec3> = near.iter().map(|n| DVec3::from(*n.geom())).collect();
                 let radius = places.last().map_or(0.0, |last| last.distance(places[0]));
                 let numbers: Vec<u32> = near.iter().map(|n| n.data).collect();
-                (plane_normal(&places, &[1.0; NEIGHBOURS][..places.len()]), radius, numbers)
+                let normal = plane_normal(&places, &[1.0; NEIGHBOURS][..places.len()]);
+                let others = places.iter().sum::<DVec3>() / places.len() as f64 - places[0];
+                let beyond = -(others - normal * others.dot(normal)).normalize_or_zero();
+                (normal, radius, numbers, beyond)
             };
             Ok(part.iter().map(told).collect::<Vec<_>>())
         })?;
@@ -110,14 +118,20 @@ impl Around {
             let ends = [a.min(b), a.max(b)];
             Link::between(ends, ends.map(|n| places[n as usize]), ends.map(|n| normals[n as usize]))
         };
-        let links =
-            (0..).zip(&found).flat_map(|(a, (.., near))| near.iter().filter(move |&&b| a != b).map(move |&b| (a, b)));
+        let links = (0..)
+            .zip(&found)
+            .flat_map(|(a, (_, _, near, _))| near.iter().filter(move |&&b| a != b).map(move |&b| (a, b)));
         let links: Vec<Link> = links.map(|(a, b)| of(a, b)).collect();
         orient(&places, &mut normals, links);
-        let areas: Vec<f64> = found.iter().map(|(_, radius, _)| PI * radius * radius / NEIGHBOURS as f64).collect();
+        let areas: Vec<f64> = found.iter().map(|(_, radius, ..)| PI * radius * radius / NEIGHBOURS as f64).collect();
         let mut sorted = areas.clone();
         sorted.sort_by(f64::total_cmp);
-        Ok(Self { normals, areas, apart: sorted.get(sorted.len() / 2).map_or(0.0, |area| area.sqrt()) })
+        Ok(Self {
+            normals,
+            areas,
+            beyond: found.iter().map(|(.., beyond)| *beyond).collect(),
+            apart: sorted.get(sorted.len() / 2).map_or(0.0, |area| area.sqrt()),
+        })
     }
 }
 
@@ -141,47 +155,21 @@ fn facets(points: &[[f64; 3]], around: &Around) -> TriangleMesh {
     mesh
 }
 
-/// Where the winding number is asked.
-#[derive(Clone, Copy, Debug)]
-struct Lattice {
+/// Where the winding number is asked: at the nodes of a lattice, from rims on along the border between the sides.
+struct Lattice<'a> {
+    tree: &'a RTree<Numbered>,
+    winding: WindingTree,
     first: DVec3,
     step: f64,
-    /// Along each axis.
-    blocks: [i64; 3],
+    /// How far from 1/2 it is where it was asked.
+    known: HashMap<[i64; 3], f64>,
 }
 
-impl Lattice {
-    /// Around all points; none where it would have too many blocks.
-    fn new(points: &[[f64; 3]], step: f64) -> Option<Self> {
-        let bound = |pick: fn(DVec3, DVec3) -> DVec3| points.iter().map(|&p| DVec3::from(p)).reduce(pick);
-        let (low, high) = (bound(DVec3::min)?, bound(DVec3::max)?);
-        let edge = BLOCK as f64 * step;
-        let blocks = ((high - low) / edge).to_array().map(|n| n.floor() + 3.0);
-        let fits = step > 0.0 && blocks.iter().product::<f64>() < MOST_BLOCKS;
-        fits.then(|| Self { first: low - DVec3::splat(edge), step, blocks: blocks.map(|n| n as i64) })
-    }
-
+impl Lattice<'_> {
     fn place(&self, node: [i64; 3]) -> DVec3 {
         self.first + DVec3::from(node.map(|n| n as f64)) * self.step
     }
 
-    fn number(&self, [x, y, z]: [i64; 3]) -> usize {
-        ((z * self.blocks[1] + y) * self.blocks[0] + x) as usize
-    }
-
-    fn all(&self) -> Vec<[i64; 3]> {
-        let [nx, ny, nz] = self.blocks;
-        (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z]))).collect()
-    }
-}
-
-struct Known<'a> {
-    tree: &'a RTree<Numbered>,
-    winding: WindingTree,
-    lattice: Lattice,
-}
-
-impl Known<'_> {
     fn away(&self, at: DVec3) -> f64 {
         let nearest = self.tree.nearest_neighbor(at.to_array());
         nearest.map_or(f64::INFINITY, |point| DVec3::from(*point.geom()).distance(at))
@@ -191,63 +179,72 @@ impl Known<'_> {
         self.winding.winding_number(at.to_array()) - HALF
     }
 
-    /// Places on all caps, in the order of the blocks.
-    fn places(&self, stage: &Stage<'_>, points: &[[f64; 3]]) -> Result<Vec<Place>> {
-        let due = self.due(stage, points)?;
-        let found = stage.run(&due, &Workers::none(), |(), block| Ok(self.of_block(*block)))?;
+    /// The cubes around places beside rims: where no points are though the surface would go on.
+    fn rims(&self, stage: &Stage<'_>, points: &[[f64; 3]], around: &Around) -> Result<Vec<[i64; 3]>> {
+        let numbers: Vec<usize> = (0..points.len()).collect();
+        let parts: Vec<&[usize]> = numbers.chunks(AT_ONCE).collect();
+        let found = stage.run(&parts, &Workers::none(), |(), part| {
+            let beyond = |&n: &usize| DVec3::from(points[n]) + around.beyond[n] * (BEYOND * self.step);
+            let rims = part.iter().map(beyond).filter(|&at| self.away(at) > BESIDE * self.step);
+            let cube = |at: DVec3| ((at - self.first) / self.step).to_array().map(|v| v.floor() as i64);
+            Ok(rims.flat_map(|at| corners(cube(at).map(|v| v - 1), 3)).collect::<Vec<_>>())
+        })?;
         Ok(found.concat())
     }
 
-    /// The blocks that hold points or stand beside such, and those whose corners are on different sides.
-    fn due(&self, stage: &Stage<'_>, points: &[[f64; 3]]) -> Result<Vec<[i64; 3]>> {
-        let lattice = &self.lattice;
-        let mut near = vec![false; lattice.blocks.iter().product::<i64>() as usize];
-        for point in points {
-            let at = (DVec3::from(*point) - lattice.first) / (lattice.step * BLOCK as f64);
-            let at = at.to_array().map(|v| v.floor() as i64);
-            for beside in voxels(Box3::new(at.map(|v| v - 1), at.map(|v| v + 2))) {
-                if (0..3).all(|a| (0..lattice.blocks[a]).contains(&beside[a])) {
-                    near[lattice.number(beside)] = true;
-                }
-            }
-        }
-        let all = lattice.all();
-        let parts: Vec<&[[i64; 3]]> = all.chunks(512).collect();
-        let corner = |block: &[i64; 3]| self.side(lattice.place(block.map(|n| n * BLOCK))) > 0.0;
-        let corners =
-            stage.run(&parts, &Workers::none(), |(), part| Ok(part.iter().map(corner).collect::<Vec<_>>()))?;
-        let inside = corners.concat();
-        let both = |block: &[i64; 3]| {
-            let own = inside[lattice.number(*block)];
-            voxels(Box3::new(*block, block.map(|v| v + 2)))
-                .any(|at| (0..3).all(|a| at[a] < lattice.blocks[a]) && inside[lattice.number(at)] != own)
-        };
-        Ok(all.into_iter().filter(|block| near[lattice.number(*block)] || both(block)).collect())
+    /// Asks at those nodes of cubes that are not known yet.
+    fn ask(&mut self, stage: &Stage<'_>, cubes: &[[i64; 3]]) -> Result<()> {
+        let mut nodes: Vec<[i64; 3]> = cubes.iter().flat_map(|&cube| corners(cube, 2)).collect();
+        nodes.retain(|node| !self.known.contains_key(node));
+        nodes.sort_unstable();
+        nodes.dedup();
+        let parts: Vec<&[[i64; 3]]> = nodes.chunks(AT_ONCE).collect();
+        let ask = |part: &&[[i64; 3]]| part.iter().map(|&node| self.side(self.place(node))).collect::<Vec<_>>();
+        let sides = stage.run(&parts, &Workers::none(), |(), part| Ok(ask(part)))?;
+        self.known.extend(nodes.into_iter().zip(sides.concat()));
+        Ok(())
     }
 
-    /// Where the border passes between nodes of the lattice that are not beside points.
-    fn of_block(&self, block: [i64; 3]) -> Vec<Place> {
-        let lattice = &self.lattice;
-        let beside = BESIDE * lattice.step;
-        let lo = block.map(|n| n * BLOCK);
-        let nodes = Box3::new(lo, lo.map(|v| v + BLOCK + 1));
-        let places: Vec<DVec3> = voxels(nodes).map(|node| lattice.place(node)).collect();
-        let away: Vec<f64> = places.iter().map(|&at| self.away(at)).collect();
-        let side = |n: usize| if away[n] > beside - lattice.step { self.side(places[n]) } else { f64::NAN };
-        let sides: Vec<f64> = (0..places.len()).map(side).collect();
-        let edge = (BLOCK + 1) as usize;
+    /// Places on all caps: where the border crosses the lattice's lines away from points, followed from cube to cube.
+    fn places(&mut self, stage: &Stage<'_>, mut due: Vec<[i64; 3]>, most: usize) -> Result<Vec<Place>> {
+        let mut seen = HashSet::new();
+        let mut found = BTreeMap::new();
+        while !due.is_empty() && found.len() < most {
+            due.retain(|cube| seen.insert(*cube));
+            self.ask(stage, &due)?;
+            let parts: Vec<&[[i64; 3]]> = due.chunks(AT_ONCE).collect();
+            let crossed = stage.run(&parts, &Workers::none(), |(), part| {
+                Ok(part
+                    .iter()
+                    .map(|&cube| (cube, self.crossings(cube)))
+                    .filter(|(_, of)| !of.is_empty())
+                    .collect::<Vec<_>>())
+            })?;
+            let mut next = Vec::new();
+            for (cube, crossings) in crossed.into_iter().flatten() {
+                next.extend(corners(cube.map(|v| v - 1), 3));
+                found.extend(crossings);
+            }
+            due = next;
+        }
+        Ok(found.into_values().collect())
+    }
+
+    /// Where the border crosses the edges of a cube that are not beside points, by node and axis.
+    fn crossings(&self, cube: [i64; 3]) -> Vec<(([i64; 3], usize), Place)> {
         let mut found = Vec::new();
-        for (n, node) in voxels(nodes).enumerate() {
-            for stride in [1, edge, edge * edge] {
-                let is_own = (0..3).all(|a| node[a] < lo[a] + BLOCK);
-                if !is_own || !(sides[n] * sides[n + stride] < 0.0) {
-                    continue;
-                }
-                let part = sides[n] / (sides[n] - sides[n + stride]);
-                let at = places[n] + (places[n + stride] - places[n]) * part;
-                let far = self.away(at);
-                if far > beside {
-                    found.push(Place { at, away: far, area: self.area(at) });
+        for node in corners(cube, 2) {
+            for axis in (0..3).filter(|&axis| node[axis] == cube[axis]) {
+                let mut beside = node;
+                beside[axis] += 1;
+                let [from, to] = [node, beside].map(|node| self.known.get(&node).copied().unwrap_or(f64::NAN));
+                if from * to < 0.0 {
+                    let (a, b) = (self.place(node), self.place(beside));
+                    let at = a + (b - a) * (from / (from - to));
+                    let away = self.away(at);
+                    if away > BESIDE * self.step {
+                        found.push(((node, axis), Place { at, away, area: self.area(at) }));
+                    }
                 }
             }
         }
@@ -257,15 +254,16 @@ impl Known<'_> {
     /// The area that one crossing of the border with the lattice's lines stands for: a border with the unit normal n has
     /// |n| of each axis over the step squared of them.
     fn area(&self, at: DVec3) -> f64 {
-        let step = 0.5 * self.lattice.step;
+        let step = 0.5 * self.step;
         let slope = DVec3::AXES.map(|axis| self.side(at + axis * step) - self.side(at - axis * step));
         let normal = DVec3::from(slope).normalize_or(DVec3::ONE.normalize());
-        self.lattice.step.powi(2) / normal.abs().element_sum()
+        self.step.powi(2) / normal.abs().element_sum()
     }
 }
 
-/// The voxels of a box, in its order.
-fn voxels(part: Box3) -> impl Iterator<Item = [i64; 3]> {
+/// So many nodes along each axis from one on.
+fn corners(first: [i64; 3], number: i64) -> impl Iterator<Item = [i64; 3]> {
+    let part = Box3::new(first, first.map(|v| v + number));
     (0..part.len()).map(move |n| part.voxel_at(n))
 }
 

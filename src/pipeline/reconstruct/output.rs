@@ -26,6 +26,12 @@ use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 /// Points farther from the solved surface than so many largest spacings have been left by it.
 const LEFT_VOXELS: f64 = 0.6;
 
+/// Where more of the points than this part have one side all around them, holes are looked for that let it in.
+const MOST_SHEET: f64 = 0.02;
+
+/// Where caps do not close a cloud the search grows to so many times its first reach.
+const MOST_GROWTH: f64 = 4.0;
+
 /// A point may be so many deviations of the noise off the surface.
 const OF_NOISE: f64 = 3.0;
 
@@ -178,6 +184,9 @@ pub fn reconstruct_shown(
     if is_first && (measures.triangles == 0 || lost_points == cloud.len() as u64) {
         return Err(vanished(settings, grid, larger_beta));
     }
+    if settings.beta.is_some() && evolution.is_unrested() && 2 * lost_points > cloud.len() as u64 {
+        return Err(on_its_way(evolution.steps, lost_points, cloud.len()));
+    }
     Ok(Reconstruction {
         geometry: told,
         beta,
@@ -229,22 +238,31 @@ fn enclosed(engine: &Engine, grid: &Geometry, cloud: &[[f64; 3]], settings: &Rec
         beta: settings.beta,
         start: Start::Watershed,
         first_reach: first_reach_for(grid, settings.beta),
-        grows: settings.beta.is_some(),
+        most_growth: 1.0,
         suffix: "",
     };
     let begun = |enclosure, closed, caps| Ok(Begun { enclosure, closed, caps });
     let mut found = enclose(engine, &search)?;
-    if let Found::Open = found {
+    let most = MOST_SHEET * cloud.len() as f64;
+    let lost = match &found {
+        Found::Open => Some(usize::MAX),
+        Found::Enclosed(enclosure) => Some(enclosure.sheet().len()).filter(|&lost| lost as f64 > most),
+        _ => None,
+    };
+    if let Some(lost) = lost.filter(|_| settings.beta.is_none()) {
         let Closing { points, caps } = close(&engine.by_itself(), cloud)?;
         if !points.is_empty() {
             let closed = [cloud, &points].concat();
-            if let Found::Enclosed(enclosure) =
-                enclose(engine, &Search { cloud: &closed, suffix: " with caps", ..search })?
+            let search = Search { cloud: &closed, suffix: " with caps", ..search };
+            if let Found::Enclosed(enclosure) = enclose(engine, &search)?
+                && enclosure.sheet().len() < lost / 2
             {
                 return begun(enclosure, Some(closed), caps);
             }
         }
-        found = enclose(engine, &Search { grows: true, suffix: " farther", ..search })?;
+    }
+    if matches!(found, Found::Open) {
+        found = enclose(engine, &Search { most_growth: MOST_GROWTH, suffix: " farther", ..search })?;
     }
     match found {
         Found::Enclosed(enclosure) => begun(enclosure, None, Vec::new()),
@@ -342,4 +360,13 @@ fn vanished(settings: &ReconstructSettings, grid: &Geometry, larger_beta: Option
         (None, None) => format!("give a --spacing finer than {spacing}, or less smoothing (--delta)"),
     };
     Error::vanished(format!("the surface vanished: it shrank away from all points; {what}"))
+}
+
+fn on_its_way(steps: u32, lost: u64, points: usize) -> Error {
+    Error::failed(format!(
+        "after {steps} time steps the surface is still on its way: {} of {} points are farther than a voxel from it; give a smaller \
+         --beta, or leave it out, or give more --max-steps",
+        digits::grouped(lost),
+        digits::grouped(points as u64)
+    ))
 }
