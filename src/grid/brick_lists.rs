@@ -24,11 +24,15 @@ impl BrickLists {
             match &mut run {
                 Some((of, count)) if *of == brick => *count += 1,
                 _ => {
-                    run.replace((brick, 1)).into_iter().for_each(|(of, count)| *places.entry(of).or_default() += count);
+                    if let Some((of, count)) = run.replace((brick, 1)) {
+                        *places.entry(of).or_default() += count;
+                    }
                 }
             }
         }
-        run.into_iter().for_each(|(of, count)| *places.entry(of).or_default() += count);
+        if let Some((of, count)) = run {
+            *places.entry(of).or_default() += count;
+        }
         let mut bricks: Vec<BrickId> = places.keys().copied().collect();
         bricks.sort_unstable();
         let mut starts = vec![0];

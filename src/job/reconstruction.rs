@@ -103,6 +103,13 @@ impl<'a> Reconstruction<'a> {
         self
     }
 
+    /// Standard deviation of the points from the surface, a length, 0 to take all as they are; told from the points where this is left
+    /// out.
+    pub fn noise(mut self, deviation: f64) -> Self {
+        self.settings.noise = Some(deviation);
+        self
+    }
+
     /// Weight of the attraction to the points.
     pub fn theta(mut self, theta: f64) -> Self {
         self.settings.motion.theta = theta;
@@ -223,6 +230,12 @@ impl SolvedReconstruction {
     #[must_use]
     pub fn beta(&self) -> f64 {
         self.found.beta
+    }
+
+    /// Standard deviation of the points from the surface; none where they do not tell it.
+    #[must_use]
+    pub fn noise(&self) -> Option<f64> {
+        self.found.noise.deviation
     }
 
     /// How the time loop ended.

@@ -36,5 +36,6 @@ pub mod geometry;
 pub mod image;
 pub mod level_set;
 pub mod outline;
+pub mod points;
 pub mod surface;
 pub mod topology;

@@ -22,11 +22,12 @@ pub struct Drawn {
     pub hausdorff: Option<Hausdorff>,
     /// How many of the points are how far from it.
     pub spread: Option<Spread>,
-    /// Points that are farther from it than the largest spacing.
+    /// Points that are farther from it than they may be.
     pub lost_points: u64,
 }
 
-/// Sends the closed surface of `u` to `mesh`; measures it, and how far `points` lie from it.
+/// Sends the closed surface of `u` to `mesh`; measures it, and how far `points` lie from it, of which those beyond `lost_beyond` are
+/// counted.
 ///
 /// # Errors
 /// When the sink fails or the run is interrupted.
@@ -34,12 +35,12 @@ pub fn draw(
     stage: &Stage<'_>,
     u: &BrickArray<f32>,
     geometry: &Geometry,
-    points: &[[f64; 3]],
+    (points, lost_beyond): (&[[f64; 3]], f64),
     mesh: &mut dyn MeshSink,
 ) -> Result<Drawn> {
     let measures = extract(stage, u, geometry, mesh)?;
     let distances = distances_to(stage, u, geometry, points)?;
-    let lost_points = distances.iter().flatten().filter(|&&d| d > geometry.max_spacing()).count() as u64;
+    let lost_points = distances.iter().flatten().filter(|&&d| d > lost_beyond).count() as u64;
     let known = || distances.iter().copied().flatten();
     Ok(Drawn { measures, hausdorff: Hausdorff::of(known()), spread: Spread::of(known()), lost_points })
 }

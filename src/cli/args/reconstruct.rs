@@ -17,6 +17,8 @@ pub(crate) struct ReconstructArgs {
     #[command(flatten)]
     pub(crate) grid: CloudGridArgs,
     #[command(flatten)]
+    pub(crate) points: PointArgs,
+    #[command(flatten)]
     pub(crate) motion: MotionArgs,
     #[command(flatten)]
     pub(crate) distance: DistanceArgs,
@@ -30,6 +32,15 @@ pub(crate) struct ReconstructArgs {
     /// Write the surface once more, in a file of its own, in the format of its name
     #[arg(long, value_name = "FILE.ply|obj|stl|vtp", help_heading = "Output")]
     pub(crate) mesh: Option<PathBuf>,
+}
+
+/// What the points are taken for.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Points")]
+pub(crate) struct PointArgs {
+    /// Standard deviation of the points from the surface, a length; 0 takes every point as it is [default: told from the points]
+    #[arg(long, value_name = "D", allow_hyphen_values = true)]
+    pub(crate) noise: Option<f64>,
 }
 
 /// How fine the grid is, and on which box of it fields are written.

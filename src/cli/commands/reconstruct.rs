@@ -137,7 +137,7 @@ impl Job {
     fn new(args: ReconstructArgs, typed: &[String], comm: Arc<dyn Comm>) -> Result<Self> {
         let started = Instant::now();
         let cancel = signals::cancel_on_signals()?;
-        let mut settings = settings::reconstruct_settings(&args.motion, args.distance.method)?;
+        let mut settings = settings::reconstruct_settings(&args)?;
         let spacing = settings::spacing("--spacing", args.grid.spacing)?;
         let outputs = Outputs {
             inputs: vec![&args.cloud],
@@ -362,10 +362,27 @@ fn describe_found(found: &Reconstruction) -> String {
     if found.sheet_points > 0 {
         lines.push(format!("sheets without an inside: {} points, held as thin shells", grouped(found.sheet_points)));
     }
+    lines.extend(found.noise.deviation.filter(|_| found.noise.moved > 0).map(|deviation| {
+        format!(
+            "noise of the points: {}; {} of them moved onto their surface",
+            number(deviation),
+            grouped(found.noise.moved)
+        )
+    }));
     lines.extend(found.hole.map(|hole| {
         let at = place(hole.place, 0.1 * hole.width);
         format!("largest hole of the cloud: {} wide, at {at}", number(hole.width))
     }));
+    if let Some(cap) = found.caps.first() {
+        let share = 100.0 * found.caps.iter().map(|cap| cap.area).sum::<f64>() / m.area;
+        lines.push(format!(
+            "holes closed without points: {}, {} % of the surface; the widest {} wide, at {}",
+            grouped(found.caps.len() as u64),
+            number(share),
+            number(cap.width),
+            place(cap.place, 0.1 * cap.width)
+        ));
+    }
     lines.push(format!(
         "start at {} from the points; {} steps, ended by {}",
         number(found.beta),

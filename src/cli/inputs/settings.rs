@@ -5,10 +5,10 @@ use std::path::Path;
 use crate::cli::args::common::{
     Edge, ImageArg, MotionArgs, OverlapArg, ResourceArgs, SegmentArgs, SmoothingArg, StartArg, StopArg,
 };
+use crate::cli::args::reconstruct::ReconstructArgs;
 use crate::cli::terminal::world;
 use crate::error::{Error, Result};
 use crate::job::resources::Resources;
-use crate::pipeline::distance::Method;
 use crate::pipeline::image::terms::Smoothing;
 use crate::pipeline::level_set::motion::Motion;
 use crate::pipeline::level_set::time_loop::Stop;
@@ -68,10 +68,15 @@ pub(crate) fn settings(args: &SegmentArgs) -> Result<SegmentSettings> {
 }
 
 /// The settings of a reconstruction.
-pub(crate) fn reconstruct_settings(args: &MotionArgs, method: Method) -> Result<ReconstructSettings> {
+pub(crate) fn reconstruct_settings(args: &ReconstructArgs) -> Result<ReconstructSettings> {
     let defaults = ReconstructSettings::default();
-    let settings =
-        ReconstructSettings { method, motion: motion(args, defaults.motion), beta: args.beta, keeps_grid: false };
+    let settings = ReconstructSettings {
+        method: args.distance.method,
+        motion: motion(&args.motion, defaults.motion),
+        beta: args.motion.beta,
+        noise: args.points.noise,
+        ..defaults
+    };
     settings.check()?;
     Ok(settings)
 }
@@ -140,6 +145,7 @@ mod tests {
 
     use super::*;
     use crate::cli::args::command_line::{Cli, Command};
+    use crate::pipeline::distance::Method;
     use crate::pipeline::segment::FillGaps;
 
     fn typed(flags: &str) -> Box<SegmentArgs> {

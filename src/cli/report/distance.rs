@@ -85,7 +85,7 @@ pub(crate) struct Settings {
     exact: Option<bool>,
     /// The image that times are asked for through; null where distances are.
     #[serde(skip_serializing_if = "Option::is_none")]
-    speed: Option<Option<String>>,
+    speed: Option<serde_json::Value>,
     brick: i64,
     scratch: String,
 }
@@ -133,7 +133,7 @@ impl Settings {
             exact_labels: middle.map(|choice| choice.labels == LabelMode::Exact),
             closest_point: settings.closest_point,
             exact: middle.is_none().then_some(settings.exact),
-            speed: middle.is_none().then(|| args.speed.as_ref().map(|path| path.display().to_string())),
+            speed: middle.is_none().then(|| args.speed.as_ref().map(|path| path.display().to_string()).into()),
             brick: settings.brick,
             scratch: resources.scratch.display().to_string(),
         }

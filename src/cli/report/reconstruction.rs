@@ -8,7 +8,7 @@ use super::run_report::{Distances, Hausdorff, Hole, SimplifiedCopy};
 use super::settings::{Moved, Moves};
 use crate::cli::args::reconstruct::ReconstructArgs;
 use crate::pipeline::output::viewer_mesh::Simplified;
-use crate::pipeline::reconstruct::{ReconstructSettings, Reconstruction};
+use crate::pipeline::reconstruct::{Cap, ReconstructSettings, Reconstruction};
 
 /// Every setting, also those that nobody gave; lengths physical.
 #[derive(Debug, Serialize)]
@@ -22,6 +22,8 @@ pub(crate) struct Settings {
     motion: Moves,
     /// Null when it was found; it is then in the result.
     beta: Option<f64>,
+    /// Null when it was told from the points; it is then in the result.
+    noise: Option<f64>,
     scratch: String,
 }
 
@@ -40,6 +42,7 @@ impl Settings {
             method: settings.method.name(),
             motion: Moves::new(&settings.motion, &found.geometry),
             beta: settings.beta,
+            noise: settings.noise,
             scratch: scratch.display().to_string(),
         }
     }
@@ -59,13 +62,19 @@ pub(crate) struct Found {
     hausdorff: Option<Hausdorff>,
     distances: Option<Distances>,
     cloud_points: u64,
-    /// Points farther from the surface than a voxel.
+    /// Points farther from the surface than a voxel, and than three times a noise that was followed.
     lost_points: u64,
     /// Points held as thin shells or slits.
     sheet_points: u64,
     spaces: usize,
     beta: f64,
+    /// Standard deviation of the points from the surface; null where they do not tell it.
+    noise: Option<f64>,
+    /// Points that were moved onto the surface around them.
+    moved_points: u64,
     hole: Option<Hole>,
+    /// Holes that were closed though no points are there, the widest first.
+    caps: Vec<CappedHole>,
     band_voxels: u64,
     #[serde(flatten)]
     moved: Moved,
@@ -88,9 +97,28 @@ impl Found {
             sheet_points: found.sheet_points,
             spaces: found.spaces,
             beta: found.beta,
+            noise: found.noise.deviation,
+            moved_points: found.noise.moved,
             hole: found.hole.map(Into::into),
+            caps: found.caps.iter().map(|cap| CappedHole::new(cap, found.measures.area)).collect(),
             band_voxels: found.band_voxels,
             moved: Moved::from(&found.evolution),
         }
+    }
+}
+
+/// A hole that was closed.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct CappedHole {
+    width: f64,
+    place_xyz: [f64; 3],
+    area: f64,
+    /// Its part of the surface.
+    share: f64,
+}
+
+impl CappedHole {
+    fn new(cap: &Cap, surface: f64) -> Self {
+        Self { width: cap.width, place_xyz: cap.place, area: cap.area, share: cap.area / surface }
     }
 }

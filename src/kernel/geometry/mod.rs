@@ -1,5 +1,6 @@
 //! Triples, triangles and closed meshes: geometry in f64, without a grid.
 
+pub(crate) mod eigen;
 pub mod nearest_point;
 pub mod rim;
 pub mod solid;

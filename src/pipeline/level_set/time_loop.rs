@@ -60,6 +60,17 @@ pub struct Evolution {
     pub residuals: Vec<f64>,
 }
 
+/// What ended a loop whose surface was not at rest.
+const STEP_LIMIT: &str = "max-steps";
+
+impl Evolution {
+    /// Whether the loop ended at its limit of steps, the surface not at rest.
+    #[must_use]
+    pub fn is_unrested(&self) -> bool {
+        self.stopped_by == STEP_LIMIT
+    }
+}
+
 /// The steps that were taken.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Taken {
@@ -97,7 +108,7 @@ impl Taken {
     }
 
     pub(super) fn evolution(self, stop: Stop, sor_iterations: u64) -> Evolution {
-        let stopped_by = if self.ended { stop.name() } else { "max-steps" };
+        let stopped_by = if self.ended { stop.name() } else { STEP_LIMIT };
         let residual = self.residuals.last().copied().unwrap_or(f64::INFINITY);
         Evolution {
             steps: self.steps,

@@ -85,7 +85,8 @@ pub(super) fn boxes(region: &RegionOfInterest, cloud: &[[f64; 3]]) -> Footprint 
 /// The stages of a reconstruction that is thought to take so many seconds, and what each will probably take.
 #[must_use]
 pub fn plan(seconds: f64, writes: bool) -> Plan {
-    let stages = [("distance", 0.15), ("tagging", 0.2), ("band", 0.1), ("level set", 0.5), ("surface", 0.05)];
+    let stages =
+        [("noise", 0.01), ("distance", 0.14), ("tagging", 0.2), ("band", 0.1), ("level set", 0.5), ("surface", 0.05)];
     let written = [(viewer_mesh::STAGE, 0.05), ("write levelset", 0.02), ("write distance", 0.02)];
     let written = written.into_iter().filter(|_| writes);
     stages.into_iter().chain(written).map(|(name, share)| (name.into(), share * seconds)).collect()

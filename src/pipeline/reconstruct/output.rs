@@ -2,8 +2,10 @@
 
 use std::fmt;
 
+use super::caps::{Cap, Closing, close};
 use super::estimate::{BUFFERS, WRITING, begin, boxes};
 use super::flat::flat;
+use super::noise::{Noise, without_noise};
 use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
@@ -24,6 +26,15 @@ use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 /// Points farther from the solved surface than so many largest spacings have been left by it.
 const LEFT_VOXELS: f64 = 0.6;
 
+/// Where more of the points than this part have one side all around them, holes are looked for that let it in.
+const MOST_SHEET: f64 = 0.02;
+
+/// Where caps do not close a cloud the search grows to so many times its first reach.
+const MOST_GROWTH: f64 = 4.0;
+
+/// A point may be so many deviations of the noise off the surface.
+const OF_NOISE: f64 = 3.0;
+
 /// A cloud that is no thicker than this part of a spacing, root mean square, is flat.
 const FLAT_VOXELS: f64 = 0.1;
 
@@ -33,6 +44,10 @@ pub struct Reconstruction {
     pub geometry: Geometry,
     /// Where the start surface lay.
     pub beta: f64,
+    /// How the points scatter around the surface, and how many of them were moved onto it for that.
+    pub noise: Noise,
+    /// The holes that were closed by caps, the widest first.
+    pub caps: Vec<Cap>,
     /// The cloud's largest hole.
     pub hole: Option<Hole>,
     /// Number of spaces that the cloud encloses.
@@ -49,7 +64,7 @@ pub struct Reconstruction {
     pub hausdorff: Option<Hausdorff>,
     /// How many points are how far from it.
     pub spread: Option<Spread>,
-    /// Points farther from the surface than the largest spacing.
+    /// Points farther from the surface than the largest spacing and three times the noise.
     pub lost_points: u64,
     /// The solved fields.
     band: Band,
@@ -146,26 +161,37 @@ pub fn reconstruct_shown(
 ) -> Result<Reconstruction> {
     let _buffers = engine.reserve(BUFFERS)?;
     let held = engine.reserve(boxes(&begin(grid, cloud, settings), cloud))?;
-    let enclosure = enclosed(engine, grid, cloud, settings)?;
+    let (smooth, noise) = without_noise(engine, cloud, settings.noise)?;
+    // The surface is that of the smooth points; what is measured is how far it is from those that were given.
+    let points = smooth.as_deref().unwrap_or(cloud);
+    let Begun { enclosure, closed, caps } = enclosed(engine, grid, points, settings)?;
+    let points = closed.as_deref().unwrap_or(points);
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
     let window = enclosure.window;
     let larger_beta = enclosure.larger_beta();
     let (beta, mut sheet) = (enclosure.beta, enclosure.sheet().to_vec());
     let (mut band, held_by_box) = enclosure.into_band(engine, "")?;
     let mut growing = Growing::of(shown_in, "surface", &geometry)?;
-    let evolution = solve(engine, &geometry, cloud, settings, (&mut band, &mut sheet), growing.as_mut())?;
+    let evolution = solve(engine, &geometry, points, settings, (&mut band, &mut sheet), growing.as_mut())?;
     drop(growing);
     let told = if settings.keeps_grid { grid.clone() } else { geometry.clone() };
     mesh.on_grid(&told)?;
     let is_first = engine.comm().rank() == 0;
-    let drawn = if is_first { draw(engine, (&band, &geometry), cloud, mesh)? } else { Drawn::default() };
+    let lost_beyond =
+        geometry.max_spacing() + noise.deviation.filter(|_| noise.moved > 0).map_or(0.0, |d| OF_NOISE * d);
+    let drawn = if is_first { draw(engine, (&band, &geometry), (cloud, lost_beyond), mesh)? } else { Drawn::default() };
     let Drawn { measures, hausdorff, spread, lost_points } = drawn;
     if is_first && (measures.triangles == 0 || lost_points == cloud.len() as u64) {
         return Err(vanished(settings, grid, larger_beta));
     }
+    if settings.beta.is_some() && evolution.is_unrested() && 2 * lost_points > cloud.len() as u64 {
+        return Err(on_its_way(evolution.steps, lost_points, cloud.len()));
+    }
     Ok(Reconstruction {
         geometry: told,
         beta,
+        noise,
+        caps,
         hole,
         spaces,
         sheet_points: sheet.len() as u64,
@@ -185,7 +211,7 @@ pub fn reconstruct_shown(
 fn draw(
     engine: &Engine,
     (band, geometry): (&Band, &Geometry),
-    cloud: &[[f64; 3]],
+    cloud: (&[[f64; 3]], f64),
     mesh: &mut dyn MeshSink,
 ) -> Result<Drawn> {
     let stage = engine.stage("surface", 0);
@@ -195,13 +221,16 @@ fn draw(
     Ok(drawn)
 }
 
-/// What the cloud encloses.
-fn enclosed(
-    engine: &Engine,
-    grid: &Geometry,
-    cloud: &[[f64; 3]],
-    settings: &ReconstructSettings,
-) -> Result<Box<Enclosure>> {
+/// What a search starts from, and what was found.
+struct Begun {
+    enclosure: Box<Enclosure>,
+    /// The points that close the cloud, behind its own.
+    closed: Option<Vec<[f64; 3]>>,
+    caps: Vec<Cap>,
+}
+
+/// What the cloud encloses: as it is where that is told near it, else with caps over its holes, else as far from it as is needed.
+fn enclosed(engine: &Engine, grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructSettings) -> Result<Begun> {
     let search = Search {
         grid,
         cloud,
@@ -209,15 +238,40 @@ fn enclosed(
         beta: settings.beta,
         start: Start::Watershed,
         first_reach: first_reach_for(grid, settings.beta),
+        most_growth: 1.0,
         suffix: "",
     };
-    match enclose(engine, &search)? {
-        Found::Enclosed(enclosure) => Ok(enclosure),
+    let begun = |enclosure, closed, caps| Ok(Begun { enclosure, closed, caps });
+    let mut found = enclose(engine, &search)?;
+    let most = MOST_SHEET * cloud.len() as f64;
+    let lost = match &found {
+        Found::Open => Some(usize::MAX),
+        Found::Enclosed(enclosure) => Some(enclosure.sheet().len()).filter(|&lost| lost as f64 > most),
+        _ => None,
+    };
+    if let Some(lost) = lost.filter(|_| settings.beta.is_none()) {
+        let Closing { points, caps } = close(&engine.by_itself(), cloud)?;
+        if !points.is_empty() {
+            let closed = [cloud, &points].concat();
+            let search = Search { cloud: &closed, suffix: " with caps", ..search };
+            if let Found::Enclosed(enclosure) = enclose(engine, &search)?
+                && enclosure.sheet().len() < lost / 2
+            {
+                return begun(enclosure, Some(closed), caps);
+            }
+        }
+    }
+    if matches!(found, Found::Open) {
+        found = enclose(engine, &Search { most_growth: MOST_GROWTH, suffix: " farther", ..search })?;
+    }
+    match found {
+        Found::Enclosed(enclosure) => begun(enclosure, None, Vec::new()),
         Found::Leaks(deepest) => Err(flat_cloud(grid, cloud).unwrap_or_else(|| leaks(settings, grid, &deepest))),
         Found::Nothing(deepest) => {
             let nothing = || encloses_nothing(settings, grid, deepest.as_ref());
             Err(flat_cloud(grid, cloud).unwrap_or_else(nothing))
         }
+        Found::Open => Err(encloses_nothing(settings, grid, None)),
     }
 }
 
@@ -306,4 +360,13 @@ fn vanished(settings: &ReconstructSettings, grid: &Geometry, larger_beta: Option
         (None, None) => format!("give a --spacing finer than {spacing}, or less smoothing (--delta)"),
     };
     Error::vanished(format!("the surface vanished: it shrank away from all points; {what}"))
+}
+
+fn on_its_way(steps: u32, lost: u64, points: usize) -> Error {
+    Error::failed(format!(
+        "after {steps} time steps the surface is still on its way: {} of {} points are farther than a voxel from it; give a smaller \
+         --beta, or leave it out, or give more --max-steps",
+        digits::grouped(lost),
+        digits::grouped(points as u64)
+    ))
 }

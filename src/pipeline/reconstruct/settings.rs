@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::pipeline::distance::Method;
 use crate::pipeline::level_set::motion::Motion;
 use crate::pipeline::level_set::time_loop::Stop;
-use crate::pipeline::limits::{ABOVE_ZERO, check_given};
+use crate::pipeline::limits::{ABOVE_ZERO, AT_LEAST_ZERO, check_given};
 
 /// What the user may set.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +15,8 @@ pub struct ReconstructSettings {
     pub motion: Motion,
     /// Distance of the start surface from the cloud; automatic when none.
     pub beta: Option<f64>,
+    /// The standard deviation of the points from the surface, 0 to take all as they are; found when none.
+    pub noise: Option<f64>,
     /// Whether fields are written on the grid as it was given; else on a box of it around what is found.
     pub keeps_grid: bool,
 }
@@ -28,6 +30,7 @@ impl Default for ReconstructSettings {
             method: Method::VDT,
             motion: Motion { rho: 0.0, stop: REST, ..Motion::default() },
             beta: None,
+            noise: None,
             keeps_grid: false,
         }
     }
@@ -40,6 +43,7 @@ impl ReconstructSettings {
     /// With the setting and what it may be.
     pub fn check(&self) -> Result<()> {
         self.motion.check()?;
-        check_given("--beta", self.beta, ABOVE_ZERO)
+        check_given("--beta", self.beta, ABOVE_ZERO)?;
+        check_given("--noise", self.noise, AT_LEAST_ZERO)
     }
 }

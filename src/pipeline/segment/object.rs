@@ -47,12 +47,14 @@ pub(super) fn solve<T: Element>(
         beta: settings.beta,
         start: if loose { search::Start::Watershed } else { search::Start::Tube },
         first_reach: first_reach(marks, picture.geometry, settings),
+        most_growth: f64::INFINITY,
         suffix: &suffix,
     };
     let enclosure = match enclose(engine, &search)? {
         Found::Enclosed(enclosure) => enclosure,
         Found::Leaks(deepest) => return Err(leak(marks, settings, &deepest, picture.world)),
         Found::Nothing(deepest) => return Err(encloses_nothing(marks, picture, deepest.as_ref())),
+        Found::Open => return Err(encloses_nothing(marks, picture, None)),
     };
     let (geometry, window, hole) = (enclosure.geometry.clone(), enclosure.window, enclosure.hole());
     let (beta, larger_beta) = (enclosure.beta, enclosure.larger_beta());

@@ -132,10 +132,13 @@ fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool,
     swept
 }
 
+/// The voxels of one vector, those beside each along the axes, and the speeds of the first.
+type Vector<'a, L, const N: usize> = (&'a mut [L; N], [&'a [L; N]; 6], &'a [f32; N]);
+
 /// Lowers the voxels of one vector. Something is to be carried back to a side that was passed before and is larger.
 #[inline(always)]
 fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool, const UNEVEN: bool>(
-    (here, beside, speeds): (&mut [P::Lane; N], [&[P::Lane; N]; 6], &[f32; N]),
+    (here, beside, speeds): Vector<'_, P::Lane, N>,
     passed: [usize; 3],
     k: &Axes<A>,
     (place, record): (Place<'_>, &mut R),

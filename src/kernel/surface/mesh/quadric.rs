@@ -9,10 +9,10 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::kernel::geometry::eigen::eigen;
+
 /// Singular values below this part of the largest are noise of flat parts.
 const LEAST_VALUE: f64 = 1e-3;
-/// Rotations after which a symmetric matrix is diagonal: it converges quadratically.
-const SWEEPS: usize = 12;
 
 /// Sums over the planes of triangles, and over corners.
 #[derive(Clone, Copy, Debug, Default)]
@@ -72,29 +72,6 @@ impl Quadric {
     }
 }
 
-/// Eigenvalues and eigenvectors, as columns, of a symmetric matrix (Jacobi 1846).
-fn eigen(mut matrix: DMat3) -> (DVec3, DMat3) {
-    let mut vectors = DMat3::IDENTITY;
-    for (p, q) in [(0, 1), (0, 2), (1, 2)].into_iter().cycle().take(3 * SWEEPS) {
-        let off = matrix.col(q)[p];
-        if off == 0.0 {
-            continue;
-        }
-        let ratio = (matrix.col(q)[q] - matrix.col(p)[p]) / (2.0 * off);
-        let tangent = ratio.signum() / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
-        let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
-        let sine = tangent * cosine;
-        let mut rotation = DMat3::IDENTITY;
-        rotation.col_mut(p)[p] = cosine;
-        rotation.col_mut(q)[q] = cosine;
-        rotation.col_mut(q)[p] = sine;
-        rotation.col_mut(p)[q] = -sine;
-        matrix = rotation.transpose() * matrix * rotation;
-        vectors *= rotation;
-    }
-    (DVec3::new(matrix.x_axis.x, matrix.y_axis.y, matrix.z_axis.z), vectors)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,19 +96,6 @@ mod tests {
             let off = normals[..planes].iter().map(|n| n.dot(found - corner).abs()).fold(0.0, f64::max);
             assert!(off < 1e-9, "{planes}: {off}");
             assert!(found.distance(quadric.mean()) < 1.0 + corner.distance(quadric.mean()), "{planes}: {found}");
-        }
-    }
-
-    #[test]
-    fn eigenvectors_make_a_matrix_diagonal() {
-        for matrix in [
-            DMat3::from_cols_array(&[2.0, 1.0, 0.5, 1.0, 3.0, -1.0, 0.5, -1.0, 1.0]),
-            DMat3::from_cols_array(&[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]),
-            DMat3::ZERO,
-        ] {
-            let (values, vectors) = eigen(matrix);
-            let again = vectors * DMat3::from_diagonal(values) * vectors.transpose();
-            assert!(again.abs_diff_eq(matrix, 1e-12), "{again}");
         }
     }
 }

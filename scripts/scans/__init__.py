@@ -1,0 +1,1 @@
+"""Surfaces from noisy clouds and clouds with holes, beside the true ones."""

@@ -1,0 +1,294 @@
+//! Caps over the holes of a cloud: points where the surface is to pass though none were measured (docs/algorithms.md,
+//! "Holes").
+//!
+//! Normals are fitted and turned to one side, and each point stands for a small facet. The winding number of these facets is 1
+//! inside, 0 outside and 1/2 where as much of one side is seen as of the other, as on a disc in its rim: there, on a lattice as
+//! fine as the points, new points are put. They are looked for beside rims, and followed from there.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use crate::error::Result;
+use crate::exec::{Engine, Stage, Workers};
+use crate::grid::{Box3, TriangleMesh};
+use crate::kernel::geometry::winding_number::WindingTree;
+use crate::kernel::points::height_field::plane_normal;
+use crate::kernel::points::orientation::{Link, orient};
+use crate::kernel::topology::union_find::Forest;
+
+/// Neighbours that tell a normal, and those that are linked.
+const NEIGHBOURS: usize = 12;
+/// A cap is farther than so many edges of the square that a point has of the surface from all points.
+const BESIDE: f64 = 1.6;
+/// Beside a rim that far beyond a point, where no other point is as near as that, the surface would go on.
+const BEYOND: f64 = 2.2;
+/// Caps of more than so many new points for each of the cloud's are no caps.
+const MOST_NEW: usize = 3;
+/// Points or nodes that one thread takes at a time.
+const AT_ONCE: usize = 256;
+/// The border between inside and outside.
+const HALF: f64 = 0.5;
+/// Bytes a point takes: its place, twice, node, normal, links, facet and its place in the winding number's tree.
+const BYTES: u64 = 1200;
+
+/// A hole that was closed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cap {
+    /// Its middle.
+    pub place: [f64; 3],
+    /// Twice the largest distance from any point.
+    pub width: f64,
+    /// Its area, about.
+    pub area: f64,
+}
+
+/// What closes a cloud.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Closing {
+    /// New points.
+    pub(super) points: Vec<[f64; 3]>,
+    /// The holes they close, the widest first.
+    pub(super) caps: Vec<Cap>,
+}
+
+/// A place on a cap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Place {
+    at: DVec3,
+    /// From the nearest point.
+    away: f64,
+    area: f64,
+}
+
+type Numbered = GeomWithData<[f64; 3], u32>;
+
+/// Puts points over the holes of a cloud; none where it has no holes, or no sides.
+///
+/// # Errors
+/// When the memory is too little, or the run is interrupted.
+pub(super) fn close(engine: &Engine, points: &[[f64; 3]]) -> Result<Closing> {
+    let _held = engine.hold(points.len() as u64 * BYTES)?;
+    let stage = engine.stage("holes", points.len() as u64);
+    let numbered = points.iter().zip(0..).map(|(&p, n)| GeomWithData::new(p, n)).collect();
+    let tree = RTree::<Numbered>::bulk_load(numbered);
+    let around = Around::new(&stage, points, &tree)?;
+    let facets = facets(points, &around);
+    let (first, step) = (DVec3::from(points.first().copied().unwrap_or_default()), around.apart);
+    let mut lattice = Lattice { tree: &tree, winding: WindingTree::new(&facets), first, step, known: HashMap::new() };
+    let rims = lattice.rims(&stage, points, &around)?;
+    let places = lattice.places(&stage, rims, MOST_NEW * points.len())?;
+    stage.finish();
+    Ok(Closing { points: places.iter().map(|place| place.at.to_array()).collect(), caps: caps(&places, step) })
+}
+
+/// Normals of the points, turned to one side, and what part of the surface each has.
+struct Around {
+    normals: Vec<DVec3>,
+    areas: Vec<f64>,
+    /// Towards where each point has no neighbours, along the surface; unit length.
+    beyond: Vec<DVec3>,
+    /// The edge of the square that a point has of the surface, the median.
+    apart: f64,
+}
+
+impl Around {
+    fn new(stage: &Stage<'_>, points: &[[f64; 3]], tree: &RTree<Numbered>) -> Result<Self> {
+        let parts: Vec<&[[f64; 3]]> = points.chunks(AT_ONCE).collect();
+        let found = stage.run(&parts, &Workers::none(), |(), part| {
+            let told = |p: &[f64; 3]| {
+                let near: Vec<_> = tree.nearest_neighbor_iter(*p).take(NEIGHBOURS).collect();
+                let places: Vec<DVec3> = near.iter().map(|n| DVec3::from(*n.geom())).collect();
+                let radius = places.last().map_or(0.0, |last| last.distance(places[0]));
+                let numbers: Vec<u32> = near.iter().map(|n| n.data).collect();
+                let normal = plane_normal(&places, &[1.0; NEIGHBOURS][..places.len()]);
+                let others = places.iter().sum::<DVec3>() / places.len() as f64 - places[0];
+                let beyond = -(others - normal * others.dot(normal)).normalize_or_zero();
+                (normal, radius, numbers, beyond)
+            };
+            Ok(part.iter().map(told).collect::<Vec<_>>())
+        })?;
+        let found: Vec<_> = found.into_iter().flatten().collect();
+        let places: Vec<DVec3> = points.iter().map(|&p| DVec3::from(p)).collect();
+        let mut normals: Vec<DVec3> = found.iter().map(|(normal, ..)| *normal).collect();
+        let of = |a: u32, b: u32| {
+            let ends = [a.min(b), a.max(b)];
+            Link::between(ends, ends.map(|n| places[n as usize]), ends.map(|n| normals[n as usize]))
+        };
+        let links = (0..)
+            .zip(&found)
+            .flat_map(|(a, (_, _, near, _))| near.iter().filter(move |&&b| a != b).map(move |&b| (a, b)));
+        let links: Vec<Link> = links.map(|(a, b)| of(a, b)).collect();
+        orient(&places, &mut normals, links);
+        let areas: Vec<f64> = found.iter().map(|(_, radius, ..)| PI * radius * radius / NEIGHBOURS as f64).collect();
+        let mut sorted = areas.clone();
+        sorted.sort_by(f64::total_cmp);
+        Ok(Self {
+            normals,
+            areas,
+            beyond: found.iter().map(|(.., beyond)| *beyond).collect(),
+            apart: sorted.get(sorted.len() / 2).map_or(0.0, |area| area.sqrt()),
+        })
+    }
+}
+
+/// A facet for each point: a triangle of its area, across its normal.
+fn facets(points: &[[f64; 3]], around: &Around) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    for ((point, normal), area) in points.iter().zip(&around.normals).zip(&around.areas) {
+        if normal.length_squared() < 0.5 {
+            continue;
+        }
+        let (u, v) = normal.any_orthonormal_pair();
+        // The area of an equilateral triangle is 3/4 sqrt 3 of its outer radius squared.
+        let radius = (area / (0.75 * 3f64.sqrt())).sqrt();
+        let first = mesh.vertices.len() as u32;
+        let turned = if u.cross(v).dot(*normal) > 0.0 { v } else { -v };
+        for (cosine, sine) in [(1.0, 0.0), (-0.5, 0.75f64.sqrt()), (-0.5, -(0.75f64.sqrt()))] {
+            mesh.vertices.push((DVec3::from(*point) + (u * cosine + turned * sine) * radius).to_array());
+        }
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    mesh
+}
+
+/// Where the winding number is asked: at the nodes of a lattice, from rims on along the border between the sides.
+struct Lattice<'a> {
+    tree: &'a RTree<Numbered>,
+    winding: WindingTree,
+    first: DVec3,
+    step: f64,
+    /// How far from 1/2 it is where it was asked.
+    known: HashMap<[i64; 3], f64>,
+}
+
+impl Lattice<'_> {
+    fn place(&self, node: [i64; 3]) -> DVec3 {
+        self.first + DVec3::from(node.map(|n| n as f64)) * self.step
+    }
+
+    fn away(&self, at: DVec3) -> f64 {
+        let nearest = self.tree.nearest_neighbor(at.to_array());
+        nearest.map_or(f64::INFINITY, |point| DVec3::from(*point.geom()).distance(at))
+    }
+
+    fn side(&self, at: DVec3) -> f64 {
+        self.winding.winding_number(at.to_array()) - HALF
+    }
+
+    /// The cubes around places beside rims: where no points are though the surface would go on.
+    fn rims(&self, stage: &Stage<'_>, points: &[[f64; 3]], around: &Around) -> Result<Vec<[i64; 3]>> {
+        let numbers: Vec<usize> = (0..points.len()).collect();
+        let parts: Vec<&[usize]> = numbers.chunks(AT_ONCE).collect();
+        let found = stage.run(&parts, &Workers::none(), |(), part| {
+            let beyond = |&n: &usize| DVec3::from(points[n]) + around.beyond[n] * (BEYOND * self.step);
+            let rims = part.iter().map(beyond).filter(|&at| self.away(at) > BESIDE * self.step);
+            let cube = |at: DVec3| ((at - self.first) / self.step).to_array().map(|v| v.floor() as i64);
+            Ok(rims.flat_map(|at| corners(cube(at).map(|v| v - 1), 3)).collect::<Vec<_>>())
+        })?;
+        Ok(found.concat())
+    }
+
+    /// Asks at those nodes of cubes that are not known yet.
+    fn ask(&mut self, stage: &Stage<'_>, cubes: &[[i64; 3]]) -> Result<()> {
+        let mut nodes: Vec<[i64; 3]> = cubes.iter().flat_map(|&cube| corners(cube, 2)).collect();
+        nodes.retain(|node| !self.known.contains_key(node));
+        nodes.sort_unstable();
+        nodes.dedup();
+        let parts: Vec<&[[i64; 3]]> = nodes.chunks(AT_ONCE).collect();
+        let ask = |part: &&[[i64; 3]]| part.iter().map(|&node| self.side(self.place(node))).collect::<Vec<_>>();
+        let sides = stage.run(&parts, &Workers::none(), |(), part| Ok(ask(part)))?;
+        self.known.extend(nodes.into_iter().zip(sides.concat()));
+        Ok(())
+    }
+
+    /// Places on all caps: where the border crosses the lattice's lines away from points, followed from cube to cube.
+    fn places(&mut self, stage: &Stage<'_>, mut due: Vec<[i64; 3]>, most: usize) -> Result<Vec<Place>> {
+        let mut seen = HashSet::new();
+        let mut found = BTreeMap::new();
+        while !due.is_empty() && found.len() < most {
+            due.retain(|cube| seen.insert(*cube));
+            self.ask(stage, &due)?;
+            let parts: Vec<&[[i64; 3]]> = due.chunks(AT_ONCE).collect();
+            let crossed = stage.run(&parts, &Workers::none(), |(), part| {
+                Ok(part
+                    .iter()
+                    .map(|&cube| (cube, self.crossings(cube)))
+                    .filter(|(_, of)| !of.is_empty())
+                    .collect::<Vec<_>>())
+            })?;
+            let mut next = Vec::new();
+            for (cube, crossings) in crossed.into_iter().flatten() {
+                next.extend(corners(cube.map(|v| v - 1), 3));
+                found.extend(crossings);
+            }
+            due = next;
+        }
+        Ok(found.into_values().collect())
+    }
+
+    /// Where the border crosses the edges of a cube that are not beside points, by node and axis.
+    fn crossings(&self, cube: [i64; 3]) -> Vec<(([i64; 3], usize), Place)> {
+        let mut found = Vec::new();
+        for node in corners(cube, 2) {
+            for axis in (0..3).filter(|&axis| node[axis] == cube[axis]) {
+                let mut beside = node;
+                beside[axis] += 1;
+                let [from, to] = [node, beside].map(|node| self.known.get(&node).copied().unwrap_or(f64::NAN));
+                if from * to < 0.0 {
+                    let (a, b) = (self.place(node), self.place(beside));
+                    let at = a + (b - a) * (from / (from - to));
+                    let away = self.away(at);
+                    if away > BESIDE * self.step {
+                        found.push(((node, axis), Place { at, away, area: self.area(at) }));
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// The area that one crossing of the border with the lattice's lines stands for: a border with the unit normal n has
+    /// |n| of each axis over the step squared of them.
+    fn area(&self, at: DVec3) -> f64 {
+        let step = 0.5 * self.step;
+        let slope = DVec3::AXES.map(|axis| self.side(at + axis * step) - self.side(at - axis * step));
+        let normal = DVec3::from(slope).normalize_or(DVec3::ONE.normalize());
+        self.step.powi(2) / normal.abs().element_sum()
+    }
+}
+
+/// So many nodes along each axis from one on.
+fn corners(first: [i64; 3], number: i64) -> impl Iterator<Item = [i64; 3]> {
+    let part = Box3::new(first, first.map(|v| v + number));
+    (0..part.len()).map(move |n| part.voxel_at(n))
+}
+
+/// Places that are connected are one cap.
+fn caps(places: &[Place], step: f64) -> Vec<Cap> {
+    let tree = RTree::<Numbered>::bulk_load(
+        places.iter().zip(0..).map(|(place, n)| GeomWithData::new(place.at.to_array(), n)).collect(),
+    );
+    let mut forest = Forest::of_singles(places.len());
+    for (place, n) in places.iter().zip(0..) {
+        for beside in tree.locate_within_distance(place.at.to_array(), 4.0 * step * step) {
+            forest.join(n, beside.data);
+        }
+    }
+    let mut sums = BTreeMap::<u32, (DVec3, f64, f64)>::new();
+    for (place, n) in places.iter().zip(0..) {
+        let (middle, away, area) = sums.entry(forest.root(n)).or_default();
+        *middle += place.at * place.area;
+        *away = away.max(place.away);
+        *area += place.area;
+    }
+    let mut caps: Vec<Cap> = sums
+        .into_values()
+        .map(|(middle, away, area)| Cap { place: (middle / area).to_array(), width: 2.0 * away, area })
+        .collect();
+    caps.sort_by(|a, b| b.width.total_cmp(&a.width));
+    caps
+}
