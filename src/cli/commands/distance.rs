@@ -289,16 +289,12 @@ impl Job {
     /// What this rank takes.
     fn needs<P: Precision>(&self, threads: usize) -> Needs {
         let (writes, ranks) = (self.args.job.output.store().is_some(), self.comm.ranks());
-        match self.middle_settings() {
-            Some(middle) => {
-                let needs = middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes);
-                with_touching(needs, self.volume.as_ref().map(|volume| volume as &dyn Labels), threads)
-            }
-            None => {
-                let needs = self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], self.writes());
-                self.speeds.as_ref().map_or(needs, |speeds| needs.reading(speeds.as_ref(), threads))
-            }
+        if let Some(middle) = self.middle_settings() {
+            let needs = middle.needs::<P>(&self.geometry, &self.sets, threads, ranks, writes);
+            return with_touching(needs, self.volume.as_ref().map(|volume| volume as &dyn Labels), threads);
         }
+        let needs = self.settings.needs::<P>(&self.geometry, &self.sets, [threads, ranks], self.writes());
+        self.speeds.as_ref().map_or(needs, |speeds| needs.reading(speeds.as_ref(), threads))
     }
 
     /// The stages of the run, and what each will probably take.

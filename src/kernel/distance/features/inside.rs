@@ -74,7 +74,7 @@ impl<'a> Inside<'a> {
         let step = self.geometry.max_spacing();
         let mut reach = 0.5 * room / rim.steepest(place, 0.0);
         for _ in 0..HALVINGS {
-            if !(reach >= step) {
+            if reach.is_nan() || reach < step {
                 return 0;
             }
             if reach * rim.steepest(place, reach) <= room {

@@ -132,10 +132,13 @@ fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool,
     swept
 }
 
+/// The voxels of one vector, those beside them, and their speeds.
+type Vector<'v, L, const N: usize> = (&'v mut [L; N], [&'v [L; N]; 6], &'v [f32; N]);
+
 /// Lowers the voxels of one vector. Something is to be carried back to a side that was passed before and is larger.
 #[inline(always)]
 fn lower<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool, const UNEVEN: bool>(
-    (here, beside, speeds): (&mut [P::Lane; N], [&[P::Lane; N]; 6], &[f32; N]),
+    (here, beside, speeds): Vector<'_, P::Lane, N>,
     passed: [usize; 3],
     k: &Axes<A>,
     (place, record): (Place<'_>, &mut R),
