@@ -85,10 +85,14 @@ pub(crate) struct Settings {
     exact: Option<bool>,
     /// The image that times are asked for through; null where distances are.
     #[serde(skip_serializing_if = "Option::is_none")]
-    speed: Option<serde_json::Value>,
+    speed: Option<Speed>,
     brick: i64,
     scratch: String,
 }
+
+/// The image of speeds, where there is one.
+#[derive(Debug, Serialize)]
+struct Speed(Option<String>);
 
 impl Settings {
     pub(crate) fn new(
@@ -133,7 +137,7 @@ impl Settings {
             exact_labels: middle.map(|choice| choice.labels == LabelMode::Exact),
             closest_point: settings.closest_point,
             exact: middle.is_none().then_some(settings.exact),
-            speed: middle.is_none().then(|| args.speed.as_ref().map(|path| path.display().to_string()).into()),
+            speed: middle.is_none().then(|| Speed(args.speed.as_ref().map(|path| path.display().to_string()))),
             brick: settings.brick,
             scratch: resources.scratch.display().to_string(),
         }

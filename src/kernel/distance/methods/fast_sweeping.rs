@@ -132,8 +132,8 @@ fn pass<P: Precision, A: Real, R: Record, const N: usize, const ISOTROPIC: bool,
     swept
 }
 
-/// The voxels of one vector, those beside each along the axes, and the speeds of the first.
-type Vector<'a, L, const N: usize> = (&'a mut [L; N], [&'a [L; N]; 6], &'a [f32; N]);
+/// The voxels of one vector, those beside them, and their speeds.
+type Vector<'v, L, const N: usize> = (&'v mut [L; N], [&'v [L; N]; 6], &'v [f32; N]);
 
 /// Lowers the voxels of one vector. Something is to be carried back to a side that was passed before and is larger.
 #[inline(always)]

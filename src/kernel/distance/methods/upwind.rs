@@ -224,7 +224,7 @@ mod tests {
         };
         for _ in 0..2000 {
             let spacing = [0.5 + random(), 0.5 + random(), 0.5 + random()];
-            let speed = 10_f64.powf(6.0 * random() - 3.0);
+            let speed = libm::pow(10.0, 6.0 * random() - 3.0);
             let near = [2.0 * random() / speed, 2.0 * random() / speed, 2.0 * random() / speed];
             let excess = |x: f64| {
                 let sum: f64 = (0..3).map(|a| ((x - near[a]).max(0.0) / spacing[a]).powi(2)).sum();
