@@ -111,7 +111,7 @@ fn reconstructions_that_make_no_sense() {
     let grid = Geometry::new([4; 3], [0.1; 3], [0.0; 3]);
     for (job, what) in [
         (job().beta(0.0), "`beta` is 0; it must be a number, more than 0"),
-        (job().noise(-0.1), "`noise` is -0.1; it must be a number, at least 0"),
+        (job().noise(-0.1), "`noise` is -0.1; it must be a number, 0 or more"),
         (job().theta(-1.0), "`theta` is -1"),
         (job().delta(f64::NAN), "`delta` is NaN"),
         (job().tau(0.0), "`tau` is 0"),

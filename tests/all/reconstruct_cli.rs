@@ -127,7 +127,7 @@ fn what_cannot_be_done_is_refused_in_a_sentence() {
         ("reconstruct ball.xyz -o out/x.zarr --spacing 1e-300", 2, ["--spacing", "voxels"]),
         ("reconstruct ball.xyz -o out/x.zarr --beta 0.01", 2, ["--beta 0.01", "leaks"]),
         ("reconstruct ball.xyz -o out/x.zarr --beta -1", 2, ["--beta", "more than 0"]),
-        ("reconstruct ball.xyz -o out/x.zarr --noise -1", 2, ["--noise", "at least 0"]),
+        ("reconstruct ball.xyz -o out/x.zarr --noise -1", 2, ["--noise", "0 or more"]),
         ("reconstruct ball.xyz -o out/x.zarr --mesh out/m.xyz", 2, ["m.xyz", ".vtp"]),
         ("reconstruct ball.xyz -o out/x.zarr --memory 1MiB", 2, ["memory", ""]),
         ("measure ball.xyz", 2, ["ball.xyz", "no triangle"]),

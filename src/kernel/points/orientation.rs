@@ -1,5 +1,5 @@
-//! Which way the normals of a cloud point: along a tree of least differences between neighbours (Hoppe, `DeRose`, Duchamp,
-//! `McDonald` and Stuetzle, "Surface reconstruction from unorganized points", 1992; docs/algorithms.md, "Holes").
+//! Which way the normals of a cloud point: along a tree of least differences between neighbours (Hoppe et al., "Surface
+//! reconstruction from unorganized points", 1992; docs/algorithms.md, "Holes").
 
 use glam::DVec3;
 
