@@ -11,8 +11,10 @@ use super::height_field::{COEFFICIENTS, HeightField, plane_normal};
 const FITS: usize = 3;
 /// The weight of a neighbour falls to 1/e^2 at the distance of the farthest one.
 const FALL: f64 = 2.0;
-/// Neighbours so many deviations off the fitted surface hardly count.
-const FAR_DEVIATIONS: f64 = 2.5;
+/// Neighbours so many deviations off the fitted surface hardly count; before there is one, so many off the point along its normal: both
+/// sides of a thin part would count alike.
+const FAR_DEVIATIONS: f64 = 2.0;
+const FIRST_DEVIATIONS: f64 = 3.0;
 /// A point is moved so many deviations at most; what is farther off is no noise.
 const MOST_DEVIATIONS: f64 = 6.0;
 
@@ -38,6 +40,10 @@ pub fn smoothed(neighbours: &[DVec3], sigma: f64) -> Option<DVec3> {
     let near = |squared: f64| libm::exp(-FALL * squared / (radius * radius));
     let mut weights: Vec<f64> = neighbours.iter().map(|p| near(p.distance_squared(from))).collect();
     let mut normal = plane_normal(neighbours, &weights);
+    for (weight, point) in weights.iter_mut().zip(neighbours) {
+        let off = (*point - from).dot(normal) / (FIRST_DEVIATIONS * sigma);
+        *weight *= libm::exp(-0.5 * off * off);
+    }
     let mut at = from;
     for _ in 0..FITS {
         let fitted = HeightField::fitted(neighbours, &weights, (at, normal), radius)?;
