@@ -18,10 +18,19 @@ const FIRST_DEVIATIONS: f64 = 3.0;
 /// A point is moved so many deviations at most; what is farther off is no noise.
 const MOST_DEVIATIONS: f64 = 6.0;
 
-/// How far `neighbours` of a place scatter around a surface that is fitted to them; root mean square, of what the fit has
-/// left free. None where they tell no surface.
+/// What a fit to the points around a place leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scatter {
+    /// Root mean square, of what the fit has left free.
+    pub deviation: f64,
+    /// The mean fourth power over the square of the mean square: the less, the more all points are as far off, as those of the two sides of
+    /// a thin part are.
+    pub kurtosis: f64,
+}
+
+/// How `neighbours` of a place scatter around a surface that is fitted to them. None where they tell no surface.
 #[must_use]
-pub fn deviation(neighbours: &[DVec3]) -> Option<f64> {
+pub fn scatter(neighbours: &[DVec3]) -> Option<Scatter> {
     let (place, radius) = (*neighbours.first()?, radius_of(neighbours)?);
     let free = neighbours.len().checked_sub(COEFFICIENTS).filter(|&free| free > 0)?;
     let weights = vec![1.0; neighbours.len()];
@@ -29,7 +38,9 @@ pub fn deviation(neighbours: &[DVec3]) -> Option<f64> {
     let first = HeightField::fitted(neighbours, &weights, (place, normal), radius)?;
     let second = HeightField::fitted(neighbours, &weights, (place, first.normal), radius)?;
     let sum: f64 = second.residuals.iter().map(|r| r * r).sum();
-    Some((sum / free as f64).sqrt())
+    let fourth: f64 = second.residuals.iter().map(|r| r.powi(4)).sum();
+    let kurtosis = if sum > 0.0 { fourth * neighbours.len() as f64 / (sum * sum) } else { f64::INFINITY };
+    Some(Scatter { deviation: (sum / free as f64).sqrt(), kurtosis })
 }
 
 /// Where the surface is that the first of `neighbours`, the nearest first, lies beside, for points that scatter by `sigma` around
@@ -100,9 +111,30 @@ mod tests {
         let mut seed = 3;
         for sigma in [0.0, 0.1, 0.4] {
             let found: f64 =
-                (0..40).filter_map(|_| deviation(&patch(30.0, sigma, &mut seed)[..25])).sum::<f64>() / 40.0;
+                (0..40).filter_map(|_| scatter(&patch(30.0, sigma, &mut seed)[..25])).map(|s| s.deviation).sum::<f64>()
+                    / 40.0;
             assert!((found - sigma).abs() < 0.05 * sigma + 0.01, "{sigma}: {found}");
         }
+    }
+
+    /// Two sheets are told from noise of the same size.
+    #[test]
+    fn two_sheets_are_no_noise() {
+        let mut seed = 4;
+        let mut median = |of: fn(f64) -> f64| {
+            let one = |_| {
+                let mut points = patch(1e4, 0.0, &mut seed);
+                points.truncate(14);
+                let heights: Vec<f64> = points.iter().map(|_| of(noise(&mut seed))).collect();
+                points.iter_mut().zip(heights).for_each(|(point, height)| point.z += height);
+                scatter(&points).unwrap().kurtosis
+            };
+            let mut found: Vec<f64> = (0..600).map(one).collect();
+            found.sort_by(f64::total_cmp);
+            found[300]
+        };
+        let (sheets, normal) = (median(f64::signum), median(|height| height));
+        assert!(sheets < 2.2 && normal > 2.4, "{sheets} {normal}");
     }
 
     #[test]
