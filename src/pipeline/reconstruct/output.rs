@@ -29,8 +29,6 @@ const LEFT_VOXELS: f64 = 0.6;
 /// Where more of the points than this part have one side all around them, holes are looked for that let it in.
 const MOST_SHEET: f64 = 0.02;
 
-/// Where caps do not close a cloud the search grows to so many times its first reach.
-const MOST_GROWTH: f64 = 4.0;
 
 /// A point may be so many deviations of the noise off the surface.
 const OF_NOISE: f64 = 3.0;
@@ -262,7 +260,7 @@ fn enclosed(engine: &Engine, grid: &Geometry, cloud: &[[f64; 3]], settings: &Rec
         }
     }
     if matches!(found, Found::Open) {
-        found = enclose(engine, &Search { most_growth: MOST_GROWTH, suffix: " farther", ..search })?;
+        found = enclose(engine, &Search { most_growth: f64::INFINITY, suffix: " farther", ..search })?;
     }
     match found {
         Found::Enclosed(enclosure) => begun(enclosure, None, Vec::new()),
