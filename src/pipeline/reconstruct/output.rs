@@ -29,7 +29,6 @@ const LEFT_VOXELS: f64 = 0.6;
 /// Where more of the points than this part have one side all around them, holes are looked for that let it in.
 const MOST_SHEET: f64 = 0.02;
 
-
 /// A point may be so many deviations of the noise off the surface.
 const OF_NOISE: f64 = 3.0;
 
