@@ -60,8 +60,8 @@ pub struct Search<'a> {
     pub start: Start,
     /// The distance from the cloud within which the search begins.
     pub first_reach: f64,
-    /// So many times the first reach the search grows to at most; with 1 it ends as open where the first one finds too little.
-    pub most_growth: f64,
+    /// The search ends as open where that finds too little; else it grows.
+    pub only_near: bool,
     /// What is added to the names of stages.
     pub suffix: &'a str,
 }
@@ -181,18 +181,16 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     let grid = search.grid;
     let half_width = BAND_VOXELS * libm::cbrt(grid.voxel_volume());
     let mut progress = Progress::begin(engine, search.suffix)?;
-    let first = search.first_reach.max(half_width + 3.0 * grid.max_spacing());
-    let mut farthest = progress.farthest_or(first);
+    let mut farthest = progress.farthest_or(search.first_reach.max(half_width + 3.0 * grid.max_spacing()));
     let enough = |sides: &Sides| sides.lost.len() as f64 <= MOST_LOST * search.cloud.len() as f64;
     loop {
         let around = Around::new(engine, search, farthest, &mut progress)?;
         let mut sides = around.sides_found(engine, search, &mut progress)?;
-        if search.most_growth <= 1.0 && (sides.basins.is_empty() || !enough(&sides)) {
+        if search.only_near && (sides.basins.is_empty() || !enough(&sides)) {
             return Ok(Found::Open);
         }
         // No ball fits the box around the cloud that is larger.
-        let all = 2.0 * farthest > search.extents().into_iter().fold(f64::INFINITY, f64::min) + grid.max_spacing()
-            || farthest >= search.most_growth * first;
+        let all = 2.0 * farthest > search.extents().into_iter().fold(f64::INFINITY, f64::min) + grid.max_spacing();
         // Where balls were tried before, they were to be.
         let tried = progress.balls();
         if sides.basins.is_empty() && all && tried == 0 {

@@ -235,7 +235,7 @@ fn enclosed(engine: &Engine, grid: &Geometry, cloud: &[[f64; 3]], settings: &Rec
         beta: settings.beta,
         start: Start::Watershed,
         first_reach: first_reach_for(grid, settings.beta),
-        most_growth: 1.0,
+        only_near: true,
         suffix: "",
     };
     let begun = |enclosure, closed, caps| Ok(Begun { enclosure, closed, caps });
@@ -259,7 +259,7 @@ fn enclosed(engine: &Engine, grid: &Geometry, cloud: &[[f64; 3]], settings: &Rec
         }
     }
     if matches!(found, Found::Open) {
-        found = enclose(engine, &Search { most_growth: f64::INFINITY, suffix: " farther", ..search })?;
+        found = enclose(engine, &Search { only_near: false, suffix: " farther", ..search })?;
     }
     match found {
         Found::Enclosed(enclosure) => begun(enclosure, None, Vec::new()),

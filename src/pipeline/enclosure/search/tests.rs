@@ -44,9 +44,8 @@ fn a_search_that_is_ended_anywhere_goes_on_with_the_same_bits() {
         let run = |engine: &Engine| {
             let first_reach = first_reach_for(&grid, beta);
             let method = Method::FSM;
-            let most_growth = f64::INFINITY;
-            let search =
-                Search { grid: &grid, cloud: &cloud, method, beta, start, first_reach, most_growth, suffix: "" };
+            let (only_near, suffix) = (false, "");
+            let search = Search { grid: &grid, cloud: &cloud, method, beta, start, first_reach, only_near, suffix };
             let found = found(engine, &search);
             most.fetch_max(engine.reports().len(), Relaxed);
             found
