@@ -201,8 +201,7 @@ impl SampleWork for Reading<'_> {
 
 /// The bricks of this rank that a box reaches.
 fn own_bricks<'a>(set: &'a BrickSet, part: &Box3) -> impl Iterator<Item = Slot> + use<'a> {
-    let slots = set.grid().bricks_in(part).filter_map(|id| set.slot(id));
-    slots.filter(|slot| set.owned().contains(slot))
+    set.grid().bricks_in(part).filter_map(|id| set.own_slot(id))
 }
 
 /// Writes what a box holds of a brick.
