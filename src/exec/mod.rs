@@ -41,6 +41,6 @@ pub use progress::outlook::{Outlook, Plan};
 pub use progress::report::StageReport;
 pub use ranks::as_threads;
 pub use relax::{Place, Relax, Until, Waves};
-pub use save_points::{SavePoint, SavePoints, Saved};
+pub use save_points::{SavePoint, SavePoints, Saved, share_checkpoints};
 pub use schedule::{checkerboard, corner_colours, one_wave, sweep_waves};
 pub use workers::Workers;

@@ -12,7 +12,7 @@ use crate::cli::terminal::console::{Console, Voice};
 use crate::cli::terminal::signals::wish;
 use crate::cli::terminal::text::bytes;
 use crate::error::{Error, Result, one_line};
-use crate::exec::{Engine, Progress, SavePoints, gather_records};
+use crate::exec::{Engine, Progress, SavePoints, share_checkpoints};
 use crate::io::ome_zarr::{LiveState, is_store, live};
 use crate::store::checkpoint::{Checkpoints, Identity, difference};
 
@@ -123,20 +123,11 @@ pub(crate) fn survivable(
     known: Option<&Identity>,
     console: &dyn Progress,
 ) -> Result<Engine> {
-    let (rank, ranks) = (engine.comm().rank(), engine.comm().ranks());
     let identity = || known.map_or_else(|| identity(typed), |known| Ok(Some(known.clone())));
     // What others wait for is looked at when all of them have seen what is there.
     engine.comm().any(false)?;
-    let mut found = if rank == 0 { checkpoints(output, identity, console)? } else { None };
-    if ranks > 1 {
-        let first = found.map(|found| found.of_first(ranks)).transpose()?;
-        let (own, shared) = first.unzip();
-        let shared = gather_records(engine.comm(), &shared)?.into_iter().next().flatten();
-        found = match (own, shared) {
-            (None, Some(shared)) => Some(Checkpoints::of_rank(shared, rank, ranks)?),
-            (own, _) => own,
-        };
-    }
+    let found = if engine.comm().rank() == 0 { checkpoints(output, identity, console)? } else { None };
+    let found = share_checkpoints(engine.comm(), found)?;
     let every = output.survive.checkpoint_every;
     Ok(engine.with_save_points(found.map(|found| Arc::new(SavePoints::new(found, every, wish())))))
 }

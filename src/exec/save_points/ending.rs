@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::SavePoints;
+use super::{SavePoints, share_checkpoints};
 use crate::error::{ErrorKind, Result};
-use crate::exec::{Budget, Cancel, Comm, Engine, Progress, as_threads, gather_records};
+use crate::exec::{Budget, Cancel, Comm, Engine, Progress, as_threads};
 use crate::store::Scratch;
 use crate::store::checkpoint::Checkpoints;
 
@@ -45,17 +45,15 @@ struct Layout {
     ranks: usize,
 }
 
-/// Where a run puts by what it has solved, and how often.
-type Saving = (Checkpoints, Option<Duration>);
-
 /// Runs on ranks that share nothing but the folder of the checkpoints; the first one is ended, and gives what is compared.
 fn ran<R: Send>(
     layout: Layout,
-    checkpoints: Option<Saving>,
+    checkpoints: Option<(Checkpoints, Option<Duration>)>,
     steps: usize,
     run: &(dyn Fn(&Engine) -> Result<R> + Sync),
 ) -> Ran<R> {
-    let first = Mutex::new(checkpoints);
+    let (checkpoints, every) = checkpoints.unzip();
+    let (first, every) = (Mutex::new(checkpoints), every.flatten());
     let enders: Vec<Arc<Ender>> = (0..layout.ranks)
         .map(|rank| {
             let (left, signal) = (if rank == 0 { steps } else { usize::MAX }, Arc::default());
@@ -68,9 +66,9 @@ fn ran<R: Send>(
         let (scratch, budget) = (Scratch::new(folder.path(), 1 << 30), Budget { total: 1 << 30 });
         let ender = Arc::new(Relayed { to: enders[rank].clone(), flag: cancel.flag() });
         let engine = Engine::new(layout.threads, scratch, budget, cancel, ender).unwrap().as_rank(comm);
-        let own = if rank == 0 { first.lock().unwrap().take() } else { None };
-        let saving = of_rank(&engine, own)?;
-        let saving = saving.map(|(checkpoints, every)| SavePoints::new(checkpoints, every, Arc::default()));
+        let found = if rank == 0 { first.lock().unwrap().take() } else { None };
+        let found = share_checkpoints(engine.comm(), found)?;
+        let saving = found.map(|checkpoints| SavePoints::new(checkpoints, every, Arc::default()));
         run(&engine.with_save_points(saving.map(Arc::new)))
     };
     let found = as_threads(layout.ranks, work).map(|found| found.into_iter().next().unwrap());
@@ -100,21 +98,6 @@ impl Progress for Relayed {
     }
 
     fn end(&self) {}
-}
-
-/// The checkpoints of each rank, where the first one has some.
-fn of_rank(engine: &Engine, own: Option<Saving>) -> Result<Option<Saving>> {
-    let (rank, ranks) = (engine.comm().rank(), engine.comm().ranks());
-    if ranks == 1 {
-        return Ok(own);
-    }
-    let first = own.map(|(own, every)| own.of_first(ranks).map(|(own, shared)| (own, (shared, every)))).transpose()?;
-    let (own, told) = first.unzip();
-    let Some((shared, every)) = gather_records(engine.comm(), &told)?.into_iter().next().flatten() else {
-        return Ok(None);
-    };
-    let own = own.map_or_else(|| Checkpoints::of_rank(shared, rank, ranks), Ok)?;
-    Ok(Some((own, every)))
 }
 
 /// Ends a run at so many moments, evenly spread over it, half of them once more, and goes on with it: each gives what a run gives that
