@@ -74,15 +74,14 @@ impl Engine {
     }
 
     /// The run is over: what was put by goes, unless the run ended by something that can be mended: a signal, a
-    /// full disk, too little memory. A run that is terminated says what it leaves.
+    /// full disk, too little memory. A run that is terminated says what it leaves. Where that is nothing, no folder stays.
     pub fn settle_save_points<R>(&self, result: &Result<R>) {
         let is_final = |error: &Error| matches!(error.kind(), ErrorKind::Input | ErrorKind::Vanished);
         if result.is_err() && self.cancel.is_terminated() {
             self.saving.iter().for_each(|saving| saving.tell_of_last(self.progress.as_ref()));
         }
-        if result.as_ref().err().is_none_or(is_final) {
-            self.saving.iter().for_each(|saving| saving.clear());
-        }
+        let is_final = result.as_ref().err().is_none_or(is_final);
+        self.saving.iter().filter(|saving| is_final || !saving.are_there()).for_each(|saving| saving.clear());
     }
 
     /// An engine that shares this one's threads and window, for one of several jobs side by side: it keeps reports of

@@ -11,8 +11,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::comm::messages::{Comm, Message, damaged};
-use super::halo::HaloPlan;
+use super::halo::{HaloPlan, Reach};
 use super::ownership::Ownership;
+use super::schedule::one_wave;
 use crate::error::Result;
 use crate::grid::{BrickId, BrickSet, FACES, Slot};
 use crate::store::{BrickArray, Element};
@@ -137,10 +138,23 @@ impl<'a> Exchange<'a> {
     }
 }
 
+/// Writes the faces of all ghosts of a field that is solved: what their owners have. All ranks do it at the same time.
+///
+/// # Errors
+/// When another rank is gone.
+pub fn tell_faces<T: Element>(comm: &dyn Comm, array: &BrickArray<T>) -> Result<()> {
+    if comm.ranks() == 1 {
+        return Ok(());
+    }
+    let plan = HaloPlan::new(*array.set().grid(), Reach::All);
+    Exchange::new(comm, array.set(), &plan)?.faces(array, &one_wave(array.set()))?;
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exec::{Boundary, Reach, ThreadComm};
+    use crate::exec::{Boundary, ThreadComm};
     use crate::grid::{Box3, BrickGrid};
     use crate::store::Scratch;
     use crate::tile::HaloTile;

@@ -1,5 +1,6 @@
 //! Fields that are relaxed brick by brick until nothing changes: each brick once, and again after one beside it changed.
 
+use super::comm::messages::Comm;
 use super::engine::Stage;
 use super::exchange::Exchange;
 use super::halo::{HaloPlan, Reach};
@@ -28,6 +29,15 @@ pub trait FixedPoint: Sync {
 
     /// Takes note that a brick changed; marks bricks to be relaxed again besides those beside it.
     fn changed(&mut self, _slot: Slot, _mark: impl FnMut(Slot)) {}
+
+    /// Nothing is left to do on any rank: takes over what others know that no brick beside theirs tells; marks bricks to be relaxed
+    /// again for that.
+    ///
+    /// # Errors
+    /// When another rank is gone.
+    fn quiet(&mut self, _comm: &dyn Comm, _mark: impl FnMut(Slot)) -> Result<()> {
+        Ok(())
+    }
 }
 
 /// Relaxes a field to its fixed point, from bricks as far as `reach` says. The rounds are the stage's iterations.
@@ -47,9 +57,16 @@ pub fn relax_to_fixed_point<J: FixedPoint>(
         Reach::All => (corner_colours(&set), NEIGHBOURS_26.to_vec()),
     };
     let mut marked = Marked { job, neighbours, dirty: vec![true; set.len()] };
-    let rounds = Waves { stage, exchange, workers, waves: &waves }.relax(&mut marked, Until::QUIET)?;
-    stage.iterated(rounds, 0.0);
-    Ok(())
+    let waves = Waves { stage, exchange, workers, waves: &waves };
+    loop {
+        let rounds = waves.relax(&mut marked, Until::QUIET)?;
+        if rounds == 0 {
+            return Ok(());
+        }
+        stage.iterated(rounds, 0.0);
+        let Marked { job, dirty, .. } = &mut marked;
+        job.quiet(stage.comm(), |slot| dirty[slot as usize] = true)?;
+    }
 }
 
 /// A field and which of its bricks are to be relaxed.

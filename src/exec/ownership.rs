@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::comm::messages::Comm;
-use super::halo::HaloPlan;
+use super::halo::{HaloPlan, Reach};
 use crate::error::Result;
 use crate::grid::{BrickId, BrickSet, Slot};
 
@@ -71,10 +71,17 @@ impl Ownership {
     }
 }
 
+/// This rank's equal part of the bricks of a set, with all bricks around it as ghosts.
+#[must_use]
+pub fn equal_part(comm: &dyn Comm, set: &BrickSet) -> BrickSet {
+    let plan = HaloPlan::new(*set.grid(), Reach::All);
+    Ownership::balanced(set, comm.ranks()).part(set, comm.rank(), &plan)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exec::{Reach, ThreadComm};
+    use crate::exec::ThreadComm;
     use crate::grid::BrickGrid;
 
     #[test]

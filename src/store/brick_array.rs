@@ -137,6 +137,11 @@ impl<T: Element> BrickArray<T> {
         self.absent = Absent { all: value, each: Vec::new() };
     }
 
+    /// Gives all bricks that are not stored the values that they have in another field of the same grid.
+    pub fn take_absent(&mut self, from: &Self) {
+        self.absent = Absent { all: from.absent.all, each: from.absent.each.clone() };
+    }
+
     /// The constant value of a brick that is not stored.
     #[must_use]
     pub fn absent(&self, id: BrickId) -> T {

@@ -30,3 +30,17 @@ pub fn unpack_message<R: DeserializeOwned>(message: &[u8]) -> Result<R> {
 pub fn gather_records<R: Serialize + DeserializeOwned>(comm: &dyn Comm, own: &R) -> Result<Vec<R>> {
     comm.gather(pack_message(own)?)?.iter().map(|message| unpack_message(message)).collect()
 }
+
+/// The records of all ranks, one after the other in order of these, and where this rank's own begin.
+///
+/// # Errors
+/// When another rank is gone.
+pub fn join_records<R: Serialize + DeserializeOwned>(comm: &dyn Comm, own: Vec<R>) -> Result<(Vec<R>, usize)> {
+    if comm.ranks() == 1 {
+        return Ok((own, 0));
+    }
+    let all: Vec<Vec<R>> = gather_records(comm, &own)?;
+    drop(own);
+    let first = all[..comm.rank()].iter().map(Vec::len).sum();
+    Ok((all.into_iter().flatten().collect(), first))
+}

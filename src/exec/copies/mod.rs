@@ -2,3 +2,4 @@
 
 pub(super) mod borrow;
 pub(super) mod spread;
+pub(super) mod whole;

@@ -81,6 +81,11 @@ impl SavePoints {
         self.checkpoints.identity()
     }
 
+    /// Whether there is a checkpoint, of this run or of the one that it goes on with.
+    pub(in crate::exec) fn are_there(&self) -> bool {
+        self.checkpoints.are_there()
+    }
+
     /// Removes all checkpoints: the run is done.
     pub fn clear(&self) {
         self.checkpoints.clear();

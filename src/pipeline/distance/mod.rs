@@ -39,7 +39,7 @@ pub use solvers::{Method, SOLVERS, Solver, Textbook, solvers};
 pub use solving::Solving;
 
 use crate::error::Result;
-use crate::exec::{Engine, Stage, Workers, one_wave};
+use crate::exec::{Engine, Stage, Workers, equal_part, one_wave, tell_faces};
 use crate::grid::BrickSet;
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::store::BrickArray;
@@ -77,29 +77,27 @@ impl Options {
     }
 }
 
-/// Distance to the nearest point in f32, physical units, on the bricks of `set`, no value above `farthest`; on all
-/// ranks of the stage's engine, each of which gets all of it. No bit depends on threads or ranks.
+/// Distance to the nearest point in f32, physical units, on this rank's equal part of the bricks of `set`, with the faces of ghosts; no value
+/// above `farthest`. No bit depends on threads or ranks.
 ///
 /// # Errors
-/// When scratch runs out or the run is interrupted.
+/// When scratch runs out, the run is interrupted or another rank is gone.
 pub fn cloud_distance(
     stage: &Stage<'_>,
     engine: &Engine,
     sources: &Sources<'_>,
-    set: &Arc<BrickSet>,
+    set: &BrickSet,
     method: Method,
     farthest: f32,
 ) -> Result<BrickArray<f32>> {
     let options = Options::up_to(f64::from(farthest));
-    let all =
-        |ranks: usize| if ranks == 1 { Vec::new() } else { set.ids().map(|id| set.grid().brick_box(id)).collect() };
-    let reads = Reads { early: None, boxes: &all(stage.comm().ranks()) };
-    let solved = ranks::solve_once::<f32>(stage, sources, set, (method, Schedule::Front), options, reads)?;
-    let mut distance = BrickArray::with_faces(engine.scratch(), set)?;
+    let solved = ranks::solve_once::<f32>(stage, sources, set, (method, Schedule::Front), options, Reads::default())?;
+    let own = &Arc::new(equal_part(stage.comm(), set));
+    let mut distance = BrickArray::with_faces(engine.scratch(), own)?;
     let (edge, len) = (set.grid().edge(), set.grid().brick_len());
     let workers = Workers::new(move || vec![0.0; len]);
-    stage.run(&one_wave(set), &workers, |values, &slot| {
-        let part = set.grid().brick_box(set.id(slot));
+    stage.run(&one_wave(own), &workers, |values, &slot| {
+        let part = set.grid().brick_box(own.id(slot));
         solved.values.read_box(&part, &mut values[..part.len()])?;
         distance.write(slot, |brick| {
             let width = part.shape()[0] as usize;
@@ -112,5 +110,6 @@ pub fn cloud_distance(
         Ok(())
     })?;
     distance.set_all_absent(farthest);
+    tell_faces(stage.comm(), &distance)?;
     Ok(distance)
 }

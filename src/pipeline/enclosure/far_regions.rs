@@ -1,8 +1,6 @@
 //! Regions far from the cloud: bricks that are not stored, because all their voxels lie at the same (largest) distance.
 //! A connected region of them is one place to a flood.
 
-use std::sync::Arc;
-
 use crate::grid::{BrickId, BrickSet, FACES};
 
 /// Connected regions of bricks that are not stored; each counts as one.
@@ -16,12 +14,13 @@ pub(crate) struct FarRegions {
 }
 
 impl FarRegions {
-    pub(crate) fn new(set: &Arc<BrickSet>, farthest: f32) -> Self {
-        let grid = set.grid();
+    /// Those between the stored bricks of all ranks.
+    pub(crate) fn new(cells: &BrickSet, farthest: f32) -> Self {
+        let grid = cells.grid();
         let mut regions =
             Self { region: vec![u32::MAX; grid.len() as usize], level: Vec::new(), farthest, bricks: Vec::new() };
         for seed in 0..grid.len() {
-            if set.slot(seed).is_some() || regions.region[seed as usize] != u32::MAX {
+            if cells.slot(seed).is_some() || regions.region[seed as usize] != u32::MAX {
                 continue;
             }
             let name = regions.bricks.len() as u32;
@@ -32,7 +31,7 @@ impl FarRegions {
                 for face in FACES {
                     match grid.neighbour(id, face.offset()) {
                         None => outside = true,
-                        Some(n) if set.slot(n).is_none() && regions.region[n as usize] == u32::MAX => {
+                        Some(n) if cells.slot(n).is_none() && regions.region[n as usize] == u32::MAX => {
                             regions.region[n as usize] = name;
                             bricks.push(n);
                         }
@@ -48,7 +47,11 @@ impl FarRegions {
 
     /// Raises the level of the region that a brick belongs to. Returns the region's bricks and level if it rose.
     pub(crate) fn raise(&mut self, id: BrickId, level: f32) -> Option<(&[BrickId], f32)> {
-        let region = self.region[id as usize] as usize;
+        self.raise_region(self.region[id as usize] as usize, level)
+    }
+
+    /// The same of the region of that number.
+    pub(crate) fn raise_region(&mut self, region: usize, level: f32) -> Option<(&[BrickId], f32)> {
         let level = level.min(self.farthest);
         if level <= self.level[region] {
             return None;

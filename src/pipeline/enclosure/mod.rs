@@ -1,6 +1,7 @@
 //! What a cloud encloses, and the region in which its surface is sought.
 
 pub(crate) mod far_regions;
+mod near;
 pub(crate) mod needs;
 pub(crate) mod pockets;
 pub mod region;

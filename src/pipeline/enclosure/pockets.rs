@@ -4,11 +4,12 @@
 //! Where the flood from outside reaches at that radius, the ball's centre may be; pockets are farther than the radius
 //! from there and not reached themselves.
 
+use super::near::Near;
 use super::needs::POINT_BYTES;
 use super::tagging::level_of;
 use super::watershed::WALL_VOXELS;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Hold, Reach, Stage, Workers, one_wave};
+use crate::exec::{Boundary, Engine, HaloPlan, Hold, Reach, Stage, Workers, join_records, one_wave};
 use crate::grid::{Geometry, PointBins};
 use crate::kernel::level_set::initial::flood::shore;
 use crate::kernel::level_set::initial::pocket;
@@ -21,7 +22,7 @@ use crate::tile::HaloTile;
 const SLACK_VOXELS: f64 = 1.0;
 
 /// How deep each voxel lies in a pocket of a ball of that radius, 0 for those in none; physical lengths, over the cells
-/// of `distance`, which reaches farther than the radius. What is `inside` anyhow is no pocket, nor are walls of points.
+/// of `near`, which reaches farther than the radius. What is `inside` anyhow is no pocket, nor are walls of points.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
@@ -29,16 +30,16 @@ pub(crate) fn pockets(
     stage: &Stage<'_>,
     engine: &Engine,
     geometry: &Geometry,
-    distance: &BrickArray<f32>,
+    near: Near<'_>,
     inside: &BrickArray<u8>,
     radius: f64,
 ) -> Result<BrickArray<f32>> {
-    let set = distance.set();
-    let level = level_of(stage, engine, distance)?;
+    let (distance, set) = (near.distance, near.distance.set());
+    let level = level_of(stage, engine, near)?;
     let (centres, _held) = centres(stage, engine, geometry, &level, radius as f32)?;
     let bins = PointBins::new(*set.grid(), geometry, &centres);
     let sources = Sources::cloud(geometry, &centres, &bins);
-    let away = cloud_distance(stage, engine, &sources, set, Method::VDT, f32::INFINITY)?;
+    let away = cloud_distance(stage, engine, &sources, near.cells, Method::VDT, f32::INFINITY)?;
     let ball = Ball {
         radius: radius as f32,
         from: (radius + SLACK_VOXELS * geometry.max_spacing()) as f32,
@@ -73,6 +74,10 @@ fn centres(
         let held = engine.hold(centres.len() as u64 * POINT_BYTES)?;
         Ok((centres, held))
     })?;
-    let (found, held): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-    Ok((found.concat(), held))
+    let (found, mut held): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    let own = found.concat();
+    let own_count = own.len();
+    let (centres, _) = join_records(stage.comm(), own)?;
+    held.push(engine.hold((centres.len() - own_count) as u64 * POINT_BYTES)?);
+    Ok((centres, held))
 }

@@ -8,10 +8,11 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::near::Near;
 use super::tagging::Basin;
 use super::watershed::Sides;
 use crate::error::{Error, Result};
-use crate::exec::{Engine, SavePoint, Saved, Stage};
+use crate::exec::{Engine, SavePoint, Saved, Stage, tell_faces};
 use crate::grid::BrickSet;
 use crate::store::BrickArray;
 use crate::store::checkpoint::SavedField;
@@ -51,8 +52,7 @@ impl<'a> Progress<'a> {
     /// # Errors
     /// When a checkpoint cannot be understood.
     pub(super) fn begin(engine: &'a Engine, suffix: &str) -> Result<Self> {
-        // All ranks have the whole search.
-        let save_point = engine.save_point(&format!("enclosure{suffix}")).map(SavePoint::alike);
+        let save_point = engine.save_point(&format!("enclosure{suffix}"));
         let saved = save_point.as_ref().and_then(SavePoint::saved);
         let known = saved.as_ref().map(Saved::facts).transpose()?.unwrap_or_default();
         Ok(Self { save_point, saved, known })
@@ -98,6 +98,7 @@ impl<'a> Progress<'a> {
         let Some(saved) = self.saved.as_ref().filter(|_| self.known.is_solved) else { return Ok(None) };
         let distance = BrickArray::with_faces(engine.scratch(), set)?;
         saved.restore(0, &distance)?;
+        tell_faces(engine.comm(), &distance)?;
         Ok(Some(distance))
     }
 
@@ -116,15 +117,16 @@ impl<'a> Progress<'a> {
     ///
     /// # Errors
     /// When they cannot be read, or scratch runs out.
-    pub(super) fn sides(&mut self, engine: &Engine, set: &Arc<BrickSet>) -> Result<Option<Sides>> {
+    pub(super) fn sides(&mut self, engine: &Engine, near: Near<'_>) -> Result<Option<Sides>> {
         let (Some(saved), Some(told)) = (self.saved.take(), &self.known.told) else { return Ok(None) };
-        let mut inside = BrickArray::with_faces(engine.scratch(), set)?;
-        let far: Vec<_> = (0..set.grid().len()).filter(|&id| set.slot(id).is_none()).collect();
+        let mut inside = BrickArray::with_faces(engine.scratch(), near.distance.set())?;
+        let far: Vec<_> = near.far_bricks().collect();
         if far.len() != told.far.len() {
             return Err(Error::failed("the checkpoint is of another grid; leave --resume out to begin anew"));
         }
         far.into_iter().zip(&told.far).for_each(|(id, &side)| inside.set_absent(id, side));
         saved.restore(1, &inside)?;
+        tell_faces(engine.comm(), &inside)?;
         Ok(Some(Sides { inside, basins: told.basins.clone(), lost: told.lost.clone() }))
     }
 
@@ -132,15 +134,13 @@ impl<'a> Progress<'a> {
     ///
     /// # Errors
     /// When the run is to end.
-    pub(super) fn told(&mut self, distance: &BrickArray<f32>, sides: &Sides, balls: usize) -> Result<()> {
+    pub(super) fn told(&mut self, near: Near<'_>, sides: &Sides, balls: usize) -> Result<()> {
         if self.save_point.is_none() {
             return Ok(());
         }
-        let set = sides.inside.set();
-        let far =
-            (0..set.grid().len()).filter(|&id| set.slot(id).is_none()).map(|id| sides.inside.absent(id)).collect();
+        let far = near.far_bricks().map(|id| sides.inside.absent(id)).collect();
         self.known.told = Some(Told { balls, basins: sides.basins.clone(), lost: sides.lost.clone(), far });
-        self.put_by(&[distance, &sides.inside])
+        self.put_by(&[near.distance, &sides.inside])
     }
 
     /// A step that begins with what is known, of which `fields` are, and leaves it as it is.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::near::Near;
 use super::needs::box_bytes;
 use super::pockets::pockets;
 use super::region::{RegionOfInterest, voxel_bounds};
@@ -13,11 +14,11 @@ use super::sheets::{Company, hold_sheets};
 use super::tagging::{Basin, tag};
 use super::watershed::{Sides, watershed};
 use crate::error::Result;
-use crate::exec::{Engine, Hold, Stage};
-use crate::grid::{Box3, Geometry, digits};
+use crate::exec::{Engine, Hold, Stage, equal_part, tell_faces};
+use crate::grid::{Box3, BrickSet, Geometry, digits};
 use crate::kernel::level_set::initial::persistence::PERSISTENCE;
 use crate::pipeline::distance::{Method, Sources, cloud_distance};
-use crate::pipeline::level_set::band::{Band, Reaches, make_band};
+use crate::pipeline::level_set::band::{Band, Reaches, SidesNear, make_band};
 use crate::store::BrickArray;
 use crate::store::checkpoint::SavedField;
 
@@ -137,6 +138,9 @@ pub struct Enclosure {
     pub beta: f64,
     /// How far the band reaches.
     pub reaches: Reaches,
+    /// The cells near the cloud, of all ranks.
+    cells: BrickSet,
+    /// On this rank's part of them.
     distance: BrickArray<f32>,
     inside: BrickArray<u8>,
     basins: Vec<Basin>,
@@ -204,14 +208,15 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
                 if closed.lost.len() < sides.lost.len() {
                     sides = closed;
                 }
-                progress.told(&around.distance, &sides, balls)?;
+                progress.told(around.near(), &sides, balls)?;
             }
         }
         if !sides.basins.is_empty() && (all || enough(&sides)) {
             let reaches = Reaches { inner: half_width as f32, outer: half_width as f32 };
             let Sides { inside, basins, lost } = sides;
             let geometry = &around.region.geometry;
-            let sheet = hold_sheets(geometry, search.cloud, &lost, Company::AT_THE_START, &inside);
+            let sheet = hold_sheets(engine.comm(), geometry, search.cloud, &lost, Company::AT_THE_START, &inside)?;
+            tell_faces(engine.comm(), &inside)?;
             return Ok(Found::Enclosed(Box::new(around.enclosed(0.0, reaches, inside, basins, sheet))));
         }
         farthest *= 2.0;
@@ -226,12 +231,11 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     let mut farthest = progress.farthest_or(search.first_reach);
     loop {
         let around = Around::new(engine, search, farthest, &mut progress)?;
-        let engine = &*engine.by_itself();
         let stage = around.tagging(engine, search);
         // Whoever names a beta knows how deep the inside is.
         let ratio = if search.beta.is_some() { 1.0 } else { PERSISTENCE };
         let wanted = |basin: &Basin| search.beta.is_none_or(|beta| search.holds(basin, beta));
-        let flood = || tag(&stage, engine, &around.sources(search), &around.distance, ratio, wanted);
+        let flood = || tag(&stage, engine, &around.sources(search), around.near(), ratio, wanted);
         let mut tagging = progress.step(&[&around.distance], flood)?;
         let beta = search.beta.or_else(|| automatic_beta(&tagging.basins, grid));
         let Some(beta) = beta.filter(|&beta| tagging.basins.iter().any(|basin| search.holds(basin, beta))) else {
@@ -257,7 +261,8 @@ fn enclose_by_flood(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         }
         let deepest = Deepest::of(&tagging.basins, &around.region.geometry);
         tagging.basins.retain(|basin| search.holds(basin, beta));
-        let inside = progress.step(&[&around.distance], || tagging.inside(&stage, engine, beta as f32))?;
+        let inside =
+            progress.step(&[&around.distance], || tagging.inside(&stage, engine, around.near(), beta as f32))?;
         stage.finish();
         let reaches = Reaches { inner: half_width as f32, outer: outer as f32 };
         let enclosure = around.enclosed(beta, reaches, inside, tagging.basins, Vec::new());
@@ -273,6 +278,7 @@ fn automatic_beta(basins: &[Basin], grid: &Geometry) -> Option<f64> {
 /// The distance within some reach of the cloud.
 struct Around {
     region: RegionOfInterest,
+    /// On this rank's part of the region's cells.
     distance: BrickArray<f32>,
     held: Hold,
 }
@@ -287,15 +293,16 @@ impl Around {
         let region = RegionOfInterest::new(search.grid, search.cloud, farthest);
         drop(tables);
         let held = engine.hold(region.held(search.cloud))?;
-        let set = Arc::new(region.cells.clone());
+        let set = &region.cells;
         let sources = Sources::cloud(&region.geometry, search.cloud, &region.bins);
         let stage = progress.stage(engine, &format!("distance{}", search.suffix), 11 * set.len() as u64);
         stage.voxels((set.len() * set.grid().brick_len()) as u64);
-        let distance = if let Some(mut distance) = progress.distance(engine, &set)? {
-            (0..set.grid().len()).for_each(|id| distance.set_absent(id, farthest as f32));
+        let own = Arc::new(equal_part(engine.comm(), set));
+        let distance = if let Some(mut distance) = progress.distance(engine, &own)? {
+            distance.set_all_absent(farthest as f32);
             distance
         } else {
-            let distance = cloud_distance(&stage, engine, &sources, &set, search.method, farthest as f32)?;
+            let distance = cloud_distance(&stage, engine, &sources, set, search.method, farthest as f32)?;
             progress.solved(&distance)?;
             distance
         };
@@ -305,12 +312,16 @@ impl Around {
 
     /// The sides of the cloud as an earlier run told them, else as they are without balls.
     fn sides_found(&self, engine: &Engine, search: &Search<'_>, progress: &mut Progress<'_>) -> Result<Sides> {
-        if let Some(sides) = progress.sides(engine, self.distance.set())? {
+        if let Some(sides) = progress.sides(engine, self.near())? {
             return Ok(sides);
         }
         let sides = progress.step(&[&self.distance], || self.sides(engine, search, None))?;
-        progress.told(&self.distance, &sides, 0)?;
+        progress.told(self.near(), &sides, 0)?;
         Ok(sides)
+    }
+
+    fn near(&self) -> Near<'_> {
+        Near { distance: &self.distance, cells: &self.region.cells }
     }
 
     fn sources<'a>(&'a self, search: &Search<'a>) -> Sources<'a> {
@@ -319,28 +330,26 @@ impl Around {
 
     /// The sides of the cloud; with a radius, what is open is closed by a ball of it, what is inside stays so.
     fn sides(&self, engine: &Engine, search: &Search<'_>, ball: Option<(f64, &BrickArray<u8>)>) -> Result<Sides> {
-        let engine = &*engine.by_itself();
         let stage = self.tagging(engine, search);
         let pockets = ball
-            .map(|(radius, inside)| pockets(&stage, engine, &self.region.geometry, &self.distance, inside, radius))
+            .map(|(radius, inside)| pockets(&stage, engine, &self.region.geometry, self.near(), inside, radius))
             .transpose()?;
-        let sides = watershed(&stage, engine, &self.sources(search), &self.distance, pockets.as_ref())?;
+        let sides = watershed(&stage, engine, &self.sources(search), self.near(), pockets.as_ref())?;
         stage.finish();
         Ok(sides)
     }
 
     /// The deepest space of a cloud that encloses nothing: what a given beta could start from.
     fn deepest(&self, engine: &Engine, search: &Search<'_>, progress: &mut Progress<'_>) -> Result<Option<Deepest>> {
-        let engine = &*engine.by_itself();
         let stage = self.tagging(engine, search);
-        let flood = || tag(&stage, engine, &self.sources(search), &self.distance, 1.0, |_| false);
+        let flood = || tag(&stage, engine, &self.sources(search), self.near(), 1.0, |_| false);
         let tagging = progress.step(&[&self.distance], flood)?;
         stage.finish();
         Ok(Deepest::of(&tagging.basins, &self.region.geometry))
     }
 
     fn tagging<'a>(&self, engine: &'a Engine, search: &Search<'_>) -> Stage<'a> {
-        let set = self.distance.set();
+        let set = &self.region.cells;
         let stage = engine.stage(&format!("tagging{}", search.suffix), 0);
         stage.voxels((set.len() * set.grid().brick_len()) as u64);
         stage
@@ -354,10 +363,9 @@ impl Around {
         basins: Vec<Basin>,
         sheet: Vec<u32>,
     ) -> Enclosure {
-        let (geometry, window) = (self.region.geometry.clone(), self.region.window);
+        let Self { region: RegionOfInterest { geometry, window, cells, .. }, distance, held } = self;
         let deepest = Deepest::of(&basins, &geometry);
-        let Self { distance, held, .. } = self;
-        Enclosure { geometry, window, beta, reaches, distance, inside, basins, deepest, sheet, held }
+        Enclosure { geometry, window, beta, reaches, cells, distance, inside, basins, deepest, sheet, held }
     }
 }
 
@@ -399,13 +407,14 @@ impl Enclosure {
         Ok((distance, inside))
     }
 
-    /// Makes the band; the fields of the search go. What the box takes of the memory is held until the guard goes.
+    /// Makes the band, which all ranks then have; the fields of the search go. What the box takes of the memory is held until the guard goes.
     ///
     /// # Errors
-    /// When scratch runs out or the run is interrupted.
+    /// When scratch runs out, the run is interrupted or another rank is gone.
     pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<(Band, Hold)> {
         let stage = engine.stage(&format!("band{suffix}"), self.inside.set().len() as u64);
-        let band = make_band(&stage, engine, &self.distance, &self.inside, self.reaches)?;
+        let sides = SidesNear { distance: &self.distance, inside: &self.inside, cells: &self.cells };
+        let band = make_band(&stage, engine, sides, self.reaches)?;
         stage.finish();
         Ok((band, self.held))
     }

@@ -6,6 +6,8 @@ use std::collections::BTreeSet;
 
 use rstar::RTree;
 
+use crate::error::Result;
+use crate::exec::{Comm, join_records};
 use crate::grid::{Box3, BrickSet, Geometry, Slot};
 use crate::kernel::level_set::initial::start::{HELD, value};
 use crate::pipeline::level_set::band::Band;
@@ -85,14 +87,19 @@ impl Holds for Band {
 }
 
 /// Holds the voxels around those of the `lost` points that form sheets, and between them and their neighbours in the
-/// cloud, each on the side opposite to what is there; returns these points.
+/// cloud, each on the side opposite to what is there; returns these points. Each rank of several does so in its part of the target, and
+/// looks after the faces of ghosts itself.
+///
+/// # Errors
+/// When another rank is gone.
 pub(crate) fn hold_sheets(
+    comm: &dyn Comm,
     geometry: &Geometry,
     positions: &[[f64; 3]],
     lost: &[u32],
     company: Company,
     target: &impl Holds,
-) -> Vec<u32> {
+) -> Result<Vec<u32>> {
     let tree = RTree::bulk_load(lost.iter().map(|&point| positions[point as usize]).collect());
     let within = (company.near * geometry.max_spacing()).powi(2);
     let is_sheet = |p| tree.locate_within_distance(p, within).take(company.others + 1).count() > company.others;
@@ -102,10 +109,11 @@ pub(crate) fn hold_sheets(
         let (slot, at) = place_of(target.set(), geometry.to_voxels(place).map(|v| v.round() as i64))?;
         is_sheet(place).then(|| (point, target.side(slot, at)))
     };
-    let sheet: Vec<(u32, u8)> = lost.iter().filter_map(side).collect();
+    let (mut sheet, _) = join_records(comm, lost.iter().filter_map(side).collect())?;
     if sheet.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
+    sheet.sort_unstable();
     let all = RTree::bulk_load(positions.to_vec());
     let mut touched = BTreeSet::new();
     let longest = (NEAR_VOXELS * geometry.max_spacing()).powi(2);
@@ -133,15 +141,15 @@ pub(crate) fn hold_sheets(
     for slot in touched {
         target.refresh(slot);
     }
-    sheet.into_iter().map(|(point, _)| point).collect()
+    Ok(sheet.into_iter().map(|(point, _)| point).collect())
 }
 
-/// The brick of a voxel and its place there; none where nothing is stored.
+/// The brick of a voxel and its place there; none where this rank stores nothing.
 fn place_of(set: &BrickSet, voxel: [i64; 3]) -> Option<(Slot, usize)> {
     let id = set.grid().brick_of(voxel)?;
     let (lo, edge) = (set.grid().brick_box(id).lo, set.grid().edge());
     let [x, y, z] = [0, 1, 2].map(|a| voxel[a] - lo[a]);
-    Some((set.slot(id)?, ((z * edge + y) * edge + x) as usize))
+    Some((set.own_slot(id)?, ((z * edge + y) * edge + x) as usize))
 }
 
 /// The voxel nearest to a place, and those within reach of it.

@@ -6,13 +6,15 @@
 use serde::{Deserialize, Serialize};
 
 use super::far_regions::FarRegions;
+use super::near::Near;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, FixedPoint, HaloPlan, Reach, Stage, Workers, one_wave, relax_to_fixed_point};
-use crate::grid::{FACES, Face, Slot};
+use crate::exec::{Boundary, Comm, Engine, Exchange, FixedPoint, HaloPlan, Hold, Reach, Stage, Workers};
+use crate::exec::{gather_records, join_records, one_wave, relax_to_fixed_point, tell_faces};
+use crate::grid::{BrickId, FACES, Face, Slot};
 use crate::kernel::level_set::initial::basins;
 use crate::kernel::level_set::initial::basins::Piece;
 use crate::kernel::level_set::initial::flood;
-use crate::kernel::level_set::initial::persistence::{Joins, PIECE_BYTES};
+use crate::kernel::level_set::initial::persistence::{Joins, PIECE_BYTES, across, beyond};
 use crate::pipeline::distance::Sources;
 use crate::store::BrickArray;
 use crate::tile::HaloTile;
@@ -43,10 +45,10 @@ impl Tagging {
     ///
     /// # Errors
     /// When scratch runs out or the run is interrupted.
-    pub fn inside(&self, stage: &Stage<'_>, engine: &Engine, beta: f32) -> Result<BrickArray<u8>> {
+    pub fn inside(&self, stage: &Stage<'_>, engine: &Engine, near: Near<'_>, beta: f32) -> Result<BrickArray<u8>> {
         let set = self.level.set();
         let mut inside = BrickArray::with_faces(engine.scratch(), set)?;
-        for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
+        for id in near.far_bricks() {
             inside.set_absent(id, u8::from(self.level.absent(id) < beta));
         }
         stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
@@ -56,24 +58,26 @@ impl Tagging {
             inside.refresh_faces(slot);
             Ok(())
         })?;
+        tell_faces(stage.comm(), &inside)?;
         Ok(inside)
     }
 }
 
 /// Floods the grid from its border and finds the basins that are so many times as deep as their saddle. Of these the deepest and
-/// those that are `wanted` are kept: noise has as many as a cloud has points, and each is looked for at every voxel.
+/// those that are `wanted` are kept: noise has as many as a cloud has points, and each is looked for at every voxel. All ranks find the
+/// same basins.
 ///
 /// # Errors
-/// When scratch runs out or the run is interrupted.
+/// When scratch runs out, the run is interrupted or another rank is gone.
 pub fn tag(
     stage: &Stage<'_>,
     engine: &Engine,
     sources: &Sources<'_>,
-    distance: &BrickArray<f32>,
+    near: Near<'_>,
     ratio: f32,
     wanted: impl Fn(&Basin) -> bool,
 ) -> Result<Tagging> {
-    let mut far = FarRegions::new(distance.set(), distance.absent(0));
+    let (mut far, distance) = (near.far_regions(), near.distance);
     let level = flood_all(stage, engine, distance, &mut far)?;
     let (mut basins, mut pieces) = find_basins(stage, engine, [distance, &level], &far, ratio)?;
     let deepest = basins.iter().map(|basin| basin.depth).fold(0.0, f32::max);
@@ -87,8 +91,8 @@ pub fn tag(
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
-pub fn level_of(stage: &Stage<'_>, engine: &Engine, distance: &BrickArray<f32>) -> Result<BrickArray<f32>> {
-    flood_all(stage, engine, distance, &mut FarRegions::new(distance.set(), distance.absent(0)))
+pub fn level_of(stage: &Stage<'_>, engine: &Engine, near: Near<'_>) -> Result<BrickArray<f32>> {
+    flood_all(stage, engine, near.distance, &mut near.far_regions())
 }
 
 /// Relaxes bricks until nothing rises.
@@ -139,20 +143,41 @@ impl FixedPoint for Flood<'_> {
     /// A far region beside a brick that rose may rise too, which marks every brick around it.
     fn changed(&mut self, slot: Slot, mut mark: impl FnMut(Slot)) {
         let set = self.distance.set();
-        let grid = set.grid();
+        // Of a ghost that is its owner's to tell.
+        if !set.owned().contains(&slot) {
+            return;
+        }
         for face in FACES {
-            let Some(id) = grid.neighbour(set.id(slot), face.offset()) else { continue };
+            let Some(id) = set.grid().neighbour(set.id(slot), face.offset()) else { continue };
             if set.slot(id).is_some() {
                 continue;
             }
             let highest = self.level.read_face(slot, face, flood::highest);
-            let Some((bricks, raised)) = self.far.raise(id, highest) else { continue };
-            for &far_brick in bricks {
-                self.level.set_absent(far_brick, raised);
-                let around = FACES.iter().filter_map(|face| grid.neighbour(far_brick, face.offset()));
-                around.filter_map(|id| set.slot(id)).for_each(&mut mark);
+            raised(&mut self.level, self.far.raise(id, highest), &mut mark);
+        }
+    }
+
+    /// A far region may lie beside bricks of any rank.
+    fn quiet(&mut self, comm: &dyn Comm, mut mark: impl FnMut(Slot)) -> Result<()> {
+        if comm.ranks() == 1 || self.far.level.iter().all(|&level| level == self.far.farthest) {
+            return Ok(());
+        }
+        for levels in gather_records(comm, &self.far.level)? {
+            for (region, level) in levels.into_iter().enumerate() {
+                raised(&mut self.level, self.far.raise_region(region, level), &mut mark);
             }
         }
+        Ok(())
+    }
+}
+
+/// A far region rose: the flood has its level there, and the bricks around it are marked.
+fn raised(level: &mut BrickArray<f32>, region: Option<(&[BrickId], f32)>, mark: &mut impl FnMut(Slot)) {
+    let (Some((bricks, to)), set) = (region, level.set().clone()) else { return };
+    for &brick in bricks {
+        level.set_absent(brick, to);
+        let around = FACES.iter().filter_map(|face| set.grid().neighbour(brick, face.offset()));
+        around.filter_map(|id| set.slot(id)).for_each(&mut *mark);
     }
 }
 
@@ -164,7 +189,7 @@ fn find_basins(
     far: &FarRegions,
     ratio: f32,
 ) -> Result<(Vec<Basin>, Pieces)> {
-    let set = distance.set();
+    let (set, comm) = (distance.set(), stage.comm());
     let labels: BrickArray<u16> = BrickArray::with_faces(engine.scratch(), set)?;
     let edge = set.grid().edge() as usize;
     let found = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
@@ -175,16 +200,13 @@ fn find_basins(
         let held = engine.hold(pieces.len() as u64 * PIECE_BYTES)?;
         Ok((pieces, held))
     })?;
-    let (found, _held): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-    let first: Vec<u32> = found
-        .iter()
-        .scan(0u32, |next, pieces: &Vec<Piece>| {
-            let at = *next;
-            *next += pieces.len() as u32;
-            Some(at)
-        })
-        .collect();
-    let mut pieces: Vec<Piece> = found.into_iter().flatten().collect();
+    let (found, _held): (Vec<_>, Vec<Hold>) = found.into_iter().unzip();
+    let counts: Vec<u32> = found.iter().map(|pieces: &Vec<Piece>| pieces.len() as u32).collect();
+    let own = found.concat();
+    let own_count = own.len();
+    let (mut pieces, own_first) = join_records(comm, own)?;
+    let _of_others = engine.hold((pieces.len() - own_count) as u64 * PIECE_BYTES)?;
+    let first = first_pieces(comm, &labels, &counts, own_first as u32)?;
     let far_first = pieces.len() as u32;
     let brick_len = set.grid().brick_len() as u64;
     pieces.extend(far.bricks.iter().zip(&far.level).map(|(bricks, &saddle)| Piece {
@@ -194,17 +216,37 @@ fn find_basins(
         saddle,
     }));
     let mut joins = Joins::new(pieces);
-    join_bricks(&mut joins, &labels, &first, far, far_first);
+    let touching = touching_pieces(&labels, &first, far, far_first);
+    join_records(comm, touching)?.0.into_iter().for_each(|pair| joins.join(pair));
     let (whole, basin) = joins.persisting(ratio);
     let found = |p: &Piece| Basin { voxels: p.voxels, depth: p.depth, saddle: p.saddle, place: [0; 3] };
     let far = (0..set.grid().len()).map(|id| far_first.wrapping_add(far.region[id as usize])).collect();
     Ok((whole.iter().map(found).collect(), Pieces { labels, first, far, basin }))
 }
 
-/// Joins the pieces of neighbouring bricks, and those beside a far region with it, where that is a basin.
-fn join_bricks(joins: &mut Joins, labels: &BrickArray<u16>, first: &[u32], far: &FarRegions, far_first: u32) {
+/// The piece that label 1 of each slot's brick stands for, from how many each of this rank's has and which is the first of them all. Ghosts
+/// get theirs, and their faces, from their owners.
+fn first_pieces(comm: &dyn Comm, labels: &BrickArray<u16>, counts: &[u32], own_first: u32) -> Result<Vec<u32>> {
     let set = labels.set();
-    for slot in 0..set.len() as Slot {
+    let (mut first, mut next) = (vec![0; set.len()], own_first);
+    let mut told = Vec::with_capacity(counts.len());
+    for (slot, count) in set.owned().zip(counts) {
+        first[slot as usize] = next;
+        told.push((slot, [f64::from(next)]));
+        next += count;
+    }
+    let exchange = Exchange::new(comm, set, &HaloPlan::new(*set.grid(), Reach::Faces))?;
+    exchange.post(labels, &told)?;
+    for (ghost, [of_ghost]) in exchange.collect::<u16, [f64; 1]>(labels)? {
+        first[ghost as usize] = of_ghost as u32;
+    }
+    Ok(first)
+}
+
+/// The pieces that touch across the faces of this rank's bricks, and those beside a far region with it, where that is a basin.
+fn touching_pieces(labels: &BrickArray<u16>, first: &[u32], far: &FarRegions, far_first: u32) -> Vec<[u32; 2]> {
+    let (set, mut touching) = (labels.set(), Vec::new());
+    for slot in set.owned() {
         let here = first[slot as usize];
         for face in FACES {
             let Some(id) = set.grid().neighbour(set.id(slot), face.offset()) else { continue };
@@ -212,19 +254,20 @@ fn join_bricks(joins: &mut Joins, labels: &BrickArray<u16>, first: &[u32], far: 
                 // Faces between stored bricks are seen from below, once.
                 Some(other) if face.upper => labels.read_face(slot, face, |mine| {
                     labels.read_face(other, face.opposite(), |theirs| {
-                        joins.across([mine, theirs], [here, first[other as usize]]);
+                        across([mine, theirs], [here, first[other as usize]], &mut touching);
                     });
                 }),
                 Some(_) => {}
                 None => {
                     let region = far.region[id as usize];
                     if far.level[region as usize] < far.farthest {
-                        labels.read_face(slot, face, |mine| joins.beyond(mine, here, far_first + region));
+                        labels.read_face(slot, face, |mine| beyond(mine, here, far_first + region, &mut touching));
                     }
                 }
             }
         }
     }
+    touching
 }
 
 /// The labelled pieces and the basins they belong to.
@@ -298,9 +341,10 @@ fn locate_saddles(
         let placed = |(name, at): (u32, [usize; 3])| (name, std::array::from_fn(|a| lo[a] + at[a] as i64));
         Ok(entries.into_iter().map(placed).collect::<Vec<(u32, [i64; 3])>>())
     })?;
+    let (found, _) = join_records(stage.comm(), found.concat())?;
     let order = |v: &[i64; 3]| sources.geometry.domain().offset_of(*v);
     for (n, basin) in basins.iter_mut().enumerate() {
-        let places = found.iter().flatten().filter(|(name, _)| *name == n as u32);
+        let places = found.iter().filter(|(name, _)| *name == n as u32);
         if let Some(place) = places.map(|(_, place)| *place).min_by_key(order) {
             basin.place = place;
         }

@@ -8,13 +8,13 @@
 use std::sync::Arc;
 
 use super::far_regions::FarRegions;
+use super::near::Near;
 use super::tagging::Basin;
 use crate::error::Result;
-use crate::exec::{
-    Boundary, Engine, FixedPoint, HaloPlan, Hold, Reach, Stage, Workers, one_wave, relax_to_fixed_point,
-};
+use crate::exec::{Boundary, Comm, Engine, FixedPoint, HaloPlan, Hold, Reach, Stage, Workers, borrow_bricks};
+use crate::exec::{join_records, one_wave, read_by_bricks, relax_to_fixed_point, tell_faces};
 use crate::grid::{Box3, BrickId, BrickSet, Face, Slot};
-use crate::kernel::level_set::initial::ascent::{Ascent, OUTSIDE, renumber};
+use crate::kernel::level_set::initial::ascent::{Ascent, OUTSIDE, Peak, renumber};
 use crate::kernel::level_set::initial::contacts::{Contact, contacts, count};
 use crate::kernel::level_set::initial::spaces;
 use crate::kernel::level_set::initial::spaces::{Region, Space};
@@ -46,23 +46,24 @@ struct Worker {
     regions: HaloTile<u32>,
 }
 
-/// Tells the sides of the cloud that `distance` is measured from; `pockets` says how deep voxels lie in one, 0 for not.
+/// Tells the sides of the cloud that the distance `near` it is measured from; `pockets` says how deep voxels lie in one, 0 for not. Each rank
+/// has its part of what is inside; the regions and where they meet all ranks have.
 ///
 /// # Errors
-/// When scratch runs out or the run is interrupted.
+/// When scratch runs out, the run is interrupted or another rank is gone.
 pub fn watershed(
     stage: &Stage<'_>,
     engine: &Engine,
     sources: &Sources<'_>,
-    distance: &BrickArray<f32>,
+    near: Near<'_>,
     pockets: Option<&BrickArray<f32>>,
 ) -> Result<Sides> {
-    let set = distance.set();
+    let (distance, set) = (near.distance, near.distance.set());
     let edge = set.grid().edge() as usize;
     let make = move || Worker { ascent: Ascent::default(), d: HaloTile::new(edge), regions: HaloTile::new(edge) };
-    let far = FarRegions::new(set, distance.absent(0));
     let flood = Watershed {
         stage,
+        near,
         distance,
         pockets,
         spacing: sources.geometry.spacing,
@@ -70,7 +71,8 @@ pub fn watershed(
         workers: Workers::new(make),
     };
     // A cloud of noise has regions and contacts by the million: what they take is held until they are gone.
-    let (of_voxel, mut regions, _of_regions) = flood.peaks(engine, &far)?;
+    let (of_voxel, mut regions, _of_regions) = flood.peaks(engine, &near.far_regions())?;
+    tell_faces(stage.comm(), &of_voxel)?;
     let mut descent = Descent { watershed: &flood, of_voxel: &of_voxel };
     relax_to_fixed_point(stage, Reach::Faces, &flood.workers, &mut descent)?;
     let Meetings { contacts, _held } = flood.contacts(engine, &of_voxel, &mut regions)?;
@@ -93,6 +95,7 @@ struct Meetings {
 
 struct Watershed<'a> {
     stage: &'a Stage<'a>,
+    near: Near<'a>,
     distance: &'a BrickArray<f32>,
     pockets: Option<&'a BrickArray<f32>>,
     spacing: [f64; 3],
@@ -141,17 +144,25 @@ impl Watershed<'_> {
                 of_voxel.set_absent(id, name);
             }
         }
-        let mut first = Vec::with_capacity(set.len());
-        for (peaks, _) in &peaks {
-            first.push(regions.len() as u32);
-            regions.extend(peaks.iter().map(|peak| Region { depth: peak.depth, voxels: 0, pocket: peak.pocket }));
+        let (peaks, mut held): (Vec<_>, Vec<_>) = peaks.into_iter().unzip();
+        let counts: Vec<u32> = peaks.iter().map(|peaks: &Vec<Peak>| peaks.len() as u32).collect();
+        let own = peaks.concat();
+        let own_count = own.len();
+        let (all, own_first) = join_records(self.stage.comm(), own)?;
+        held.push(engine.hold((all.len() - own_count) as u64 * spaces::REGION_BYTES)?);
+        let mut next = (regions.len() + own_first) as u32;
+        let mut first = Vec::with_capacity(counts.len());
+        for count in counts {
+            first.push(next);
+            next += count;
         }
+        regions.extend(all.iter().map(|peak| Region { depth: peak.depth, voxels: 0, pocket: peak.pocket }));
+        let owned = set.owned();
         self.stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
-            of_voxel.write(slot, |dense| renumber(dense, first[slot as usize]));
+            of_voxel.write(slot, |dense| renumber(dense, first[(slot - owned.start) as usize]));
             of_voxel.refresh_faces(slot);
             Ok(())
         })?;
-        let held = peaks.into_iter().map(|(_, held)| held).collect();
         Ok((of_voxel, regions, held))
     }
 
@@ -167,22 +178,27 @@ impl Watershed<'_> {
             let held = engine.hold(contacts.len() as u64 * spaces::CONTACT_BYTES)?;
             Ok((contacts, counts, held))
         })?;
-        let mut all = Vec::with_capacity(found.iter().map(|(contacts, ..)| contacts.len()).sum());
-        let mut held = Vec::with_capacity(found.len());
-        for (slot, (contacts, counts, of_brick)) in found.into_iter().enumerate() {
+        let mut own = Vec::with_capacity(found.iter().map(|(contacts, ..)| contacts.len()).sum());
+        let (mut held, mut voxels) = (Vec::with_capacity(found.len()), vec![0; regions.len()]);
+        for (slot, (contacts, counts, of_brick)) in set.owned().zip(found) {
             held.push(of_brick);
-            all.extend(contacts.into_iter().map(|contact| (contact, set.id(slot as Slot))));
-            for (region, voxels) in counts {
-                regions[region as usize].voxels += voxels;
+            own.extend(contacts.into_iter().map(|contact| (contact, set.id(slot))));
+            for (region, count) in counts {
+                voxels[region as usize] += count;
             }
         }
+        let own = spaces::joined(own);
+        let own_count = own.len();
+        let (all, _) = join_records(self.stage.comm(), own)?;
+        held.push(engine.hold((all.len() - own_count) as u64 * spaces::CONTACT_BYTES)?);
+        count_voxels(self.stage.comm(), &voxels, regions)?;
         Ok(Meetings { contacts: spaces::joined(all), _held: held })
     }
 
     fn sides(&self, engine: &Engine, of_voxel: &BrickArray<u32>, is_inside: &[bool]) -> Result<BrickArray<u8>> {
         let set = self.set();
         let mut inside = BrickArray::with_faces(engine.scratch(), set)?;
-        for id in (0..set.grid().len()).filter(|&id| set.slot(id).is_none()) {
+        for id in self.near.far_bricks() {
             inside.set_absent(id, spaces::side_of(of_voxel.absent(id), is_inside));
         }
         self.stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
@@ -192,8 +208,18 @@ impl Watershed<'_> {
             inside.refresh_faces(slot);
             Ok(())
         })?;
+        tell_faces(self.stage.comm(), &inside)?;
         Ok(inside)
     }
+}
+
+/// Adds up how many voxels of each region all ranks have.
+fn count_voxels(comm: &dyn Comm, own: &[u64], regions: &mut [Region]) -> Result<()> {
+    let counted = (0_u32..).zip(own).filter(|(_, voxels)| **voxels > 0).map(|(region, &voxels)| (region, voxels));
+    for (region, voxels) in join_records(comm, counted.collect::<Vec<_>>())?.0 {
+        regions[region as usize].voxels += voxels;
+    }
+    Ok(())
 }
 
 /// Regions on their way down the distance, until every voxel has one.
@@ -231,24 +257,43 @@ fn basin(space: &Space, contacts: &[(Contact, BrickId)], set: &BrickSet) -> Basi
     Basin { voxels: space.voxels, depth: space.depth, saddle: hole.pass, place }
 }
 
-/// The points that have not voxels of both sides within two voxels.
+/// The points that have not voxels of both sides within two voxels, of all ranks, in order.
 fn lost_points(stage: &Stage<'_>, sources: &Sources<'_>, inside: &BrickArray<u8>) -> Result<Vec<u32>> {
-    let set = inside.set();
-    let domain = Box3::from_shape(set.grid().shape());
+    let (set, grid) = (inside.set(), inside.set().grid());
+    let domain = Box3::from_shape(grid.shape());
+    let around = |point: u32| {
+        let base = sources.geometry.to_voxels(sources.positions[point as usize]).map(|v| v.floor() as i64);
+        Box3::new(base.map(|v| v - 1), base.map(|v| v + 3)).intersect(&domain)
+    };
+    // What lies beside this rank's bricks is a ghost, or far from the cloud.
+    let is_ghost = |id: &BrickId| set.slot(*id).is_some_and(|slot| !set.owned().contains(&slot));
+    let points = set.owned().flat_map(|slot| sources.bins.of(set.id(slot)));
+    let mut ghosts: Vec<BrickId> =
+        points.flat_map(|&point| grid.bricks_in(&around(point)).filter(is_ghost).collect::<Vec<_>>()).collect();
+    ghosts.sort_unstable();
+    ghosts.dedup();
+    let borrowed = borrow_bricks(stage, inside, 0, &ghosts)?;
+    let read = |part: &Box3, voxels: &mut [u8]| match &borrowed {
+        Some(borrowed) if grid.bricks_in(part).any(|id| is_ghost(&id)) => {
+            read_by_bricks(grid, part, voxels, |id, shared, values| {
+                if is_ghost(&id) { borrowed.read_box(shared, values) } else { inside.read_box(shared, values) }
+            })
+        }
+        _ => inside.read_box(part, voxels),
+    };
     let found = stage.run(&one_wave(set), &Workers::new(Vec::new), |voxels, &slot| {
         let mut lost = Vec::new();
         for &point in sources.bins.of(set.id(slot)) {
-            let base = sources.geometry.to_voxels(sources.positions[point as usize]).map(|v| v.floor() as i64);
-            let around = Box3::new(base.map(|v| v - 1), base.map(|v| v + 3)).intersect(&domain);
-            voxels.resize(around.len(), 0u8);
-            inside.read_box(&around, voxels)?;
+            let part = around(point);
+            voxels.resize(part.len(), 0u8);
+            read(&part, voxels)?;
             if !(voxels.contains(&0) && voxels.contains(&1)) {
                 lost.push(point);
             }
         }
         Ok(lost)
     })?;
-    let mut lost = found.concat();
+    let (mut lost, _) = join_records(stage.comm(), found.concat())?;
     lost.sort_unstable();
     Ok(lost)
 }

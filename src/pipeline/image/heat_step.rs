@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::exec::{
     Boundary, Engine, Exchange, HaloPlan, Place, Reach, Relax, Stage, Waves, Workers, checkerboard, one_wave,
+    tell_faces,
 };
 use crate::grid::{BrickSet, FACES, Slot};
 use crate::kernel::image::filter::heat;
@@ -52,6 +53,7 @@ pub(crate) fn heat_step(
         smoothed.refresh_faces(slot);
         Ok(())
     })?;
+    tell_faces(stage.comm(), &smoothed)?;
     if sigma > 0.0 {
         relax_heat(stage, set, [&smoothed, &initial], &solved, spacing, sigma)?;
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::heat_step::heat_step;
 use super::smoothing::smoothed;
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
+use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, equal_part, one_wave, whole_field};
 use crate::grid::{Box3, BrickSet};
 use crate::kernel::image::filter::edge_detector::edge_detector;
 use crate::kernel::level_set::cell::{CELL, CELL_LEN};
@@ -33,10 +33,11 @@ pub struct EdgeSettings {
     pub k: f32,
 }
 
-/// The edge detector g on the cells of `band`, from the smoothed image on (at least) these cells.
+/// The edge detector g on the cells of `band`, from the smoothed image on (at least) these cells. Each rank of several does its part of the cells,
+/// and all have all of them in the end.
 ///
 /// # Errors
-/// When scratch runs out or the run is interrupted.
+/// When scratch runs out, the run is interrupted or another rank is gone.
 ///
 /// # Panics
 /// When a cell of the band was not smoothed.
@@ -48,26 +49,27 @@ pub fn edges(
     spacing: [f64; 3],
     k: f32,
 ) -> Result<BrickArray<f32>> {
-    let edges = BrickArray::with_faces(engine.scratch(), band)?;
+    let own = &Arc::new(equal_part(stage.comm(), band));
+    let edges = BrickArray::with_faces(engine.scratch(), own)?;
     let plan = HaloPlan::new(*band.grid(), Reach::All);
     let workers = Workers::new(|| (HaloTile::new(CELL), Planes::new()));
     let length = spacing.iter().copied().fold(f64::INFINITY, f64::min);
     stage.voxels((band.len() * CELL_LEN) as u64);
-    stage.run(&one_wave(band), &workers, |(tile, planes), &slot| {
-        let wide = smoothed.set().slot(band.id(slot)).expect("smoothed cells cover the band");
+    stage.run(&one_wave(own), &workers, |(tile, planes), &slot| {
+        let wide = smoothed.set().slot(own.id(slot)).expect("smoothed cells cover the band");
         plan.gather(smoothed, wide, Boundary::Mirror, tile);
         edges.write(slot, |g| edge_detector(tile.data(), spacing, length, k, planes, g));
         edges.refresh_faces(slot);
         Ok(())
     })?;
-    Ok(edges)
+    whole_field(stage, edges, band)
 }
 
 /// The smoothed image on (at least) the cells of `band` and those around them, from an image normalised to [0, 1] over
-/// the band's grid.
+/// the band's grid. Each rank of several smooths its part of the cells, and all have all of them in the end.
 ///
 /// # Errors
-/// When the smoothing is too wide, the image cannot be read, scratch runs out or the run is interrupted.
+/// When the smoothing is too wide, the image cannot be read, scratch runs out, the run is interrupted or another rank is gone.
 pub fn presmooth(
     stage: &Stage<'_>,
     engine: &Engine,
@@ -77,14 +79,18 @@ pub fn presmooth(
     settings: &EdgeSettings,
 ) -> Result<BrickArray<f32>> {
     let sigma = settings.sigma;
-    match settings.smoothing {
+    let cells = match settings.smoothing {
         // One cell more: the edge detector reads a voxel beyond the band, and who looks at its derivatives a few.
-        Smoothing::Gaussian => smoothed(stage, engine, image, &Arc::new(widened(band, [1; 3])), spacing, [sigma; 3]),
-        Smoothing::Heat => {
-            let cells = spacing.map(|h| (5.0 * sigma / (h * CELL as f64)).ceil().max(1.0) as i64);
-            heat_step(stage, engine, image, &Arc::new(widened(band, cells)), spacing, sigma)
-        }
-    }
+        Smoothing::Gaussian => [1; 3],
+        Smoothing::Heat => spacing.map(|h| (5.0 * sigma / (h * CELL as f64)).ceil().max(1.0) as i64),
+    };
+    let set = Arc::new(widened(band, cells));
+    let own = Arc::new(equal_part(stage.comm(), &set));
+    let part = match settings.smoothing {
+        Smoothing::Gaussian => smoothed(stage, engine, image, &own, spacing, [sigma; 3])?,
+        Smoothing::Heat => heat_step(stage, engine, image, &own, spacing, sigma)?,
+    };
+    whole_field(stage, part, &set)
 }
 
 /// The set with all cells that lie within so many cells of it along each axis.

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::exec::{Boundary, Engine, HaloPlan, Reach, Stage, Workers, one_wave};
+use crate::exec::{Boundary, Engine, Exchange, HaloPlan, Ownership, Reach, Stage, Workers, join_records, one_wave};
 use crate::grid::{BrickId, BrickSet, NEIGHBOURS_26, Slot};
 use crate::kernel::level_set::initial::start;
 use crate::kernel::level_set::initial::start::CellSides;
@@ -29,57 +29,44 @@ pub struct Band {
     pub voxels: u64,
 }
 
-impl Band {
-    /// A rank's own part of the band, over its own set of cells; the faces of ghosts are for the ranks to exchange.
-    ///
-    /// # Errors
-    /// When scratch runs out.
-    pub(crate) fn part(&self, engine: &Engine, own: &Arc<BrickSet>) -> Result<Band> {
-        let new = || BrickArray::<f32>::with_faces(engine.scratch(), own);
-        let solved = BrickArray::new(engine.scratch(), own)?;
-        let mut part = Band { u: new()?, distance: new()?, solved, voxels: self.voxels };
-        for id in (0..own.grid().len()).filter(|&id| self.solved.set().slot(id).is_none()) {
-            part.u.set_absent(id, self.u.absent(id));
-            part.distance.set_absent(id, self.distance.absent(id));
-        }
-        for to in own.owned() {
-            let Some(from) = self.solved.set().slot(own.id(to)) else { continue };
-            for (whole, part) in [(&self.u, &part.u), (&self.distance, &part.distance)] {
-                whole.read(from, |from| part.write(to, |to| to.copy_from_slice(from)));
-                part.refresh_faces(to);
-            }
-            self.solved.read(from, |from| part.solved.write(to, |to| to.copy_from_slice(from)));
-        }
-        Ok(part)
-    }
+/// The distance to a cloud and its sides, over the same cells: of several ranks each has its part.
+#[derive(Clone, Copy)]
+pub struct SidesNear<'a> {
+    /// Distance to the cloud, physical lengths.
+    pub distance: &'a BrickArray<f32>,
+    /// 1 inside, 0 outside; with [`start::HELD`] where it stays so.
+    pub inside: &'a BrickArray<u8>,
+    /// The cells of all ranks.
+    pub cells: &'a BrickSet,
 }
 
-/// Makes the band from the distance and the sides, both over the same cells.
+/// Makes the band from the distance and the sides; each rank its part of it, and all ranks then have all.
 ///
 /// # Errors
-/// When scratch runs out or the run is interrupted.
-pub fn make_band(
-    stage: &Stage<'_>,
-    engine: &Engine,
-    distance: &BrickArray<f32>,
-    inside: &BrickArray<u8>,
-    reaches: Reaches,
-) -> Result<Band> {
+/// When scratch runs out, the run is interrupted or another rank is gone.
+pub fn make_band(stage: &Stage<'_>, engine: &Engine, sides: SidesNear<'_>, reaches: Reaches) -> Result<Band> {
+    let SidesNear { distance, inside, cells } = sides;
+    let comm = stage.comm();
     let near = near_border(stage, engine, distance, inside, reaches)?;
     let known = Known { distance, inside, near: near.as_ref(), reaches };
-    let set = Arc::new(known.band_cells(stage)?);
-    let new = || BrickArray::<f32>::with_faces(engine.scratch(), &set);
-    let mut band = Band { u: new()?, distance: new()?, solved: BrickArray::new(engine.scratch(), &set)?, voxels: 0 };
-    for id in 0..set.grid().len() {
-        let start = known.start_of_cell(id);
-        band.u.set_absent(id, start);
-        let farthest = Some(distance.absent(id)).filter(|d| d.is_finite());
-        band.distance.set_absent(id, farthest.unwrap_or(reaches.inner.max(reaches.outer)));
+    let (of_band, constant) = known.band_cells(stage)?;
+    let set = Arc::new(BrickSet::from_ids(*cells.grid(), join_records(comm, of_band)?.0));
+    let ownership = Ownership::agreed(comm, distance.set())?;
+    let own = Arc::new(ownership.part(&set, comm.rank(), &HaloPlan::new(*set.grid(), Reach::All)));
+    let new = || BrickArray::<f32>::with_faces(engine.scratch(), &own);
+    let mut band = Band { u: new()?, distance: new()?, solved: BrickArray::new(engine.scratch(), &own)?, voxels: 0 };
+    for id in (0..set.grid().len()).filter(|&id| cells.slot(id).is_none()) {
+        band.u.set_absent(id, start::value(inside.absent(id)));
     }
-    let counts = stage.run(&one_wave(&set), &Workers::none(), |(), &slot| Ok(known.fill_cell(&band, slot)))?;
-    band.voxels = counts.iter().sum();
+    for (id, side) in join_records(comm, constant)?.0 {
+        band.u.set_absent(id, start::value(side));
+    }
+    let farthest = Some(distance.absent(0)).filter(|d| d.is_finite());
+    band.distance.set_all_absent(farthest.unwrap_or(reaches.inner.max(reaches.outer)));
+    let counts = stage.run(&one_wave(&own), &Workers::none(), |(), &slot| Ok(known.fill_cell(&band, slot)))?;
+    band.voxels = comm.sum(&counts.iter().map(|&count| count as f64).collect::<Vec<_>>())? as u64;
     stage.voxels(band.voxels);
-    Ok(band)
+    band.whole(stage, &set)
 }
 
 /// How many voxels are solved on each side of the border where it is far from the cloud.
@@ -94,25 +81,28 @@ fn near_border(
     inside: &BrickArray<u8>,
     reaches: Reaches,
 ) -> Result<Option<BrickArray<u8>>> {
-    let set = distance.set();
+    let (set, comm) = (distance.set(), stage.comm());
     let plan = HaloPlan::new(*set.grid(), Reach::Faces);
     let (edge, len) = (set.grid().edge() as usize, set.grid().brick_len());
     let workers = Workers::new(move || (HaloTile::new(edge), vec![0u8; len]));
-    let is_wide = stage.run(&one_wave(set), &workers, |(tile, near), &slot| {
+    let found = stage.run(&one_wave(set), &workers, |(tile, near), &slot| {
         plan.gather(inside, slot, Boundary::Mirror, tile);
         Ok(distance.read(slot, |d| start::border(d, tile, reaches, near)))
     })?;
-    if !is_wide.contains(&true) {
+    if !comm.any(found.contains(&true))? {
         return Ok(None);
     }
+    let exchange = Exchange::new(comm, set, &HaloPlan::new(*set.grid(), Reach::All))?;
     let grown = BrickArray::blank(engine.scratch(), set, 0u8)?;
-    let wide: Vec<Slot> = one_wave(set).into_iter().filter(|&slot| is_wide[slot as usize]).collect();
+    let wide: Vec<Slot> = set.owned().zip(found).filter_map(|(slot, is_wide)| is_wide.then_some(slot)).collect();
     stage.run(&wide, &workers, |(tile, near), &slot| {
         plan.gather(inside, slot, Boundary::Mirror, tile);
         distance.read(slot, |d| start::border(d, tile, reaches, near));
         write_cell(&grown, slot, near);
         Ok(())
     })?;
+    let mut is_wide = vec![false; set.len()];
+    wide.iter().chain(&exchange.faces(&grown, &wide)?).for_each(|&slot| is_wide[slot as usize] = true);
     let touches =
         |slot: &Slot| NEIGHBOURS_26.iter().filter_map(|&by| set.neighbour(*slot, by)).any(|n| is_wide[n as usize]);
     let around: Vec<Slot> = one_wave(set).into_iter().filter(|slot| is_wide[*slot as usize] || touches(slot)).collect();
@@ -128,6 +118,7 @@ fn near_border(
             write_cell(&grown, slot, near);
             Ok(())
         })?;
+        exchange.faces(&grown, &around)?;
     }
     Ok(Some(grown))
 }
@@ -157,13 +148,6 @@ impl Known<'_> {
         })
     }
 
-    /// The start value of a cell that is constant, told from its first voxel.
-    fn start_of_cell(&self, id: BrickId) -> f32 {
-        let slot = self.inside.set().slot(id);
-        let side = slot.map_or_else(|| self.inside.absent(id), |slot| self.inside.read(slot, |inside| inside[0]));
-        start::value(side)
-    }
-
     fn fill_cell(&self, band: &Band, slot: Slot) -> u64 {
         let set = band.solved.set();
         let (id, edge) = (set.id(slot), set.grid().edge() as usize);
@@ -181,16 +165,23 @@ impl Known<'_> {
         count
     }
 
-    /// The cells that hold a solved voxel: all others are constant.
-    fn band_cells(&self, stage: &Stage<'_>) -> Result<BrickSet> {
+    /// Of this rank's cells those that hold a solved voxel; all others are constant, and what they are their first voxel tells.
+    fn band_cells(&self, stage: &Stage<'_>) -> Result<(Vec<BrickId>, Vec<(BrickId, u8)>)> {
         let set = self.distance.set();
-        let grid = *set.grid();
-        let edge = grid.edge() as usize;
-        let holds = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
-            let valid = grid.brick_box(set.id(slot)).shape().map(|n| n as usize);
-            Ok(self.read(slot, |sides| start::holds(sides, edge, valid, self.reaches)))
+        let edge = set.grid().edge() as usize;
+        let found = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
+            let valid = set.grid().brick_box(set.id(slot)).shape().map(|n| n as usize);
+            let holds = self.read(slot, |sides| start::holds(sides, edge, valid, self.reaches));
+            Ok((!holds).then(|| self.inside.read(slot, |inside| inside[0])))
         })?;
-        Ok(BrickSet::from_fn(grid, |id| set.slot(id).is_some_and(|slot| holds[slot as usize])))
+        let (mut of_band, mut constant) = (Vec::new(), Vec::new());
+        for (slot, side) in set.owned().zip(found) {
+            match side {
+                None => of_band.push(set.id(slot)),
+                Some(side) => constant.push((set.id(slot), side)),
+            }
+        }
+        Ok((of_band, constant))
     }
 }
 

@@ -149,6 +149,7 @@ pub fn evolve(
     let owned = one_wave(band.solved.set());
     exchange.faces(&band.distance, &owned)?;
     exchange.faces(&band.u, &owned)?;
+    edges.map_or(Ok(Vec::new()), |edges| exchange.faces(edges, &owned))?;
     let mut next = second_level(stage, engine, &band.u)?;
     exchange.faces(&next, &owned)?;
     let mut save_point = stage.save_point();

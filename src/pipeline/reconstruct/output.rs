@@ -9,7 +9,7 @@ use super::noise::{Noise, without_noise};
 use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
 use crate::error::{Error, Result};
-use crate::exec::{Engine, Hold, Stage};
+use crate::exec::{Engine, Hold, SelfComm, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures, Spread};
@@ -284,7 +284,8 @@ fn solve(
     let stage = engine.resumable_stage("level set", 0);
     stage.voxels(band.voxels);
     let time_loop = settings.motion.time_loop(geometry);
-    let mut evolution = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop, growing.as_deref_mut())?;
+    let mut evolution =
+        evolve_on_ranks(&stage, engine, band, None, geometry.spacing, &time_loop, growing.as_deref_mut())?;
     // Where more smoothing was asked for, the surface leaves points because it shall.
     let keeps_points = settings.beta.is_none() && settings.motion.smooths_no_more_than_usual(geometry);
     let late = if keeps_points { hold_what_was_lost(&stage, geometry, cloud, band)? } else { Vec::new() };
@@ -292,7 +293,7 @@ fn solve(
         sheet.extend(late);
         sheet.sort_unstable();
         sheet.dedup();
-        let again = evolve_on_ranks(&stage, engine, band, geometry.spacing, &time_loop, growing)?;
+        let again = evolve_on_ranks(&stage, engine, band, None, geometry.spacing, &time_loop, growing)?;
         let (steps, sor_iterations) = (evolution.steps + again.steps, evolution.sor_iterations + again.sor_iterations);
         let residuals = [evolution.residuals, again.residuals.clone()].concat();
         evolution = Evolution { steps, sor_iterations, residuals, ..again };
@@ -306,7 +307,7 @@ fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]]
     let off = surface::distances_to(stage, &band.u, geometry, cloud)?;
     let is_lost = |(_, off): &(u32, &Option<f64>)| off.is_some_and(|off| off > LEFT_VOXELS * geometry.max_spacing());
     let lost: Vec<u32> = (0..).zip(&off).filter(is_lost).map(|(point, _)| point).collect();
-    Ok(hold_sheets(geometry, cloud, &lost, Company::AT_THE_END, band))
+    hold_sheets(&SelfComm, geometry, cloud, &lost, Company::AT_THE_END, band)
 }
 
 /// What is said of a cloud that no setting gives an inside.

@@ -9,8 +9,8 @@ use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::image::intensity::Normalised;
 use crate::pipeline::image::terms::{edges, presmooth};
 use crate::pipeline::level_set::band::Band;
-use crate::pipeline::level_set::evolve::evolve;
 use crate::pipeline::level_set::growing::Growing;
+use crate::pipeline::level_set::ranks::evolve_on_ranks;
 use crate::pipeline::level_set::time_loop::Evolution;
 use crate::pipeline::marks::ObjectMarks;
 use crate::store::{BrickArray, Element};
@@ -92,7 +92,7 @@ impl Begun {
         } else {
             let shown = Geometry { origin: picture.world.of(geometry.origin), ..geometry.clone() };
             let mut growing = Growing::of(picture.shown_in, &format!("object-{}", marks.object), &shown)?;
-            evolve(&stage, engine, &mut band, image, geometry.spacing, &time_loop, growing.as_mut())?
+            evolve_on_ranks(&stage, engine, &mut band, image, geometry.spacing, &time_loop, growing.as_mut())?
         };
         stage.finish();
         let Band { u, distance: pull, voxels: band_voxels, .. } = band;

@@ -7,7 +7,7 @@
 use super::kept::label_bytes;
 use super::neighbours::needs;
 use super::outlined::shape_start::BAND;
-use super::ranks::parts::own_objects;
+use super::ranks::parts::Share;
 use super::reach::{first_reach, likely_work};
 use super::settings::{Guides, SegmentSettings};
 use crate::exec::{Comm, Footprint, Plan};
@@ -213,7 +213,7 @@ pub fn plan(
     }
     let surfaces: Vec<f64> = guides.objects.iter().map(|marks| likely_work(marks, guides.geometry)).collect();
     let near = estimate.near_voxels as f64 * SECONDS_PER_NEAR_VOXEL / threads as f64 / surfaces.iter().sum::<f64>();
-    for n in own_objects(comm, guides.objects, guides.geometry) {
+    for n in Share::of(comm, guides.objects, guides.geometry).all() {
         let (marks, surface) = (&guides.objects[n], surfaces[n]);
         let stages = OBJECT_STAGES.iter();
         plan.extend(stages.map(|(name, share)| (format!("{name} {}", marks.object), near * surface * share)));

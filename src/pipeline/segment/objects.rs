@@ -10,11 +10,11 @@ use super::outlined::cross_validate::cross_validate;
 use super::outlined::outlines::scatter_of;
 use super::outlined::survey::{Looking, Outlined, Told, Trust, left_out_of, trust};
 use super::picture::Picture;
-use super::ranks::parts::own_objects;
+use super::ranks::parts::Share;
 use super::ranks::solved::{Solved, in_order, of_all_ranks};
 use super::settings::{Guides, ImageModel, SegmentSettings, Start};
 use crate::error::{Error, ErrorKind, Result};
-use crate::exec::Engine;
+use crate::exec::{Comm, Engine};
 use crate::grid::{Geometry, digits};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
@@ -33,7 +33,7 @@ pub(super) struct Objects {
     pub refused: Vec<Refused>,
 }
 
-/// Solves all objects, of several ranks each some; all ranks then have all. They are solved on a grid whose first voxel is the
+/// Solves all objects, of several ranks each some and all together what is too large for one; all ranks then have all. They are solved on a grid whose first voxel is the
 /// origin, so that where the image lies in the world changes nothing but their place.
 ///
 /// # Errors
@@ -52,32 +52,43 @@ pub(super) fn solve_all<T: Element>(
     let grid = Geometry { origin: [0.0; 3], ..picture.geometry.clone() };
     let picture = Picture { geometry: &grid, ..*picture };
     let local: Vec<ObjectMarks> = objects.iter().map(|marks| marks.moved(origin.map(|v| -v))).collect();
-    let own = own_objects(engine.comm(), objects, picture.geometry);
-    let most = at_once(engine, own.iter().map(|&n| &local[n]), &grid);
-    let seen = survey(engine, &picture, (&local, &own), settings, most)?;
-    let items: Vec<(usize, &Seen)> = own.iter().copied().zip(&seen).collect();
-    let work = |engine: &Engine, &(n, seen): &(usize, &Seen)| {
-        let outlined = seen.as_ref().map(|(outlined, _)| outlined);
-        let by = seen.as_ref().map(|(outlined, trust)| (outlined, *trust));
-        let solved = solve(engine, &picture, &local[n], by, settings).and_then(|solution| {
-            let solution = solution.moved(origin);
-            let mut report = draw(engine, &solution, &objects[n], settings, (store, meshes), several)?;
-            early.map_or(Ok(()), |early| early.rest(engine, n, report.label, &solution))?;
-            if let Some(outlined) = outlined.filter(|_| settings.cross_validate) {
-                report.cross_validation = cross_validate(engine, outlined, &grid)?;
-            }
-            let Solution { window, geometry, u, .. } = solution;
-            Ok(Solved { window, geometry, u, report })
-        });
-        match solved {
-            // One object that cannot be solved does not stop the others.
-            Err(error) if matches!(error.kind(), ErrorKind::Input | ErrorKind::Vanished) && several => {
-                Ok((n, Err(Refused { label: objects[n].object, reason: error.to_string() })))
-            }
-            other => other.map(|solved| (n, Ok(solved))),
-        }
+    let share = Share::of(engine.comm(), objects, picture.geometry);
+    let most = at_once(engine, share.own.iter().map(|&n| &local[n]), &grid);
+    let Seen { together, own } = survey(engine, &picture, (&local, &share), settings, most)?;
+    let solve = |engine: &Engine, n: usize, looked: Option<&Looked>| {
+        let by = looked.map(|(outlined, trust)| (outlined, *trust));
+        solve(engine, &picture, &local[n], by, settings).map(|solution| solution.moved(origin))
     };
-    let found = engine.alone().side_by_side(&items, most, work)?;
+    let finish = |engine: &Engine, n: usize, looked: Option<&Looked>, solution: Solution| {
+        let mut report = draw(engine, &solution, &objects[n], settings, (store, meshes), several)?;
+        early.map_or(Ok(()), |early| early.rest(engine, n, report.label, &solution))?;
+        if let Some((outlined, _)) = looked.filter(|_| settings.cross_validate) {
+            report.cross_validation = cross_validate(engine, outlined, &grid)?;
+        }
+        let Solution { window, geometry, u, .. } = solution;
+        Ok(Solved { window, geometry, u, report })
+    };
+    let told = |n: usize, solved: Result<Solved>| match solved {
+        // One object that cannot be solved does not stop the others.
+        Err(error) if matches!(error.kind(), ErrorKind::Input | ErrorKind::Vanished) && several => {
+            Ok((n, Err(Refused { label: objects[n].object, reason: error.to_string() })))
+        }
+        other => other.map(|solved| (n, Ok(solved))),
+    };
+    let mut found = Vec::new();
+    for (&n, looked) in share.together.iter().zip(&together) {
+        let solved = alike(engine.comm(), solve(engine, n, looked.as_ref()))?;
+        // The first rank draws and tells of it, as an owner does.
+        if engine.comm().rank() == 0 {
+            let alone = &*engine.alone();
+            found.push(told(n, solved.and_then(|solution| finish(alone, n, looked.as_ref(), solution)))?);
+        }
+    }
+    let items: Vec<(usize, Option<&Looked>)> = share.own.iter().copied().zip(own.iter().map(Option::as_ref)).collect();
+    let work = |engine: &Engine, &(n, looked): &(usize, Option<&Looked>)| {
+        told(n, solve(engine, n, looked).and_then(|solution| finish(engine, n, looked, solution)))
+    };
+    found.extend(engine.alone().side_by_side(&items, most, work)?);
     let found = told_to_all(engine, found)?;
     let mut solved = Vec::new();
     for object in found {
@@ -128,18 +139,38 @@ fn at_once<'a>(engine: &Engine, objects: impl Iterator<Item = &'a ObjectMarks>, 
     (room as usize).clamp(1, engine.threads())
 }
 
-/// An object's outlines and how far they are trusted; none where its marks are none.
-type Seen = Option<(Outlined, Trust)>;
+/// What became of an object that all ranks solve together: the same on all of them.
+///
+/// # Errors
+/// That of a rank which failed where others did not, and when another rank is gone.
+fn alike<R>(comm: &dyn Comm, solved: Result<R>) -> Result<Result<R>> {
+    let failed = comm.sum(&[f64::from(u8::from(solved.is_err()))])?;
+    if failed == 0.0 || failed == comm.ranks() as f64 {
+        return Ok(solved);
+    }
+    solved.and_then(|_| Err(Error::failed("another rank could not solve an object of all"))).map(Ok)
+}
 
-/// Looks at this rank's `own` of the objects, as far as they are marked by outlines, unless the papers' start was asked for. How far
+/// An object's outlines and how far they are trusted.
+type Looked = (Outlined, Trust);
+
+/// What was seen of a rank's objects, in their order; none where an object's marks are no outlines.
+struct Seen {
+    /// Of those that all ranks solve together.
+    together: Vec<Option<Looked>>,
+    /// Of those that this one solves without the others.
+    own: Vec<Option<Looked>>,
+}
+
+/// Looks at the objects that this rank solves, as far as they are marked by outlines, unless the papers' start was asked for. How far
 /// outlines are trusted all objects tell together.
 fn survey<T: Element>(
     engine: &Engine,
     picture: &Picture<'_, T>,
-    (objects, own): (&[ObjectMarks], &[usize]),
+    (objects, share): (&[ObjectMarks], &Share),
     settings: &SegmentSettings,
     most: usize,
-) -> Result<Vec<Seen>> {
+) -> Result<Seen> {
     let stage = engine.stage("scatter of marks", 0);
     let scatter = scatter_of(&stage, objects, picture.geometry)?;
     stage.finish();
@@ -152,13 +183,21 @@ fn survey<T: Element>(
         }
         _ => Ok(None),
     };
-    let outlined = engine.by_itself().side_by_side(own, most, look)?;
-    let told = own.iter().zip(&outlined).filter_map(|(&n, seen)| Some((n, seen.as_ref()?.told(picture.geometry))));
+    let seen_by_all = share.together.iter().map(|n| look(engine, n)).collect::<Result<Vec<_>>>()?;
+    let seen_here = engine.by_itself().side_by_side(&share.own, most, look)?;
+    // What all have seen one of them tells.
+    let first = share.together.iter().zip(&seen_by_all).filter(|_| engine.comm().rank() == 0);
+    let told = first.chain(share.own.iter().zip(&seen_here));
+    let told = told.filter_map(|(&n, seen)| Some((n, seen.as_ref()?.told(picture.geometry))));
     let told = Told::joined(in_order(engine.comm(), told.collect())?);
     let stage = engine.stage("image model", 0);
-    let trusts = trust(&stage, &outlined, &told, (picture.geometry, scatter), settings.image)?;
+    let trusted = |outlined: Vec<Option<Outlined>>| {
+        let trusts = trust(&stage, &outlined, &told, (picture.geometry, scatter), settings.image)?;
+        Ok(outlined.into_iter().zip(trusts).map(|(outlined, trust)| outlined.zip(trust)).collect())
+    };
+    let seen = Seen { together: trusted(seen_by_all)?, own: trusted(seen_here)? };
     stage.finish();
-    Ok(outlined.into_iter().zip(trusts).map(|(outlined, trust)| outlined.zip(trust)).collect())
+    Ok(seen)
 }
 
 /// Extracts, measures and writes an object's surface, and writes its segmentation function.

@@ -6,6 +6,8 @@
 //! whole grid, given by the caller; a brick knows its own maxima, and those of others where pointers leave it once its
 //! neighbours know. Only comparisons of d and its differences, so no result depends on bricks.
 
+use serde::{Deserialize, Serialize};
+
 use crate::grid::FACES;
 use crate::tile::HaloTile;
 
@@ -15,7 +17,7 @@ pub const UNKNOWN: u32 = u32::MAX;
 pub const OUTSIDE: u32 = 0;
 
 /// A maximum, where all pointers nearby lead to; or a pocket, where they end.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Peak {
     /// Its distance to the cloud, of a pocket the largest.
     pub depth: f32,

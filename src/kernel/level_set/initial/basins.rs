@@ -4,11 +4,13 @@
 //! A basin's `b` is the same on all its voxels: the saddle at which the cloud's hole lets the flood in. Its persistence
 //! is `max d / b` (docs/algorithms.md, "Bottleneck flood"). Pieces of neighbouring bricks are joined in `persistence`.
 
+use serde::{Deserialize, Serialize};
+
 use crate::grid::{FACES, Face};
 use crate::tile::HaloTile;
 
 /// The part of a basin that lies in one brick.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Piece {
     /// Number of voxels.
     pub voxels: u64,

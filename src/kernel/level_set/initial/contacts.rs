@@ -1,11 +1,13 @@
 //! Where the regions of steepest ascent meet in one brick, and how large they are there; only comparisons and counts,
 //! so no result depends on bricks.
 
+use serde::{Deserialize, Serialize};
+
 use super::ascent::rows;
 use crate::tile::HaloTile;
 
 /// Where two regions meet.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// The smaller of the two numbers first.
     pub regions: [u32; 2],

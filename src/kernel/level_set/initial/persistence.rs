@@ -12,6 +12,28 @@ pub const PERSISTENCE: f32 = 2.0;
 /// roots, its basin.
 pub const PIECE_BYTES: u64 = 128;
 
+/// The pieces that touch across a face between two bricks, each two once: `labels` of the voxels on its two sides, in the same order, 0 for
+/// none; `first` are the pieces that label 1 stands for on each side.
+pub fn across(labels: [&[u16]; 2], first: [u32; 2], touching: &mut Vec<[u32; 2]>) {
+    let both = labels[0].iter().zip(labels[1]).filter(|(a, b)| **a != 0 && **b != 0);
+    add(both.map(|(&a, &b)| [first[0] + u32::from(a) - 1, first[1] + u32::from(b) - 1]), touching);
+}
+
+/// Everything labelled on a face touches the one piece that lies beyond all of it.
+pub fn beyond(labels: &[u16], first: u32, piece: u32, touching: &mut Vec<[u32; 2]>) {
+    add(labels.iter().filter(|label| **label != 0).map(|&label| [first + u32::from(label) - 1, piece]), touching);
+}
+
+/// Few pieces touch across one face: what is known of it is looked through from its end.
+fn add(pairs: impl Iterator<Item = [u32; 2]>, touching: &mut Vec<[u32; 2]>) {
+    let begun = touching.len();
+    for pair in pairs {
+        if !touching[begun..].iter().rev().any(|known| *known == pair) {
+            touching.push(pair);
+        }
+    }
+}
+
 /// Pieces that are being joined.
 #[derive(Clone, Debug)]
 pub struct Joins {
@@ -27,19 +49,9 @@ impl Joins {
         Self { pieces, forest }
     }
 
-    /// Joins what touches across a face between two bricks: `labels` of the voxels on its two sides, in the same order,
-    /// 0 for none; `first` are the pieces that label 1 stands for on each side.
-    pub fn across(&mut self, labels: [&[u16]; 2], first: [u32; 2]) {
-        for (&a, &b) in labels[0].iter().zip(labels[1]).filter(|(a, b)| **a != 0 && **b != 0) {
-            self.forest.join(first[0] + u32::from(a) - 1, first[1] + u32::from(b) - 1);
-        }
-    }
-
-    /// Joins everything labelled on a face with the one piece that lies beyond all of it.
-    pub fn beyond(&mut self, labels: &[u16], first: u32, piece: u32) {
-        for &label in labels.iter().filter(|label| **label != 0) {
-            self.forest.join(first + u32::from(label) - 1, piece);
-        }
+    /// Joins two pieces that touch.
+    pub fn join(&mut self, [a, b]: [u32; 2]) {
+        self.forest.join(a, b);
     }
 
     /// Adds up what was joined and keeps the basins so many times as deep as their saddle, in order of their roots;
@@ -77,9 +89,11 @@ mod tests {
         // Two bricks with two pieces each, and a far region beyond the second brick.
         let pieces =
             vec![piece(5, 1.5, 1.0), piece(7, 1.0, 0.9), piece(1, 1.2, 0.9), piece(2, 1.9, 1.0), piece(64, 2.5, 1.0)];
-        let mut joins = Joins::new(pieces);
-        joins.across([&[0, 1, 2, 1], &[1, 2, 1, 0]], [0, 2]);
-        joins.beyond(&[0, 0, 2], 2, 4);
+        let (mut joins, mut touching) = (Joins::new(pieces), Vec::new());
+        across([&[0, 1, 2, 1, 1], &[1, 2, 1, 0, 2]], [0, 2], &mut touching);
+        beyond(&[0, 0, 2, 2], 2, 4, &mut touching);
+        assert_eq!(touching, [[0, 3], [1, 2], [3, 4]], "each two once");
+        touching.into_iter().for_each(|pair| joins.join(pair));
         let (basins, names) = joins.persisting(PERSISTENCE);
         assert_eq!(basins, [piece(71, 2.5, 1.0)], "1.2 over 0.9 is noise");
         assert_eq!(names, [Some(0), None, None, Some(0), Some(0)]);

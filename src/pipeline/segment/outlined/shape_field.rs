@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::exec::{Engine, Stage, Workers, one_wave};
+use crate::exec::{Engine, Stage, Workers, equal_part, one_wave, run_shared, whole_field};
 use crate::grid::{Box3, BrickGrid, BrickId, BrickSet, Geometry};
 use crate::kernel::level_set::cell::CELL;
 use crate::kernel::outline::planar::section::Section;
@@ -78,12 +78,12 @@ impl<'a> ShapeField<'a> {
         let grid = BrickGrid::new(self.geometry.shape, CELL as i64);
         let ids: Vec<BrickId> = (0..grid.len()).collect();
         let may_be_near =
-            stage.run(&ids, &Workers::none(), |(), &id| Ok(!self.shape.is_beyond(&grid.brick_box(id), reach)))?;
+            run_shared(stage, &ids, &Workers::none(), |(), &id| Ok(!self.shape.is_beyond(&grid.brick_box(id), reach)))?;
         let asked: Vec<BrickId> = ids.into_iter().filter(|&id| may_be_near[id as usize]).collect();
         let telling = TELLING * asked.len() as u64;
         stage.expect(telling + FILLING * asked.len() as u64);
         stage.weigh(TELLING);
-        let is_near = stage.run(&asked, &Workers::new(Vec::new), |values, &id| {
+        let is_near = run_shared(stage, &asked, &Workers::new(Vec::new), |values, &id| {
             let part = grid.brick_box(id);
             // Most cells near the surface show it at a few voxels.
             if a_few(&part).any(|voxel| f64::from(self.at(voxel).abs()) <= reach) {
@@ -108,7 +108,8 @@ impl<'a> ShapeField<'a> {
         engine: &Engine,
         set: &Arc<BrickSet>,
     ) -> Result<(BrickArray<f32>, f64)> {
-        let mut field = BrickArray::with_faces(engine.scratch(), set)?;
+        let own = &Arc::new(equal_part(stage.comm(), set));
+        let mut field = BrickArray::with_faces(engine.scratch(), own)?;
         let grid = *set.grid();
         let mut fills = false;
         for id in (0..grid.len()).filter(|&id| set.slot(id).is_none()) {
@@ -116,16 +117,17 @@ impl<'a> ShapeField<'a> {
             field.set_absent(id, value);
             fills |= value < 0.0;
         }
-        let lowest = stage.run(&one_wave(set), &Workers::new(Vec::new), |values, &slot| {
-            let part = grid.brick_box(set.id(slot));
+        let lowest = stage.run(&one_wave(own), &Workers::new(Vec::new), |values, &slot| {
+            let part = grid.brick_box(own.id(slot));
             values.resize(part.len(), 0.0);
             self.read(&part, values);
             field.write_box(&part, values);
             field.refresh_faces(slot);
             Ok(values.iter().copied().fold(f32::INFINITY, f32::min))
         })?;
-        let deepest = if fills { f64::INFINITY } else { -f64::from(lowest.into_iter().fold(0.0, f32::min)) };
-        Ok((field, deepest))
+        let lowest = stage.comm().least(f64::from(lowest.into_iter().fold(0.0, f32::min)))?;
+        let deepest = if fills { f64::INFINITY } else { -lowest };
+        Ok((whole_field(stage, field, set)?, deepest))
     }
 }
 

@@ -7,7 +7,7 @@ use super::shape_field::ShapeField;
 use super::speed::{Pulls, speed};
 use super::survey::{Outlined, Trust};
 use crate::error::Result;
-use crate::exec::{Engine, Stage, Workers, one_wave};
+use crate::exec::{Engine, Stage, Workers, one_wave, whole_field};
 use crate::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use crate::kernel::image::border::border_model::BorderModel;
 use crate::kernel::image::border::speed::OF_AN_END;
@@ -151,7 +151,8 @@ fn distance_to(
     let stage = engine.resumable_stage(&name("distance", marks), 11 * set.len() as u64);
     stage.voxels((set.len() * set.grid().brick_len()) as u64);
     let farthest = geometry.length(geometry.shape);
-    let distance = cloud_distance(&stage, engine, &sources, set, settings.method, farthest as f32)?;
+    let part = cloud_distance(&stage, engine, &sources, set, settings.method, farthest as f32)?;
+    let distance = whole_field(&stage, part, set)?;
     stage.finish();
     Ok(distance)
 }

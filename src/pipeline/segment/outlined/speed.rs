@@ -9,10 +9,12 @@
 //! from the outlines and their planes (d) and beyond the last of them (e), V how uncertain the image. The surface rests
 //! where both agree, weighed by their variances.
 
+use std::sync::Arc;
+
 use super::shape_field::ShapeField;
 use super::survey::{MOST_OFF, Outlined, Sampled, Trust, fade};
 use crate::error::Result;
-use crate::exec::{Engine, Stage, Workers, one_wave};
+use crate::exec::{Engine, Stage, Workers, equal_part, one_wave, run_shared, whole_field};
 use crate::grid::{Box3, Geometry};
 use crate::kernel::image::border::border_model::{BorderModel, ON_LEVEL};
 use crate::kernel::image::border::carried::Carried;
@@ -39,7 +41,7 @@ pub(crate) struct Pulls<'a> {
     pub distance: &'a BrickArray<f32>,
 }
 
-/// The speed on the cells of the shape.
+/// The speed on the cells of the shape. Each rank of several does its part of the cells, and all have all of them in the end.
 pub(crate) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &Pulls<'_>) -> Result<BrickArray<f32>> {
     let geometry = &by.field.geometry;
     let set = by.shape.set();
@@ -55,9 +57,10 @@ pub(crate) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
         growth: by.trust.growth as f32,
         bias: by.trust.reading.bias as f32,
     };
-    let field = BrickArray::with_faces(engine.scratch(), set)?;
-    stage.run(&one_wave(set), &Workers::new(Buffers::default), |buffers, &slot| {
-        let part = set.grid().brick_box(set.id(slot));
+    let own = &Arc::new(equal_part(stage.comm(), set));
+    let field = BrickArray::with_faces(engine.scratch(), own)?;
+    stage.run(&one_wave(own), &Workers::new(Buffers::default), |buffers, &slot| {
+        let part = set.grid().brick_box(own.id(slot));
         buffers.fill(&part, by, geometry, levels.as_ref())?;
         let at = Places {
             shape: &buffers.shape,
@@ -70,7 +73,7 @@ pub(crate) fn speed(stage: &Stage<'_>, engine: &Engine, object: &Outlined, by: &
         field.refresh_faces(slot);
         Ok(())
     })?;
-    Ok(field)
+    whole_field(stage, field, set)
 }
 
 #[derive(Default)]
@@ -157,7 +160,7 @@ fn levels(stage: &Stage<'_>, geometry: &Geometry, object: &Outlined, trust: &Tru
     };
     let mut lattices = [0, 1].map(|_| Lattice::for_box(geometry.shape, geometry.spacing, NODES, APART));
     let planes: Vec<usize> = (0..lattices[0].planes()).collect();
-    let nodes = stage.run(&planes, &Workers::none(), |(), &n| {
+    let nodes = run_shared(stage, &planes, &Workers::none(), |(), &n| {
         let values = lattices[0].plane(n, geometry, at);
         Ok([0, 1].map(|m| values.iter().map(|v| v[m] as f32).collect::<Vec<f32>>()))
     })?;

@@ -1,4 +1,4 @@
-//! Which objects a rank solves, and which parts of the image it keeps for that.
+//! Which objects a rank solves, alone or together with the others, and which parts of the image it keeps for that.
 
 use crate::error::Result;
 use crate::exec::{Comm, Engine};
@@ -10,29 +10,47 @@ use crate::pipeline::segment::reach::{likely_box, likely_work};
 use crate::pipeline::segment::settings::{Guides, SegmentSettings};
 use crate::store::ElementType;
 
-/// The numbers of the objects that this rank solves, in order: the largest come first, each to the rank that has least to do
-/// (Graham 1969), so all ranks find the same without a word.
-pub(in crate::pipeline::segment) fn own_objects(
-    comm: &dyn Comm,
-    objects: &[ObjectMarks],
-    grid: &Geometry,
-) -> Vec<usize> {
-    if comm.ranks() == 1 {
-        return (0..objects.len()).collect();
-    }
-    let takes: Vec<f64> = objects.iter().map(|marks| likely_work(marks, grid)).collect();
-    let owners = shared_out(&takes, comm.ranks());
-    (0..objects.len()).filter(|&n| owners[n] == comm.rank()).collect()
+/// An object that takes more than so many times a rank's fair share of all would keep the others waiting.
+const TOO_LARGE: f64 = 1.5;
+
+/// The objects that a rank solves, by their numbers, in order.
+pub(in crate::pipeline::segment) struct Share {
+    /// Those that all ranks solve together, one after the other.
+    pub together: Vec<usize>,
+    /// Those that this one solves without the others.
+    pub own: Vec<usize>,
 }
 
-/// The rank of each of several jobs, of which is known what they take.
-fn shared_out(takes: &[f64], ranks: usize) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..takes.len()).collect();
+impl Share {
+    /// That of a rank: what is too large for one all solve together; of the others the largest come first, each to the rank that has least to
+    /// do (Graham 1969). All ranks find the same without a word.
+    pub(in crate::pipeline::segment) fn of(comm: &dyn Comm, objects: &[ObjectMarks], grid: &Geometry) -> Self {
+        if comm.ranks() == 1 {
+            return Self { together: Vec::new(), own: (0..objects.len()).collect() };
+        }
+        let takes: Vec<f64> = objects.iter().map(|marks| likely_work(marks, grid)).collect();
+        let owners = shared_out(&takes, comm.ranks());
+        let numbers = |of: Option<usize>| (0..objects.len()).filter(|&n| owners[n] == of).collect();
+        Self { together: numbers(None), own: numbers(Some(comm.rank())) }
+    }
+
+    /// All of them, in order.
+    pub(in crate::pipeline::segment) fn all(&self) -> Vec<usize> {
+        let mut all = [&self.together[..], &self.own].concat();
+        all.sort_unstable();
+        all
+    }
+}
+
+/// The rank of each of several jobs, of which is known what they take; none where it is one for all ranks.
+fn shared_out(takes: &[f64], ranks: usize) -> Vec<Option<usize>> {
+    let most = TOO_LARGE * takes.iter().sum::<f64>() / ranks as f64;
+    let mut order: Vec<usize> = (0..takes.len()).filter(|&n| takes[n] <= most).collect();
     order.sort_by(|&a, &b| takes[b].total_cmp(&takes[a]).then(a.cmp(&b)));
-    let (mut owners, mut busy) = (vec![0; takes.len()], vec![0.0_f64; ranks]);
+    let (mut owners, mut busy) = (vec![None; takes.len()], vec![0.0_f64; ranks]);
     for n in order {
         let rank = (0..ranks).min_by(|&a, &b| busy[a].total_cmp(&busy[b])).unwrap_or(0);
-        owners[n] = rank;
+        owners[n] = Some(rank);
         busy[rank] += takes[n];
     }
     owners
@@ -58,8 +76,8 @@ pub(in crate::pipeline::segment) fn kept_parts(
         Some(store) => written_by_this_rank(engine, geometry, store.finest_edges(geometry.shape, element))?,
         None => Vec::new(),
     };
-    let own = own_objects(comm, guides.objects, geometry);
-    parts.extend(own.into_iter().map(|n| likely_box(&guides.objects[n], geometry).intersect(&geometry.domain())));
+    let solved = Share::of(comm, guides.objects, geometry).all();
+    parts.extend(solved.into_iter().map(|n| likely_box(&guides.objects[n], geometry).intersect(&geometry.domain())));
     Ok(Some(parts))
 }
 
@@ -73,10 +91,19 @@ mod tests {
         for ranks in [1, 2, 3, 8, 60] {
             let owners = shared_out(&takes, ranks);
             let of = |rank| (0..takes.len()).filter(|&n| owners[n] == rank).map(|n| takes[n]).sum::<f64>();
-            let sums: Vec<f64> = (0..ranks).map(of).collect();
+            let sums: Vec<f64> = (0..ranks).map(|rank| of(Some(rank))).collect();
             let (most, mean) = (sums.iter().copied().fold(0.0, f64::max), takes.iter().sum::<f64>() / ranks as f64);
             // Of any number of jobs this way leaves the busiest with four thirds of the least that is possible, at most.
             assert!(most <= 4.0 / 3.0 * mean.max(37.0), "{ranks} ranks: {sums:?}");
+            assert!((of(None) + sums.iter().sum::<f64>() - takes.iter().sum::<f64>()).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn what_would_keep_others_waiting_is_for_all() {
+        assert_eq!(shared_out(&[5.0], 1), [Some(0)]);
+        assert_eq!(shared_out(&[5.0], 2), [None]);
+        assert_eq!(shared_out(&[5.0, 4.0], 2), [Some(0), Some(1)]);
+        assert_eq!(shared_out(&[1.0, 20.0, 1.0, 1.0], 3), [Some(0), None, Some(1), Some(2)]);
     }
 }
