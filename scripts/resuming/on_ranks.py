@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import tempfile
 import time
 from pathlib import Path
 
@@ -20,7 +21,9 @@ HOWS = ("kill", "term", "panic", "disk")
 def launched(program, ranks):
     """What starts a program on so many ranks of one thread."""
     root = ["--allow-run-as-root"] if os.geteuid() == 0 else []
-    return ["mpirun", *root, "--oversubscribe", "--bind-to", "none", "-n", str(ranks), program]
+    # What mpirun itself keeps in files: on a disk that is full it hangs before there are any ranks.
+    own = ["--mca", "orte_tmpdir_base", tempfile.gettempdir()]
+    return ["mpirun", *root, *own, "--oversubscribe", "--bind-to", "none", "-n", str(ranks), program]
 
 
 def processes(program, folder):

@@ -159,7 +159,7 @@ impl FixedPoint for Flood<'_> {
 
     /// A far region may lie beside bricks of any rank.
     fn quiet(&mut self, comm: &dyn Comm, mut mark: impl FnMut(Slot)) -> Result<()> {
-        if comm.ranks() == 1 || self.far.level.iter().all(|&level| level == self.far.farthest) {
+        if comm.ranks() == 1 {
             return Ok(());
         }
         for levels in gather_records(comm, &self.far.level)? {

@@ -49,7 +49,7 @@ pub fn make_band(stage: &Stage<'_>, engine: &Engine, sides: SidesNear<'_>, reach
     let comm = stage.comm();
     let near = near_border(stage, engine, distance, inside, reaches)?;
     let known = Known { distance, inside, near: near.as_ref(), reaches };
-    let (of_band, constant) = known.band_cells(stage)?;
+    let BandCells { of_band, constant } = known.band_cells(stage)?;
     let set = Arc::new(BrickSet::from_ids(*cells.grid(), join_records(comm, of_band)?.0));
     let ownership = Ownership::agreed(comm, distance.set())?;
     let own = Arc::new(ownership.part(&set, comm.rank(), &HaloPlan::new(*set.grid(), Reach::All)));
@@ -166,7 +166,7 @@ impl Known<'_> {
     }
 
     /// Of this rank's cells those that hold a solved voxel; all others are constant, and what they are their first voxel tells.
-    fn band_cells(&self, stage: &Stage<'_>) -> Result<(Vec<BrickId>, Vec<(BrickId, u8)>)> {
+    fn band_cells(&self, stage: &Stage<'_>) -> Result<BandCells> {
         let set = self.distance.set();
         let edge = set.grid().edge() as usize;
         let found = stage.run(&one_wave(set), &Workers::none(), |(), &slot| {
@@ -181,8 +181,16 @@ impl Known<'_> {
                 Some(side) => constant.push((set.id(slot), side)),
             }
         }
-        Ok((of_band, constant))
+        Ok(BandCells { of_band, constant })
     }
+}
+
+/// The cells of one rank.
+struct BandCells {
+    /// Those that hold a solved voxel.
+    of_band: Vec<BrickId>,
+    /// All others, and the side that they are on.
+    constant: Vec<(BrickId, u8)>,
 }
 
 /// Reads a cell's flags into `mask`, with the domain's borders.

@@ -93,7 +93,9 @@ mod tests {
         across([&[0, 1, 2, 1, 1], &[1, 2, 1, 0, 2]], [0, 2], &mut touching);
         beyond(&[0, 0, 2, 2], 2, 4, &mut touching);
         assert_eq!(touching, [[0, 3], [1, 2], [3, 4]], "each two once");
-        touching.into_iter().for_each(|pair| joins.join(pair));
+        for pair in touching {
+            joins.join(pair);
+        }
         let (basins, names) = joins.persisting(PERSISTENCE);
         assert_eq!(basins, [piece(71, 2.5, 1.0)], "1.2 over 0.9 is noise");
         assert_eq!(names, [Some(0), None, None, Some(0), Some(0)]);
