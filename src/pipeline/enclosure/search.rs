@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::facing::{IsInside, level_set};
 use super::needs::box_bytes;
 use super::pockets::pockets;
 use super::region::{RegionOfInterest, voxel_bounds};
@@ -16,6 +17,7 @@ use crate::error::Result;
 use crate::exec::{Engine, Hold, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::kernel::level_set::initial::persistence::PERSISTENCE;
+use crate::kernel::points::surfel::Surfel;
 use crate::pipeline::distance::{Method, Sources, cloud_distance};
 use crate::pipeline::level_set::band::{Band, Reaches, make_band};
 use crate::store::BrickArray;
@@ -142,6 +144,8 @@ pub struct Enclosure {
     basins: Vec<Basin>,
     deepest: Option<Deepest>,
     sheet: Vec<u32>,
+    /// The level set, where it is known.
+    known: Option<BrickArray<f32>>,
     /// What the box takes of the memory.
     held: Hold,
 }
@@ -216,6 +220,30 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         }
         farthest *= 2.0;
     }
+}
+
+/// The surface of points with normals, for what encloses nothing: told near them, by `is_inside` farther off. Nothing of it is to be solved.
+///
+/// # Errors
+/// When the box does not fit the memory, scratch runs out or the run is interrupted.
+pub(crate) fn face(
+    engine: &Engine,
+    search: &Search<'_>,
+    surfels: &[Surfel],
+    is_inside: IsInside<'_>,
+) -> Result<Box<Enclosure>> {
+    let mut progress = Progress::begin(engine, search.suffix)?;
+    let farthest = progress.farthest_or(search.first_reach);
+    let around = Around::new(engine, search, farthest, &mut progress)?;
+    let engine = &*engine.by_itself();
+    let stage = around.tagging(engine, search);
+    let geometry = &around.region.geometry;
+    let u = level_set(&stage, engine, geometry, (surfels, is_inside), &around.distance)?;
+    stage.finish();
+    let inside = BrickArray::blank(engine.scratch(), around.distance.set(), 0u8)?;
+    let reaches = Reaches { inner: 0.0, outer: 0.0 };
+    let enclosure = around.enclosed(0.0, reaches, inside, Vec::new(), Vec::new());
+    Ok(Box::new(Enclosure { known: Some(u), ..enclosure }))
 }
 
 /// The flood from outside, to a start surface at one distance from all of the cloud.
@@ -357,7 +385,7 @@ impl Around {
         let (geometry, window) = (self.region.geometry.clone(), self.region.window);
         let deepest = Deepest::of(&basins, &geometry);
         let Self { distance, held, .. } = self;
-        Enclosure { geometry, window, beta, reaches, distance, inside, basins, deepest, sheet, held }
+        Enclosure { geometry, window, beta, reaches, distance, inside, basins, deepest, sheet, known: None, held }
     }
 }
 
@@ -404,6 +432,10 @@ impl Enclosure {
     /// # Errors
     /// When scratch runs out or the run is interrupted.
     pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<(Band, Hold)> {
+        if let Some(u) = self.known {
+            let solved = BrickArray::blank(engine.scratch(), self.distance.set(), 0)?;
+            return Ok((Band { u, distance: self.distance, solved, voxels: 0 }, self.held));
+        }
         let stage = engine.stage(&format!("band{suffix}"), self.inside.set().len() as u64);
         let band = make_band(&stage, engine, &self.distance, &self.inside, self.reaches)?;
         stage.finish();
