@@ -110,6 +110,12 @@ impl<'a> Reconstruction<'a> {
         self
     }
 
+    /// Lets the surface end where the points do, with a rim, where it would else be closed: for a scan from one side, or a sheet.
+    pub fn open(mut self) -> Self {
+        self.settings.open = true;
+        self
+    }
+
     /// Weight of the attraction to the points.
     pub fn theta(mut self, theta: f64) -> Self {
         self.settings.motion.theta = theta;
@@ -236,6 +242,12 @@ impl SolvedReconstruction {
     #[must_use]
     pub fn noise(&self) -> Option<f64> {
         self.found.noise.deviation
+    }
+
+    /// The area that was cut off because no points support it; none where the surface was not to be open.
+    #[must_use]
+    pub fn trimmed_area(&self) -> Option<f64> {
+        self.found.trimmed
     }
 
     /// How the time loop ended.

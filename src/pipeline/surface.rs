@@ -13,11 +13,17 @@ use crate::store::{BoxSource, BrickArray, MeshSink};
 /// Bricks whose patches are made in parallel before they are welded in order.
 const BATCH: usize = 256;
 
+/// Cuts what it will off a patch, and returns the area of that. What becomes of a vertex depends on its place alone, so that patches
+/// beside each other stay so.
+pub type Trim<'a> = dyn Fn(&mut Patch) -> f64 + Sync + 'a;
+
 /// A surface that was drawn.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawn {
     /// What it measures.
     pub measures: Measures,
+    /// The area that was cut off.
+    pub trimmed: f64,
     /// Distances of the points from it; none without points or surface.
     pub hausdorff: Option<Hausdorff>,
     /// How many of the points are how far from it.
@@ -35,14 +41,29 @@ pub fn draw(
     stage: &Stage<'_>,
     u: &BrickArray<f32>,
     geometry: &Geometry,
-    (points, lost_beyond): (&[[f64; 3]], f64),
+    cloud: (&[[f64; 3]], f64),
     mesh: &mut dyn MeshSink,
 ) -> Result<Drawn> {
-    let measures = extract(stage, u, geometry, mesh)?;
+    draw_trimmed(stage, u, geometry, cloud, mesh, &|_| 0.0)
+}
+
+/// The same of what `trim` leaves of the surface; how far points lie is told of all of it.
+///
+/// # Errors
+/// As [`draw`].
+pub fn draw_trimmed(
+    stage: &Stage<'_>,
+    u: &BrickArray<f32>,
+    geometry: &Geometry,
+    (points, lost_beyond): (&[[f64; 3]], f64),
+    mesh: &mut dyn MeshSink,
+    trim: &Trim<'_>,
+) -> Result<Drawn> {
+    let (measures, trimmed) = extract_trimmed(stage, u, geometry, mesh, trim)?;
     let distances = distances_to(stage, u, geometry, points)?;
     let lost_points = distances.iter().flatten().filter(|&&d| d > lost_beyond).count() as u64;
     let known = || distances.iter().copied().flatten();
-    Ok(Drawn { measures, hausdorff: Hausdorff::of(known()), spread: Spread::of(known()), lost_points })
+    Ok(Drawn { measures, trimmed, hausdorff: Hausdorff::of(known()), spread: Spread::of(known()), lost_points })
 }
 
 /// Sends the closed surface of `u` to `sink` and measures it.
@@ -55,11 +76,22 @@ pub fn extract(
     geometry: &Geometry,
     sink: &mut dyn MeshSink,
 ) -> Result<Measures> {
+    Ok(extract_trimmed(stage, u, geometry, sink, &|_| 0.0)?.0)
+}
+
+/// Sends what `trim` leaves of the surface to `sink`; returns its measures, and the area that was cut off.
+fn extract_trimmed(
+    stage: &Stage<'_>,
+    u: &BrickArray<f32>,
+    geometry: &Geometry,
+    sink: &mut dyn MeshSink,
+    trim: &Trim<'_>,
+) -> Result<(Measures, f64)> {
     let grid = *u.set().grid();
     let (lo, hi) = (geometry.origin, geometry.position(geometry.shape));
     let centre = std::array::from_fn(|a| 0.5 * (lo[a] + hi[a]));
     let mut welder = Welder::new(geometry);
-    let mut measure = SurfaceMeasure::new(centre);
+    let (mut measure, mut trimmed) = (SurfaceMeasure::new(centre), 0.0);
     let workers = Workers::new(|| (MarchingCubes::new(0.5), Vec::new()));
     // A surface may pass between a brick that is not stored and the one above it, so the bricks below stored ones
     // count.
@@ -68,9 +100,11 @@ pub fn extract(
         let patches = stage.run(batch, &workers, |(cubes, values), &id| {
             let mut patch = Patch::default();
             patch_of(u, id, cubes, values, &mut patch)?;
-            Ok(patch)
+            let cut = trim(&mut patch);
+            Ok((patch, cut))
         })?;
-        for patch in &patches {
+        for (patch, cut) in &patches {
+            trimmed += cut;
             if let Some(kept) = welder.enter_layer(patch) {
                 measure.forget_but(&kept);
             }
@@ -78,7 +112,7 @@ pub fn extract(
             welder.triangles_of(patch).for_each(|(corners, positions)| measure.add(corners, positions));
         }
     }
-    Ok(measure.measures())
+    Ok((measure.measures(), trimmed))
 }
 
 /// True unless the brick and all it touches above are constant and equal.

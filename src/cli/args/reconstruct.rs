@@ -9,7 +9,7 @@ use super::common::{DistanceArgs, MotionArgs, OutputArgs, ResourceArgs};
 use super::grid::GridBoxArgs;
 use super::values::parse_spacing;
 
-/// Reconstruct a closed surface from a point cloud, without normals.
+/// Reconstruct a closed surface from a point cloud, without normals; with --open one that ends with the points.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ReconstructArgs {
     /// Points (CSV, XYZ, PLY), or a mesh whose vertices are taken
@@ -41,6 +41,9 @@ pub(crate) struct PointArgs {
     /// Standard deviation of the points from the surface, a length; 0 takes every point as it is [default: told from the points]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(crate) noise: Option<f64>,
+    /// Let the surface end where the points do, with a rim: for a scan from one side, or a sheet [default: close it]
+    #[arg(long)]
+    pub(crate) open: bool,
 }
 
 /// How fine the grid is, and on which box of it fields are written.

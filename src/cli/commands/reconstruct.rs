@@ -342,16 +342,29 @@ fn far_strays(alone: usize, all: usize) -> Error {
     ))
 }
 
+/// The surface in a line.
+fn describe_surface(found: &Reconstruction) -> String {
+    let m = &found.measures;
+    let (pieces, area, triangles) = (m.components, number(m.area), grouped(m.triangles));
+    match found.trimmed {
+        Some(trimmed) if !m.is_closed() => format!(
+            "open surface in {pieces} pieces: area {area}, its rim {} long, {} cut off where no points are, {triangles} triangles",
+            number(m.rim),
+            number(trimmed)
+        ),
+        _ => {
+            let surface = if m.is_closed() { "closed" } else { "OPEN" };
+            format!(
+                "{surface} surface in {pieces} pieces: volume {}, area {area}, {triangles} triangles",
+                number(m.volume)
+            )
+        }
+    }
+}
+
 fn describe_found(found: &Reconstruction) -> String {
     let m = &found.measures;
-    let surface = if m.is_closed() { "closed" } else { "OPEN" };
-    let mut lines = vec![format!(
-        "{surface} surface in {} pieces: volume {}, area {}, {} triangles",
-        m.components,
-        number(m.volume),
-        number(m.area),
-        grouped(m.triangles)
-    )];
+    let mut lines = vec![describe_surface(found)];
     lines.extend(found.hausdorff.map(|h| {
         let lost = match found.lost_points {
             0 => String::new(),
@@ -383,11 +396,15 @@ fn describe_found(found: &Reconstruction) -> String {
             place(cap.place, 0.1 * cap.width)
         ));
     }
-    lines.push(format!(
-        "start at {} from the points; {} steps, ended by {}",
-        number(found.beta),
-        found.evolution.steps,
-        found.evolution.stopped_by
-    ));
+    lines.push(match found.evolution.steps {
+        0 => "no time steps: the surface is told by the tangent planes of the points".into(),
+        steps => {
+            format!(
+                "start at {} from the points; {steps} steps, ended by {}",
+                number(found.beta),
+                found.evolution.stopped_by
+            )
+        }
+    });
     lines.join("\n") + "\n"
 }

@@ -24,6 +24,8 @@ pub(crate) struct Settings {
     beta: Option<f64>,
     /// Null when it was told from the points; it is then in the result.
     noise: Option<f64>,
+    /// Whether the surface was to end where the points do.
+    open: bool,
     scratch: String,
 }
 
@@ -43,6 +45,7 @@ impl Settings {
             motion: Moves::new(&settings.motion, &found.geometry),
             beta: settings.beta,
             noise: settings.noise,
+            open: settings.open,
             scratch: scratch.display().to_string(),
         }
     }
@@ -51,7 +54,8 @@ impl Settings {
 /// What was found.
 #[derive(Debug, Serialize)]
 pub(crate) struct Found {
-    volume: f64,
+    /// Null where the surface is open.
+    volume: Option<f64>,
     area: f64,
     closed: bool,
     components: u64,
@@ -59,6 +63,10 @@ pub(crate) struct Found {
     /// The copy of a large surface.
     simplified: Option<SimplifiedCopy>,
     open_edges: u64,
+    /// The length of these edges.
+    rim: f64,
+    /// The area that was cut off because no points support it; null without `--open`.
+    trimmed_area: Option<f64>,
     hausdorff: Option<Hausdorff>,
     distances: Option<Distances>,
     cloud_points: u64,
@@ -83,13 +91,15 @@ pub(crate) struct Found {
 impl Found {
     pub(crate) fn new(found: &Reconstruction, cloud_points: u64, copy: Option<Simplified>) -> Self {
         Self {
-            volume: found.measures.volume,
+            volume: found.measures.is_closed().then_some(found.measures.volume),
             area: found.measures.area,
             closed: found.measures.is_closed(),
             components: found.measures.components,
             triangles: found.measures.triangles,
             simplified: copy.map(Into::into),
             open_edges: found.measures.open_edges,
+            rim: found.measures.rim,
+            trimmed_area: found.trimmed,
             hausdorff: found.hausdorff.map(Into::into),
             distances: found.spread.clone().map(Into::into),
             cloud_points,

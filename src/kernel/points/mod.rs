@@ -1,5 +1,8 @@
 //! Clouds without a grid: what the points around a place tell of the surface there.
 
+pub mod facing;
 pub mod height_field;
 pub mod orientation;
+pub mod rim;
 pub mod smoothing;
+pub mod surfel;

@@ -26,8 +26,11 @@ impl Link {
     }
 }
 
-/// Turns normals so that neighbours agree, along the links that are least unlike; of each connected part the highest point
-/// looks up.
+/// A part that bulges by less than this of its extent is flat.
+const FLAT: f64 = 1e-9;
+
+/// Turns normals so that neighbours agree, along the links that are least unlike; of each connected part they look away from its
+/// middle, all together, as those of a closed body do, or of a bowl. Of a flat one the highest point looks up.
 pub fn orient(places: &[DVec3], normals: &mut [DVec3], mut links: Vec<Link>) {
     links.sort_unstable_by(|a, b| a.unlike.total_cmp(&b.unlike).then(a.ends.cmp(&b.ends)));
     let mut forest = Forest::of_singles(places.len());
@@ -49,8 +52,10 @@ pub fn orient(places: &[DVec3], normals: &mut [DVec3], mut links: Vec<Link>) {
             normals[first as usize] = -normals[first as usize];
         }
         stack.push(first);
+        let mut part = Vec::new();
         while let Some(at) = stack.pop() {
             let normal = normals[at as usize];
+            part.push(at as usize);
             for &next in &beside[at as usize] {
                 if !std::mem::replace(&mut is_known[next as usize], true) {
                     if normals[next as usize].dot(normal) < 0.0 {
@@ -60,12 +65,46 @@ pub fn orient(places: &[DVec3], normals: &mut [DVec3], mut links: Vec<Link>) {
                 }
             }
         }
+        if looks_in(places, normals, &part) {
+            for n in part {
+                normals[n] = -normals[n];
+            }
+        }
     }
+}
+
+/// Whether the normals of some points look towards the middle of these, all together.
+fn looks_in(places: &[DVec3], normals: &[DVec3], part: &[usize]) -> bool {
+    let middle = part.iter().map(|&n| places[n]).sum::<DVec3>() / part.len() as f64;
+    let [out, extent] = part.iter().fold([0.0; 2], |[out, extent], &n| {
+        let away = places[n] - middle;
+        [out + away.dot(normals[n]), extent + away.length()]
+    });
+    out < -FLAT * extent
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A bowl that is open above: its normals look down, wherever it is highest.
+    #[test]
+    fn a_bowl_looks_out() {
+        let place = |n: u32| {
+            let (r, turn) = ((f64::from(n) / 400.0).sqrt() * 0.95, 2.399_963 * f64::from(n));
+            DVec3::new(r * libm::cos(turn), r * libm::sin(turn), 9.0 - (1.0 - r * r).sqrt())
+        };
+        let places: Vec<DVec3> = (0..400).map(place).collect();
+        let out = |n: u32| places[n as usize] - DVec3::Z * 9.0;
+        let mut normals: Vec<DVec3> = (0..400).map(|n| if n % 5 < 3 { out(n) } else { -out(n) }).collect();
+        let pairs = (0..400).flat_map(|a| (0..a).map(move |b| [a, b]));
+        let near = pairs.filter(|[a, b]| places[*a as usize].distance(places[*b as usize]) < 0.25);
+        let link =
+            |ends: [u32; 2]| Link::between(ends, ends.map(|n| places[n as usize]), ends.map(|n| normals[n as usize]));
+        let links: Vec<Link> = near.map(link).collect();
+        orient(&places, &mut normals, links);
+        assert!((0..400).all(|n| normals[n as usize].dot(out(n)) > 0.9));
+    }
 
     /// Two balls, the normals of either sign: all look out.
     #[test]

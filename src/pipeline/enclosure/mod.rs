@@ -1,5 +1,6 @@
 //! What a cloud encloses, and the region in which its surface is sought.
 
+mod facing;
 pub(crate) mod far_regions;
 mod near;
 pub(crate) mod needs;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::facing::{IsInside, level_set};
 use super::near::Near;
 use super::needs::box_bytes;
 use super::pockets::pockets;
@@ -14,9 +15,10 @@ use super::sheets::{Company, hold_sheets};
 use super::tagging::{Basin, tag};
 use super::watershed::{Sides, watershed};
 use crate::error::Result;
-use crate::exec::{Engine, Hold, Stage, equal_part, tell_faces};
+use crate::exec::{Engine, Hold, Stage, equal_part, tell_faces, whole_field};
 use crate::grid::{Box3, BrickSet, Geometry, digits};
 use crate::kernel::level_set::initial::persistence::PERSISTENCE;
+use crate::kernel::points::surfel::Surfel;
 use crate::pipeline::distance::{Method, Sources, cloud_distance};
 use crate::pipeline::level_set::band::{Band, Reaches, SidesNear, make_band};
 use crate::store::BrickArray;
@@ -146,6 +148,8 @@ pub struct Enclosure {
     basins: Vec<Basin>,
     deepest: Option<Deepest>,
     sheet: Vec<u32>,
+    /// The level set, where it is known.
+    known: Option<BrickArray<f32>>,
     /// What the box takes of the memory.
     held: Hold,
 }
@@ -221,6 +225,29 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
         }
         farthest *= 2.0;
     }
+}
+
+/// The surface of points with normals, for what encloses nothing: told near them, by `is_inside` farther off. Nothing of it is to be solved.
+///
+/// # Errors
+/// When the box does not fit the memory, scratch runs out or the run is interrupted.
+pub(crate) fn face(
+    engine: &Engine,
+    search: &Search<'_>,
+    surfels: &[Surfel],
+    is_inside: IsInside<'_>,
+) -> Result<Box<Enclosure>> {
+    let mut progress = Progress::begin(engine, search.suffix)?;
+    let farthest = progress.farthest_or(search.first_reach);
+    let around = Around::new(engine, search, farthest, &mut progress)?;
+    let stage = around.tagging(engine, search);
+    let geometry = &around.region.geometry;
+    let u = level_set(&stage, engine, geometry, (surfels, is_inside), around.near())?;
+    stage.finish();
+    let inside = BrickArray::blank(engine.scratch(), around.distance.set(), 0u8)?;
+    let reaches = Reaches { inner: 0.0, outer: 0.0 };
+    let enclosure = around.enclosed(0.0, reaches, inside, Vec::new(), Vec::new());
+    Ok(Box::new(Enclosure { known: Some(u), ..enclosure }))
 }
 
 /// The flood from outside, to a start surface at one distance from all of the cloud.
@@ -365,7 +392,20 @@ impl Around {
     ) -> Enclosure {
         let Self { region: RegionOfInterest { geometry, window, cells, .. }, distance, held } = self;
         let deepest = Deepest::of(&basins, &geometry);
-        Enclosure { geometry, window, beta, reaches, cells, distance, inside, basins, deepest, sheet, held }
+        Enclosure {
+            geometry,
+            window,
+            beta,
+            reaches,
+            cells,
+            distance,
+            inside,
+            basins,
+            deepest,
+            sheet,
+            known: None,
+            held,
+        }
     }
 }
 
@@ -413,6 +453,12 @@ impl Enclosure {
     /// When scratch runs out, the run is interrupted or another rank is gone.
     pub fn into_band(self, engine: &Engine, suffix: &str) -> Result<(Band, Hold)> {
         let stage = engine.stage(&format!("band{suffix}"), self.inside.set().len() as u64);
+        if let Some(u) = self.known {
+            let set = &Arc::new(self.cells);
+            let solved = BrickArray::blank(engine.scratch(), set, 0)?;
+            let (u, distance) = (whole_field(&stage, u, set)?, whole_field(&stage, self.distance, set)?);
+            return Ok((Band { u, distance, solved, voxels: 0 }, self.held));
+        }
         let sides = SidesNear { distance: &self.distance, inside: &self.inside, cells: &self.cells };
         let band = make_band(&stage, engine, sides, self.reaches)?;
         stage.finish();

@@ -6,34 +6,33 @@
 //! fine as the points, new points are put. They are looked for beside rims, and followed from there.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::f64::consts::PI;
 
 use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use super::oriented::{AT_ONCE, Numbered, OrientedCloud};
+use super::sided::Sided;
 use crate::error::Result;
-use crate::exec::{Engine, Stage, Workers};
+use crate::exec::{Engine, Hold, Stage, Workers};
 use crate::grid::{Box3, TriangleMesh};
 use crate::kernel::geometry::winding_number::WindingTree;
-use crate::kernel::points::height_field::plane_normal;
-use crate::kernel::points::orientation::{Link, orient};
+use crate::kernel::points::surfel::Surfel;
 use crate::kernel::topology::union_find::Forest;
 
-/// Neighbours that tell a normal, and those that are linked.
-const NEIGHBOURS: usize = 12;
 /// A cap is farther than so many edges of the square that a point has of the surface from all points.
 const BESIDE: f64 = 1.6;
 /// Beside a rim that far beyond a point, where no other point is as near as that, the surface would go on.
 const BEYOND: f64 = 2.2;
 /// Caps of more than so many new points for each of the cloud's are no caps.
 const MOST_NEW: usize = 3;
-/// Points or nodes that one thread takes at a time.
-const AT_ONCE: usize = 256;
 /// The border between inside and outside.
 const HALF: f64 = 0.5;
-/// Bytes a point takes: its place, twice, node, normal, links, facet and its place in the winding number's tree.
-const BYTES: u64 = 1200;
+/// Bytes a point takes: its facet and the place of that in the winding number's tree, and its share of nodes and caps.
+const BYTES: u64 = 800;
+/// So many of the points tell whether these have an inside, beside which the winding number is more than that.
+const SAMPLE: usize = 400;
+const INSIDE: f64 = 0.55;
 
 /// A hole that was closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +49,7 @@ pub struct Cap {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Closing {
     /// New points.
-    pub(super) points: Vec<[f64; 3]>,
+    pub(super) surfels: Vec<Surfel>,
     /// The holes they close, the widest first.
     pub(super) caps: Vec<Cap>,
 }
@@ -62,81 +61,63 @@ struct Place {
     /// From the nearest point.
     away: f64,
     area: f64,
+    /// Out of the body.
+    normal: DVec3,
 }
 
-type Numbered = GeomWithData<[f64; 3], u32>;
-
-/// Puts points over the holes of a cloud; none where it has no holes, or no sides.
-///
-/// # Errors
-/// When the memory is too little, or the run is interrupted.
-pub(super) fn close(engine: &Engine, points: &[[f64; 3]]) -> Result<Closing> {
-    let _held = engine.hold(points.len() as u64 * BYTES)?;
-    let stage = engine.stage("holes", points.len() as u64);
-    let numbered = points.iter().zip(0..).map(|(&p, n)| GeomWithData::new(p, n)).collect();
-    let tree = RTree::<Numbered>::bulk_load(numbered);
-    let around = Around::new(&stage, points, &tree)?;
-    let facets = facets(points, &around);
-    let (first, step) = (DVec3::from(points.first().copied().unwrap_or_default()), around.apart);
-    let mut lattice = Lattice { tree: &tree, winding: WindingTree::new(&facets), first, step, known: HashMap::new() };
-    let rims = lattice.rims(&stage, points, &around)?;
-    let places = lattice.places(&stage, rims, MOST_NEW * points.len())?;
-    stage.finish();
-    Ok(Closing { points: places.iter().map(|place| place.at.to_array()).collect(), caps: caps(&places, step) })
+/// The winding number of a cloud, and what it says of its holes.
+pub(super) struct Holes<'a> {
+    points: &'a [[f64; 3]],
+    sided: &'a Sided,
+    winding: WindingTree,
+    _held: Hold,
 }
 
-/// Normals of the points, turned to one side, and what part of the surface each has.
-struct Around {
-    normals: Vec<DVec3>,
-    areas: Vec<f64>,
-    /// Towards where each point has no neighbours, along the surface; unit length.
-    beyond: Vec<DVec3>,
-    /// The edge of the square that a point has of the surface, the median.
-    apart: f64,
-}
+impl<'a> Holes<'a> {
+    /// Of a cloud with its normals.
+    ///
+    /// # Errors
+    /// When the memory is too little.
+    pub(super) fn new(engine: &Engine, points: &'a [[f64; 3]], sided: &'a Sided) -> Result<Self> {
+        let held = engine.hold(points.len() as u64 * BYTES)?;
+        Ok(Self { points, sided, winding: WindingTree::new(&facets(points, &sided.cloud)), _held: held })
+    }
 
-impl Around {
-    fn new(stage: &Stage<'_>, points: &[[f64; 3]], tree: &RTree<Numbered>) -> Result<Self> {
-        let parts: Vec<&[[f64; 3]]> = points.chunks(AT_ONCE).collect();
-        let found = stage.run(&parts, &Workers::none(), |(), part| {
-            let told = |p: &[f64; 3]| {
-                let near: Vec<_> = tree.nearest_neighbor_iter(*p).take(NEIGHBOURS).collect();
-                let places: Vec<DVec3> = near.iter().map(|n| DVec3::from(*n.geom())).collect();
-                let radius = places.last().map_or(0.0, |last| last.distance(places[0]));
-                let numbers: Vec<u32> = near.iter().map(|n| n.data).collect();
-                let normal = plane_normal(&places, &[1.0; NEIGHBOURS][..places.len()]);
-                let others = places.iter().sum::<DVec3>() / places.len() as f64 - places[0];
-                let beyond = -(others - normal * others.dot(normal)).normalize_or_zero();
-                (normal, radius, numbers, beyond)
-            };
-            Ok(part.iter().map(told).collect::<Vec<_>>())
-        })?;
-        let found: Vec<_> = found.into_iter().flatten().collect();
-        let places: Vec<DVec3> = points.iter().map(|&p| DVec3::from(p)).collect();
-        let mut normals: Vec<DVec3> = found.iter().map(|(normal, ..)| *normal).collect();
-        let of = |a: u32, b: u32| {
-            let ends = [a.min(b), a.max(b)];
-            Link::between(ends, ends.map(|n| places[n as usize]), ends.map(|n| normals[n as usize]))
+    /// What part of some points have an inside on one side of them alone, as those of a body with holes have and those of a sheet, or
+    /// of thin parts whose normals do not tell their sides, have not. Told from a sample of them.
+    pub(super) fn share_of_body(&self, of: &[u32]) -> f64 {
+        let sample: Vec<usize> = of.iter().step_by(of.len().div_ceil(SAMPLE).max(1)).map(|&n| n as usize).collect();
+        let is_body = |&&n: &&usize| {
+            let (at, step) = (DVec3::from(self.points[n]), self.sided.cloud.normals[n] * self.sided.cloud.apart);
+            self.is_inside((at - step).to_array(), INSIDE) && !self.is_inside((at + step).to_array(), HALF)
         };
-        let links = (0..)
-            .zip(&found)
-            .flat_map(|(a, (_, _, near, _))| near.iter().filter(move |&&b| a != b).map(move |&b| (a, b)));
-        let links: Vec<Link> = links.map(|(a, b)| of(a, b)).collect();
-        orient(&places, &mut normals, links);
-        let areas: Vec<f64> = found.iter().map(|(_, radius, ..)| PI * radius * radius / NEIGHBOURS as f64).collect();
-        let mut sorted = areas.clone();
-        sorted.sort_by(f64::total_cmp);
-        Ok(Self {
-            normals,
-            areas,
-            beyond: found.iter().map(|(.., beyond)| *beyond).collect(),
-            apart: sorted.get(sorted.len() / 2).map_or(0.0, |area| area.sqrt()),
-        })
+        sample.iter().filter(is_body).count() as f64 / sample.len().max(1) as f64
+    }
+
+    /// Whether the winding number is more than that.
+    pub(super) fn is_inside(&self, at: [f64; 3], most: f64) -> bool {
+        self.winding.winding_number(at) > most
+    }
+
+    /// Puts points over the holes; none where there are none.
+    ///
+    /// # Errors
+    /// When the run is interrupted.
+    pub(super) fn close(&self, engine: &Engine) -> Result<Closing> {
+        let stage = engine.stage("holes", self.points.len() as u64);
+        let Sided { tree, cloud, .. } = self.sided;
+        let (first, step) = (DVec3::from(self.points.first().copied().unwrap_or_default()), cloud.apart);
+        let mut lattice = Lattice { tree, winding: &self.winding, first, step, known: HashMap::new() };
+        let rims = lattice.rims(&stage, self.points, cloud)?;
+        let places = lattice.places(&stage, rims, MOST_NEW * self.points.len())?;
+        stage.finish();
+        let surfels = places.iter().map(|place| Surfel { place: place.at, normal: place.normal }).collect();
+        Ok(Closing { surfels, caps: caps(&places, step) })
     }
 }
 
 /// A facet for each point: a triangle of its area, across its normal.
-fn facets(points: &[[f64; 3]], around: &Around) -> TriangleMesh {
+fn facets(points: &[[f64; 3]], around: &OrientedCloud) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for ((point, normal), area) in points.iter().zip(&around.normals).zip(&around.areas) {
         if normal.length_squared() < 0.5 {
@@ -158,7 +139,7 @@ fn facets(points: &[[f64; 3]], around: &Around) -> TriangleMesh {
 /// Where the winding number is asked: at the nodes of a lattice, from rims on along the border between the sides.
 struct Lattice<'a> {
     tree: &'a RTree<Numbered>,
-    winding: WindingTree,
+    winding: &'a WindingTree,
     first: DVec3,
     step: f64,
     /// How far from 1/2 it is where it was asked.
@@ -180,7 +161,7 @@ impl Lattice<'_> {
     }
 
     /// The cubes around places beside rims: where no points are though the surface would go on.
-    fn rims(&self, stage: &Stage<'_>, points: &[[f64; 3]], around: &Around) -> Result<Vec<[i64; 3]>> {
+    fn rims(&self, stage: &Stage<'_>, points: &[[f64; 3]], around: &OrientedCloud) -> Result<Vec<[i64; 3]>> {
         let numbers: Vec<usize> = (0..points.len()).collect();
         let parts: Vec<&[usize]> = numbers.chunks(AT_ONCE).collect();
         let found = stage.run(&parts, &Workers::none(), |(), part| {
@@ -243,7 +224,8 @@ impl Lattice<'_> {
                     let at = a + (b - a) * (from / (from - to));
                     let away = self.away(at);
                     if away > BESIDE * self.step {
-                        found.push(((node, axis), Place { at, away, area: self.area(at) }));
+                        let (area, normal) = self.facet(at);
+                        found.push(((node, axis), Place { at, away, area, normal }));
                     }
                 }
             }
@@ -252,12 +234,12 @@ impl Lattice<'_> {
     }
 
     /// The area that one crossing of the border with the lattice's lines stands for: a border with the unit normal n has
-    /// |n| of each axis over the step squared of them.
-    fn area(&self, at: DVec3) -> f64 {
+    /// |n| of each axis over the step squared of them. And n.
+    fn facet(&self, at: DVec3) -> (f64, DVec3) {
         let step = 0.5 * self.step;
         let slope = DVec3::AXES.map(|axis| self.side(at + axis * step) - self.side(at - axis * step));
-        let normal = DVec3::from(slope).normalize_or(DVec3::ONE.normalize());
-        self.step.powi(2) / normal.abs().element_sum()
+        let normal = -DVec3::from(slope).normalize_or(DVec3::ONE.normalize());
+        (self.step.powi(2) / normal.abs().element_sum(), normal)
     }
 }
 

@@ -5,13 +5,16 @@
 
 use std::f64::consts::PI;
 
+/// What is said of a cloud in a plane.
+pub(super) const IN_ONE_PLANE: &str = "in one plane";
+
 /// Where all points lie, as far as `within` does not matter: "on one line", "in one plane", or none of both.
 #[must_use]
 pub(super) fn flat(points: &[[f64; 3]], within: f64) -> Option<&'static str> {
     let [smallest, middle, _] = widths(points)?;
     match (smallest < within, middle < within) {
         (_, true) => Some("on one line"),
-        (true, false) => Some("in one plane"),
+        (true, false) => Some(IN_ONE_PLANE),
         (false, false) => None,
     }
 }

@@ -4,6 +4,7 @@
 //! cloud -> grid -> points without noise -> distance -> flood -> band -> time loop -> u -> surface -> mesh, measures
 //! ```
 
+mod begun;
 mod caps;
 #[cfg(test)]
 mod ended;
@@ -13,9 +14,12 @@ mod grid;
 mod isolated;
 mod noise;
 mod on_grid;
+mod oriented;
 mod output;
 mod settings;
+mod sided;
 mod spacing;
+mod trimming;
 
 pub use caps::Cap;
 pub use estimate::{Estimate, estimate, plan, refuse_too_fine, spacing_memory};

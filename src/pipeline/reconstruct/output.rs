@@ -2,18 +2,19 @@
 
 use std::fmt;
 
-use super::caps::{Cap, Closing, close};
+use super::begun::{Begun, enclosed};
+use super::caps::Cap;
 use super::estimate::{BUFFERS, WRITING, begin, boxes};
-use super::flat::flat;
 use super::noise::{Noise, without_noise};
 use super::on_grid::OnGrid;
 use super::settings::ReconstructSettings;
+use super::sided::Sided;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Hold, SelfComm, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
 use crate::kernel::surface::{Hausdorff, Measures, Spread};
-use crate::pipeline::enclosure::search::{Deepest, Enclosure, Found, Hole, Search, Start, enclose, first_reach_for};
+use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::enclosure::sheets::{Company, hold_sheets};
 use crate::pipeline::level_set::band::Band;
 use crate::pipeline::level_set::growing::Growing;
@@ -26,14 +27,8 @@ use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 /// Points farther from the solved surface than so many largest spacings have been left by it.
 const LEFT_VOXELS: f64 = 0.6;
 
-/// Where more of the points than this part have one side all around them, holes are looked for that let it in.
-const MOST_SHEET: f64 = 0.02;
-
 /// A point may be so many deviations of the noise off the surface.
 const OF_NOISE: f64 = 3.0;
-
-/// A cloud that is no thicker than this part of a spacing, root mean square, is flat.
-const FLAT_VOXELS: f64 = 0.1;
 
 /// What a reconstruction found.
 pub struct Reconstruction {
@@ -55,6 +50,8 @@ pub struct Reconstruction {
     pub band_voxels: u64,
     /// How the time loop ended.
     pub evolution: Evolution,
+    /// The area that was cut off because no points support it; none where that was not asked for.
+    pub trimmed: Option<f64>,
     /// The surface's measures.
     pub measures: Measures,
     /// Distances of the points from the surface.
@@ -161,7 +158,8 @@ pub fn reconstruct_shown(
     let (smooth, noise) = without_noise(engine, cloud, settings.noise)?;
     // The surface is that of the smooth points; what is measured is how far it is from those that were given.
     let points = smooth.as_deref().unwrap_or(cloud);
-    let Begun { enclosure, closed, caps } = enclosed(engine, grid, points, settings)?;
+    let sided = if settings.open { Some(Sided::new(&engine.by_itself(), points)?) } else { None };
+    let Begun { enclosure, closed, caps } = enclosed(engine, grid, points, settings, sided.as_ref())?;
     let points = closed.as_deref().unwrap_or(points);
     let (geometry, hole, spaces) = (enclosure.geometry.clone(), enclosure.hole(), enclosure.spaces());
     let window = enclosure.window;
@@ -176,8 +174,12 @@ pub fn reconstruct_shown(
     let is_first = engine.comm().rank() == 0;
     let lost_beyond =
         geometry.max_spacing() + noise.deviation.filter(|_| noise.moved > 0).map_or(0.0, |d| OF_NOISE * d);
-    let drawn = if is_first { draw(engine, (&band, &geometry), (cloud, lost_beyond), mesh)? } else { Drawn::default() };
-    let Drawn { measures, hausdorff, spread, lost_points } = drawn;
+    let drawn = if is_first {
+        draw(engine, (&band, &geometry), (cloud, lost_beyond), (mesh, sided.as_ref()))?
+    } else {
+        Drawn::default()
+    };
+    let Drawn { measures, trimmed, hausdorff, spread, lost_points } = drawn;
     if is_first && (measures.triangles == 0 || lost_points == cloud.len() as u64) {
         return Err(vanished(settings, grid, larger_beta));
     }
@@ -194,6 +196,7 @@ pub fn reconstruct_shown(
         sheet_points: sheet.len() as u64,
         band_voxels: band.voxels,
         evolution,
+        trimmed: settings.open.then_some(trimmed),
         measures,
         hausdorff,
         spread,
@@ -209,67 +212,19 @@ fn draw(
     engine: &Engine,
     (band, geometry): (&Band, &Geometry),
     cloud: (&[[f64; 3]], f64),
-    mesh: &mut dyn MeshSink,
+    (mesh, sided): (&mut dyn MeshSink, Option<&Sided>),
 ) -> Result<Drawn> {
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
-    let drawn = surface::draw(&stage, &band.u, geometry, cloud, mesh)?;
+    let drawn = match sided {
+        Some(sided) => {
+            let trimming = sided.trimming(geometry);
+            surface::draw_trimmed(&stage, &band.u, geometry, cloud, mesh, &|patch| trimming.trim(patch))?
+        }
+        None => surface::draw(&stage, &band.u, geometry, cloud, mesh)?,
+    };
     stage.finish();
     Ok(drawn)
-}
-
-/// What a search starts from, and what was found.
-struct Begun {
-    enclosure: Box<Enclosure>,
-    /// The points that close the cloud, behind its own.
-    closed: Option<Vec<[f64; 3]>>,
-    caps: Vec<Cap>,
-}
-
-/// What the cloud encloses: as it is where that is told near it, else with caps over its holes, else as far from it as is needed.
-fn enclosed(engine: &Engine, grid: &Geometry, cloud: &[[f64; 3]], settings: &ReconstructSettings) -> Result<Begun> {
-    let search = Search {
-        grid,
-        cloud,
-        method: settings.method,
-        beta: settings.beta,
-        start: Start::Watershed,
-        first_reach: first_reach_for(grid, settings.beta),
-        only_near: true,
-        suffix: "",
-    };
-    let begun = |enclosure, closed, caps| Ok(Begun { enclosure, closed, caps });
-    let mut found = enclose(engine, &search)?;
-    let most = MOST_SHEET * cloud.len() as f64;
-    let lost = match &found {
-        Found::Open => Some(usize::MAX),
-        Found::Enclosed(enclosure) => Some(enclosure.sheet().len()).filter(|&lost| lost as f64 > most),
-        _ => None,
-    };
-    if let Some(lost) = lost.filter(|_| settings.beta.is_none()) {
-        let Closing { points, caps } = close(&engine.by_itself(), cloud)?;
-        if !points.is_empty() {
-            let closed = [cloud, &points].concat();
-            let search = Search { cloud: &closed, suffix: " with caps", ..search };
-            if let Found::Enclosed(enclosure) = enclose(engine, &search)?
-                && enclosure.sheet().len() < lost / 2
-            {
-                return begun(enclosure, Some(closed), caps);
-            }
-        }
-    }
-    if matches!(found, Found::Open) {
-        found = enclose(engine, &Search { only_near: false, suffix: " farther", ..search })?;
-    }
-    match found {
-        Found::Enclosed(enclosure) => begun(enclosure, None, Vec::new()),
-        Found::Leaks(deepest) => Err(flat_cloud(grid, cloud).unwrap_or_else(|| leaks(settings, grid, &deepest))),
-        Found::Nothing(deepest) => {
-            let nothing = || encloses_nothing(settings, grid, deepest.as_ref());
-            Err(flat_cloud(grid, cloud).unwrap_or_else(nothing))
-        }
-        Found::Open => Err(encloses_nothing(settings, grid, None)),
-    }
 }
 
 /// Moves the surface until it rests, and again where it left points that it should not; `sheet` gets these.
@@ -281,6 +236,10 @@ fn solve(
     (band, sheet): (&mut Band, &mut Vec<u32>),
     mut growing: Option<&mut Growing<'_>>,
 ) -> Result<Evolution> {
+    if band.voxels == 0 {
+        let stopped_by = "no-steps".into();
+        return Ok(Evolution { steps: 0, sor_iterations: 0, stopped_by, residual: 0.0, residuals: Vec::new() });
+    }
     let stage = engine.resumable_stage("level set", 0);
     stage.voxels(band.voxels);
     let time_loop = settings.motion.time_loop(geometry);
@@ -308,46 +267,6 @@ fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]]
     let is_lost = |(_, off): &(u32, &Option<f64>)| off.is_some_and(|off| off > LEFT_VOXELS * geometry.max_spacing());
     let lost: Vec<u32> = (0..).zip(&off).filter(is_lost).map(|(point, _)| point).collect();
     hold_sheets(&SelfComm, geometry, cloud, &lost, Company::AT_THE_END, band)
-}
-
-/// What is said of a cloud that no setting gives an inside.
-fn flat_cloud(grid: &Geometry, cloud: &[[f64; 3]]) -> Option<Error> {
-    let place = flat(cloud, FLAT_VOXELS * grid.min_spacing())?;
-    Some(Error::input(format!(
-        "the points enclose nothing: all of them lie {place}, which has no inside; give points of all sides of the body"
-    )))
-}
-
-fn leaks(settings: &ReconstructSettings, grid: &Geometry, deepest: &Deepest) -> Error {
-    let beta = settings.beta.unwrap_or_default();
-    let larger = deepest.beta().map_or(String::new(), |beta| format!(", or give --beta {beta}"));
-    Error::input(format!(
-        "with --beta {beta} the start leaks through {}; leave --beta out{larger}",
-        hole_of(&deepest.hole, grid)
-    ))
-}
-
-fn hole_of(hole: &Hole, grid: &Geometry) -> String {
-    let place = digits::place(hole.place, grid.min_spacing());
-    format!("a hole {} wide at {place}", digits::number(hole.width))
-}
-
-fn encloses_nothing(settings: &ReconstructSettings, grid: &Geometry, deepest: Option<&Deepest>) -> Error {
-    let spacing = digits::number(grid.min_spacing());
-    let with = settings.beta.map_or(String::new(), |beta| format!(" with --beta {beta}"));
-    let Some((deepest, beta)) = deepest.and_then(|deepest| Some((deepest, deepest.beta()?))) else {
-        return Error::input(format!(
-            "the points enclose nothing at the spacing {spacing}{with}: outside reaches everywhere; give points of all \
-             sides of the body, or a finer --spacing if they lie denser than that"
-        ));
-    };
-    let depth = digits::number(deepest.depth);
-    let hole = hole_of(&deepest.hole, grid);
-    Error::input(format!(
-        "the points enclose nothing at the spacing {spacing}{with}: the deepest space is {depth} deep, which has {hole}, and \
-         a space has to be deeper than its hole is wide; give --beta {beta} if the body is that thin, else points of all \
-         sides of it, or a finer --spacing if they lie denser than that"
-    ))
 }
 
 fn vanished(settings: &ReconstructSettings, grid: &Geometry, larger_beta: Option<f64>) -> Error {

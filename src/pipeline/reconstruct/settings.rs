@@ -17,6 +17,8 @@ pub struct ReconstructSettings {
     pub beta: Option<f64>,
     /// The standard deviation of the points from the surface, 0 to take all as they are; found when none.
     pub noise: Option<f64>,
+    /// Whether the surface ends where the points do; else it is closed.
+    pub open: bool,
     /// Whether fields are written on the grid as it was given; else on a box of it around what is found.
     pub keeps_grid: bool,
 }
@@ -31,6 +33,7 @@ impl Default for ReconstructSettings {
             motion: Motion { rho: 0.0, stop: REST, ..Motion::default() },
             beta: None,
             noise: None,
+            open: false,
             keeps_grid: false,
         }
     }

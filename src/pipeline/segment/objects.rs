@@ -217,7 +217,7 @@ fn draw(
         second: meshes.map(|meshes| meshes.begin(label, geometry)).transpose()?,
     };
     let points = marks.contours.concat();
-    let Drawn { measures, hausdorff, spread, lost_points } =
+    let Drawn { measures, hausdorff, spread, lost_points, .. } =
         surface::draw(&stage, u, geometry, (&points, geometry.max_spacing()), &mut mesh)?;
     stage.voxels(solution.band_voxels);
     stage.finish();

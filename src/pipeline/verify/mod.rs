@@ -59,7 +59,9 @@ pub fn verify(engine: &Engine, store: &Path, tell: &mut dyn FnMut(Check)) -> Res
             }
         }
         "reconstruct" => {
-            tell(surface::check(engine, store, "meshes/surface.ply", of("").map(DrawnFrom::LevelSet), result)?);
+            // The rim of an open surface lies where the points end.
+            let level_set = of("").filter(|_| report["settings"]["open"] != true).map(DrawnFrom::LevelSet);
+            tell(surface::check(engine, store, "meshes/surface.ply", level_set, result)?);
         }
         "middle" if report["settings"]["surface"] == "walls" => {
             let bounded = report["settings"]["background"] == true;

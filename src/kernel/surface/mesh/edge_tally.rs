@@ -17,13 +17,10 @@ pub struct EdgeTally {
 }
 
 impl EdgeTally {
-    /// Counts the three edges of a triangle; an edge from a vertex to itself is none.
-    pub fn add(&mut self, [a, b, c]: [u32; 3]) {
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            if from != to {
-                self.walk(from, to);
-            }
-        }
+    /// Counts the three edges of a triangle, from each corner to the next; an edge from a vertex to itself is none. Of each is told
+    /// whether it waits from now on (1), closes one that waited (-1), or is none (0).
+    pub fn add(&mut self, [a, b, c]: [u32; 3]) -> [i8; 3] {
+        [(a, b), (b, c), (c, a)].map(|(from, to)| if from == to { 0 } else { self.walk(from, to) })
     }
 
     /// Forgets edges that no later triangle has: those of which an end is none of some vertices, in order of their numbers. If their
@@ -45,17 +42,19 @@ impl EdgeTally {
         Growing::of_table(&self.waiting, self.most)
     }
 
-    fn walk(&mut self, from: u32, to: u32) {
+    fn walk(&mut self, from: u32, to: u32) -> i8 {
         if let Some(count) = self.waiting.get_mut(&(to, from)) {
             self.open -= 1;
             *count -= 1;
             if *count == 0 {
                 self.waiting.remove(&(to, from));
             }
+            -1
         } else {
             self.open += 1;
             *self.waiting.entry((from, to)).or_insert(0) += 1;
             self.most = self.most.max(self.waiting.len());
+            1
         }
     }
 }

@@ -16,6 +16,8 @@ pub struct SurfaceMeasure {
     moment24: DVec3,
     /// Twice the area.
     area2: f64,
+    /// The length of the edges that wait.
+    rim: f64,
     triangles: u64,
     edges: EdgeTally,
     components: Components,
@@ -32,6 +34,8 @@ pub struct Measures {
     pub area: f64,
     /// Number of edges that no second triangle closes.
     pub open_edges: u64,
+    /// The length of these edges.
+    pub rim: f64,
     /// Number of connected pieces.
     pub components: u64,
     /// Number of triangles.
@@ -58,6 +62,7 @@ impl SurfaceMeasure {
             volume6: 0.0,
             moment24: DVec3::ZERO,
             area2: 0.0,
+            rim: 0.0,
             triangles: 0,
             edges: EdgeTally::default(),
             components: Components::default(),
@@ -73,7 +78,9 @@ impl SurfaceMeasure {
         self.moment24 += volume6 * (a + b + c);
         self.area2 += (b - a).cross(c - a).length();
         self.triangles += 1;
-        self.edges.add(corners);
+        for (n, waits) in self.edges.add(corners).into_iter().enumerate() {
+            self.rim += f64::from(waits) * [a, b, c][n].distance([b, c, a][n]);
+        }
         self.components.add(corners);
     }
 
@@ -99,6 +106,8 @@ impl SurfaceMeasure {
             centroid: <[f64; 3]>::from(if centroid.is_finite() { centroid } else { self.centre }),
             area: self.area2 / 2.0,
             open_edges: self.edges.open(),
+            // What rounding leaves of edges that came and went is no rim.
+            rim: if self.edges.open() == 0 { 0.0 } else { self.rim },
             components: self.components.count(),
             triangles: self.triangles,
             vertices: self.components.vertices(),
@@ -126,6 +135,13 @@ mod tests {
         // Three right triangles and the slanted one: 1 + 1.5 + 3 + sqrt(36 + 9 + 4) / 2.
         assert!((found.area - 9.0).abs() < 1e-12);
         assert!(found.is_closed());
-        assert_eq!((found.components, found.triangles, found.vertices), (1, 4, 4));
+        assert_eq!((found.components, found.triangles, found.vertices, found.rim), (1, 4, 4, 0.0));
+        let mut open = SurfaceMeasure::new([4_096_000.5; 3]);
+        for triangle in [[0_u32, 2, 1], [0, 1, 3], [0, 3, 2]] {
+            open.add(triangle, triangle.map(|v| corners[v as usize].map(|x: f64| x + offset)));
+        }
+        // The slanted one is missing.
+        let rim = 5f64.sqrt() + 13f64.sqrt() + 10f64.sqrt();
+        assert!((open.measures().rim - rim).abs() < 1e-8 && open.measures().open_edges == 3);
     }
 }

@@ -1,0 +1,187 @@
+//! What a reconstruction begins with: the search for what the cloud encloses, as it is, with caps, farther from it; and what is said
+//! where there is nothing.
+
+use super::caps::{Cap, Closing, Holes};
+use super::flat::{IN_ONE_PLANE, flat};
+use super::settings::ReconstructSettings;
+use super::sided::Sided;
+use crate::error::{Error, Result};
+use crate::exec::Engine;
+use crate::grid::{Geometry, digits};
+use crate::pipeline::enclosure::region::voxel_bounds;
+use crate::pipeline::enclosure::search::{
+    Deepest, Enclosure, Found, Hole, Search, Start, enclose, face, first_reach_for,
+};
+
+/// Where more of the points than this part have one side all around them, holes are looked for that let it in.
+const MOST_SHEET: f64 = 0.02;
+
+/// Caps are put over the holes of a cloud of which so many of the points in doubt have an inside.
+const LEAST_BODY: f64 = 0.5;
+
+/// Far from the points an inside is looked for in boxes of so many voxels at most: it takes all of the box.
+const FARTHER_VOXELS: u64 = 4 << 20;
+
+/// A cloud that is no thicker than this part of a spacing, root mean square, is flat.
+const FLAT_VOXELS: f64 = 0.1;
+
+/// What a search starts from, and what was found.
+pub(super) struct Begun {
+    pub(super) enclosure: Box<Enclosure>,
+    /// The points that close the cloud, behind its own.
+    pub(super) closed: Option<Vec<[f64; 3]>>,
+    pub(super) caps: Vec<Cap>,
+}
+
+impl Begun {
+    fn of(enclosure: Box<Enclosure>) -> Self {
+        Self { enclosure, closed: None, caps: Vec::new() }
+    }
+}
+
+/// What the cloud encloses: as it is where that is told near it, else with caps over its holes, else as far from it as is needed.
+///
+/// # Errors
+/// When it encloses nothing, the memory is too little, scratch runs out, or the run is interrupted.
+pub(super) fn enclosed(
+    engine: &Engine,
+    grid: &Geometry,
+    cloud: &[[f64; 3]],
+    settings: &ReconstructSettings,
+    sided: Option<&Sided>,
+) -> Result<Begun> {
+    let search = Search {
+        grid,
+        cloud,
+        method: settings.method,
+        beta: settings.beta,
+        start: Start::Watershed,
+        first_reach: first_reach_for(grid, settings.beta),
+        only_near: true,
+        suffix: "",
+    };
+    let found = enclose(engine, &search)?;
+    let most = MOST_SHEET * cloud.len() as f64;
+    let is_in_doubt = match &found {
+        Found::Open => true,
+        Found::Enclosed(enclosure) => enclosure.sheet().len() as f64 > most,
+        _ => false,
+    };
+    if !is_in_doubt || settings.beta.is_some() {
+        return as_it_is(settings, &search, found);
+    }
+    if let Some(sided) = sided {
+        let search = Search { suffix: " of sides", ..search };
+        return Ok(Begun::of(face(engine, &search, &sided.surfels, &|_| false)?));
+    }
+    let lost: Vec<u32> = match &found {
+        Found::Enclosed(enclosure) => enclosure.sheet().to_vec(),
+        _ => (0..cloud.len() as u32).collect(),
+    };
+    if let Some(begun) = closed(engine, &search, (&found, &lost))? {
+        return Ok(begun);
+    }
+    let found = match found {
+        Found::Open if voxels_of_box(grid, cloud) <= FARTHER_VOXELS => {
+            enclose(engine, &Search { only_near: false, suffix: " farther", ..search })?
+        }
+        found => found,
+    };
+    as_it_is(settings, &search, found)
+}
+
+/// What a search gave, as it is.
+fn as_it_is(settings: &ReconstructSettings, search: &Search<'_>, found: Found) -> Result<Begun> {
+    let Search { grid, cloud, .. } = *search;
+    let flat = || flat_cloud(settings, grid, cloud);
+    Err(match found {
+        Found::Enclosed(enclosure) => return Ok(Begun::of(enclosure)),
+        Found::Leaks(deepest) => flat().unwrap_or_else(|| leaks(settings, grid, &deepest)),
+        Found::Nothing(deepest) => flat().unwrap_or_else(|| encloses_nothing(settings, grid, deepest.as_ref())),
+        Found::Open => flat().unwrap_or_else(|| encloses_nothing(settings, grid, None)),
+    })
+}
+
+/// The cloud with caps over its holes, if it is a body that is open there: as a search near both finds it where that leaves half as many
+/// points without two sides, else, for one that nothing was found of, with the sides that the points and the caps have.
+fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32])) -> Result<Option<Begun>> {
+    let cloud = search.cloud;
+    let alone = &*engine.by_itself();
+    let sided = Sided::new(alone, cloud)?;
+    let holes = Holes::new(alone, cloud, &sided)?;
+    if holes.share_of_body(lost) < LEAST_BODY {
+        return Ok(None);
+    }
+    let Closing { surfels, caps } = holes.close(alone)?;
+    if surfels.is_empty() && !matches!(found, Found::Open) {
+        return Ok(None);
+    }
+    let new = surfels.iter().map(|surfel| surfel.place.to_array());
+    let closed: Vec<[f64; 3]> = cloud.iter().copied().chain(new).collect();
+    let with_caps = Search { cloud: &closed, suffix: " with caps", ..*search };
+    if let Found::Enclosed(enclosure) = enclose(engine, &with_caps)?
+        && 2 * enclosure.sheet().len() < lost.len()
+    {
+        return Ok(Some(Begun { enclosure, closed: Some(closed), caps }));
+    }
+    if !matches!(found, Found::Open) {
+        return Ok(None);
+    }
+    let surfels = [&sided.surfels[..], &surfels].concat();
+    let search = Search { suffix: " of sides", ..with_caps };
+    let enclosure = face(engine, &search, &surfels, &|at| holes.is_inside(at, 0.5))?;
+    Ok(Some(Begun { enclosure, closed: Some(closed), caps }))
+}
+
+/// The voxels of the box around a cloud.
+fn voxels_of_box(grid: &Geometry, cloud: &[[f64; 3]]) -> u64 {
+    voxel_bounds(cloud, grid).volume()
+}
+
+/// What is said of a cloud that no setting gives an inside.
+fn flat_cloud(settings: &ReconstructSettings, grid: &Geometry, cloud: &[[f64; 3]]) -> Option<Error> {
+    let place = flat(cloud, FLAT_VOXELS * grid.min_spacing())?;
+    Some(Error::input(format!(
+        "the points enclose nothing: all of them lie {place}, which has no inside; give points of all sides of the body{}",
+        if place == IN_ONE_PLANE { or_open(settings) } else { "" }
+    )))
+}
+
+/// What else there is to do.
+fn or_open(settings: &ReconstructSettings) -> &'static str {
+    if settings.open { "" } else { ", or --open for a surface that ends where the points do" }
+}
+
+fn leaks(settings: &ReconstructSettings, grid: &Geometry, deepest: &Deepest) -> Error {
+    let beta = settings.beta.unwrap_or_default();
+    let larger = deepest.beta().map_or(String::new(), |beta| format!(", or give --beta {beta}"));
+    Error::input(format!(
+        "with --beta {beta} the start leaks through {}; leave --beta out{larger}",
+        hole_of(&deepest.hole, grid)
+    ))
+}
+
+fn hole_of(hole: &Hole, grid: &Geometry) -> String {
+    let place = digits::place(hole.place, grid.min_spacing());
+    format!("a hole {} wide at {place}", digits::number(hole.width))
+}
+
+fn encloses_nothing(settings: &ReconstructSettings, grid: &Geometry, deepest: Option<&Deepest>) -> Error {
+    let spacing = digits::number(grid.min_spacing());
+    let with = settings.beta.map_or(String::new(), |beta| format!(" with --beta {beta}"));
+    let Some((deepest, beta)) = deepest.and_then(|deepest| Some((deepest, deepest.beta()?))) else {
+        return Error::input(format!(
+            "the points enclose nothing at the spacing {spacing}{with}: outside reaches everywhere; give points of all \
+             sides of the body, or a finer --spacing if they lie denser than that{}",
+            or_open(settings)
+        ));
+    };
+    let depth = digits::number(deepest.depth);
+    let hole = hole_of(&deepest.hole, grid);
+    Error::input(format!(
+        "the points enclose nothing at the spacing {spacing}{with}: the deepest space is {depth} deep, which has {hole}, and \
+         a space has to be deeper than its hole is wide; give --beta {beta} if the body is that thin, else points of all \
+         sides of it, or a finer --spacing if they lie denser than that{}",
+        or_open(settings)
+    ))
+}

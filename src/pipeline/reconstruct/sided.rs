@@ -1,0 +1,51 @@
+//! The points of a cloud with their normals, found again by their place: what an open surface is made of and trimmed by.
+
+use rstar::RTree;
+
+use super::estimate::spacing_memory;
+use super::oriented::{Numbered, OrientedCloud, numbered};
+use super::spacing::typical_spacing;
+use super::trimming::Trimming;
+use crate::error::Result;
+use crate::exec::{Engine, Hold};
+use crate::grid::Geometry;
+use crate::kernel::points::surfel::Surfel;
+
+/// Bytes a point takes: its place and number in two trees, its normal, and its links until all normals are turned.
+const BYTES: u64 = 1000;
+
+/// A cloud with its normals.
+pub(super) struct Sided {
+    pub(super) tree: RTree<Numbered>,
+    pub(super) cloud: OrientedCloud,
+    /// By number.
+    pub(super) surfels: Vec<Surfel>,
+    spacing: f64,
+    _held: Hold,
+}
+
+impl Sided {
+    /// Finds the normals of a cloud.
+    ///
+    /// # Errors
+    /// When the memory is too little, or the run is interrupted.
+    pub(super) fn new(engine: &Engine, points: &[[f64; 3]]) -> Result<Self> {
+        let held = engine.hold(points.len() as u64 * BYTES.max(spacing_memory(1)))?;
+        let stage = engine.stage("normals", points.len() as u64);
+        let tree = numbered(points);
+        let cloud = OrientedCloud::new(&stage, points, &tree)?;
+        stage.finish();
+        Ok(Self {
+            surfels: cloud.surfels(points),
+            tree,
+            cloud,
+            spacing: typical_spacing(points).unwrap_or(0.0),
+            _held: held,
+        })
+    }
+
+    /// What trims a surface on a grid.
+    pub(super) fn trimming<'a>(&'a self, geometry: &'a Geometry) -> Trimming<'a> {
+        Trimming { tree: &self.tree, surfels: &self.surfels, spacing: self.spacing, geometry }
+    }
+}
