@@ -17,7 +17,7 @@ use lab::{Lab, PlainGrid, dense, whole};
 use plain_scheme::{PlainVelocity, coefficients, gradient_norms};
 use strandline::kernel::level_set::cell::CELL;
 use strandline::kernel::level_set::scheme::velocity::Velocity;
-use strandline::pipeline::level_set::band::{Reaches, make_band};
+use strandline::pipeline::level_set::band::{Reaches, SidesNear, make_band};
 use strandline::pipeline::level_set::evolve::evolve;
 use strandline::pipeline::level_set::time_loop::{Stop, TimeLoop};
 
@@ -128,8 +128,9 @@ fn ours(scene: &Scene, threads: usize, tolerance: f64) -> Cost {
     let inside: Vec<u8> = scene.level.iter().map(|level| u8::from(*level < 3.0)).collect();
     let (distance, inside, g) = (lab.field(&set, &scene.d), lab.field(&set, &inside), lab.field(&set, &scene.g));
     let stage = lab.engine.stage("band", 0);
+    let sides = SidesNear { distance: &distance, inside: &inside, cells: &set };
     let reaches = Reaches { inner: HALF as f32, outer: HALF as f32 };
-    let mut band = make_band(&stage, &lab.engine, &distance, &inside, reaches).expect("room for a band");
+    let mut band = make_band(&stage, &lab.engine, sides, reaches).expect("room for a band");
     let edges = lab.field(&band.solved.set().clone(), &whole(&g));
     let velocity = Velocity {
         theta: VELOCITY.theta as f32,

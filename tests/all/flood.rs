@@ -9,6 +9,7 @@ use proptest::prelude::*;
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use strandline::kernel::level_set::initial::persistence::PERSISTENCE;
 use strandline::pipeline::distance::{Method, Sources, cloud_distance};
+use strandline::pipeline::enclosure::near::Near;
 use strandline::pipeline::enclosure::tagging::{Basin, Tagging, tag};
 
 use crate::common::clouds::{grid_around, sphere, sponge};
@@ -99,8 +100,8 @@ fn flood(lab: &Lab, set: &Arc<BrickSet>, d: &[f32], farthest: f32) -> Tagging {
     let sources = Sources::cloud(&geometry, &[], &bins);
     let mut distance = lab.field(set, d);
     (0..set.grid().len()).for_each(|id| distance.set_absent(id, farthest));
-    tag(&lab.engine.stage("tagging", 0), &lab.engine, &sources, &distance, PERSISTENCE, |_| true)
-        .expect("room in scratch")
+    let near = Near { distance: &distance, cells: set };
+    tag(&lab.engine.stage("tagging", 0), &lab.engine, &sources, near, PERSISTENCE, |_| true).expect("room in scratch")
 }
 
 /// Flood and basins as the plain programs find them; a place is one where the flood may enter.
@@ -140,7 +141,8 @@ fn flood_of_cloud(lab: &Lab, geometry: &Geometry, cloud: &[[f64; 3]], farthest: 
     let stage = lab.engine.stage("start", 0);
     let farthest = farthest.unwrap_or(f32::INFINITY);
     let distance = cloud_distance(&stage, &lab.engine, &sources, &set, Method::FSM, farthest).expect("room in scratch");
-    let tagging = tag(&stage, &lab.engine, &sources, &distance, PERSISTENCE, |_| true).expect("room in scratch");
+    let tagging = tag(&stage, &lab.engine, &sources, Near { distance: &distance, cells: &set }, PERSISTENCE, |_| true)
+        .expect("room in scratch");
     (whole(&distance), tagging)
 }
 

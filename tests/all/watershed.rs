@@ -7,6 +7,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use strandline::grid::{BrickGrid, BrickSet, Geometry, PointBins};
 use strandline::pipeline::distance::{Method, Sources, cloud_distance};
+use strandline::pipeline::enclosure::near::Near;
 use strandline::pipeline::enclosure::watershed::{Sides, watershed};
 
 use crate::common::clouds::{grid_around, sphere};
@@ -105,7 +106,8 @@ fn sides_of(lab: &Lab, set: &Arc<BrickSet>, d: &[f32], farthest: f32) -> Sides {
     let sources = Sources::cloud(&geometry, &[], &bins);
     let mut distance = lab.field(set, d);
     (0..set.grid().len()).for_each(|id| distance.set_absent(id, farthest));
-    watershed(&lab.engine.stage("tagging", 0), &lab.engine, &sources, &distance, None).expect("room in scratch")
+    let near = Near { distance: &distance, cells: set };
+    watershed(&lab.engine.stage("tagging", 0), &lab.engine, &sources, near, None).expect("room in scratch")
 }
 
 proptest! {
@@ -155,7 +157,8 @@ fn sides_of_cloud(cloud: &[[f64; 3]], h: f64, farthest: f64) -> (Geometry, Sides
     let stage = lab.engine.stage("start", 0);
     let distance =
         cloud_distance(&stage, &lab.engine, &sources, &set, Method::VDT, farthest as f32).expect("room in scratch");
-    let sides = watershed(&stage, &lab.engine, &sources, &distance, None).expect("room in scratch");
+    let sides = watershed(&stage, &lab.engine, &sources, Near { distance: &distance, cells: distance.set() }, None)
+        .expect("room in scratch");
     (geometry, sides)
 }
 

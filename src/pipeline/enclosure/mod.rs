@@ -2,7 +2,8 @@
 
 mod facing;
 pub(crate) mod far_regions;
-mod near;
+mod found;
+pub mod near;
 pub(crate) mod needs;
 pub(crate) mod pockets;
 pub mod region;
