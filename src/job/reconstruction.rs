@@ -20,7 +20,7 @@ use crate::pipeline::limits::{ABOVE_ZERO, check_given};
 use crate::pipeline::output::viewer_mesh::Segments;
 use crate::pipeline::reconstruct;
 use crate::pipeline::reconstruct::{
-    ReconstructSettings, estimate, grid_for, refuse_too_fine, typical_spacing, without_isolated,
+    ReconstructSettings, Vertices, estimate, grid_for, refuse_too_fine, typical_spacing, without_isolated,
 };
 use crate::store::MeshSink;
 
@@ -107,6 +107,13 @@ impl<'a> Reconstruction<'a> {
     /// out.
     pub fn noise(mut self, deviation: f64) -> Self {
         self.settings.noise = Some(deviation);
+        self
+    }
+
+    /// Where the mesh has its vertices; where this is left out, where the points have the surface, unless a surface is asked for that leaves
+    /// them (a smaller `theta`, a larger `delta`).
+    pub fn vertices(mut self, vertices: Vertices) -> Self {
+        self.settings.vertices = Some(vertices);
         self
     }
 

@@ -39,6 +39,7 @@ mod ranks;
 mod ranks_jobs;
 mod reconstruct;
 mod reconstruct_cli;
+mod reconstruct_vertices;
 mod surfaces;
 mod travel_times;
 mod triangle_distance;

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::common::{DistanceArgs, MotionArgs, OutputArgs, ResourceArgs};
 use super::grid::GridBoxArgs;
-use super::values::parse_spacing;
+use super::values::{VerticesArg, parse_spacing};
 
 /// Reconstruct a closed surface from a point cloud, without normals.
 #[derive(Clone, Debug, Args)]
@@ -18,6 +18,8 @@ pub(crate) struct ReconstructArgs {
     pub(crate) grid: CloudGridArgs,
     #[command(flatten)]
     pub(crate) points: PointArgs,
+    #[command(flatten)]
+    pub(crate) surface: SurfaceArgs,
     #[command(flatten)]
     pub(crate) motion: MotionArgs,
     #[command(flatten)]
@@ -41,6 +43,16 @@ pub(crate) struct PointArgs {
     /// Standard deviation of the points from the surface, a length; 0 takes every point as it is [default: told from the points]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(crate) noise: Option<f64>,
+}
+
+/// How the surface is drawn.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Surface")]
+pub(crate) struct SurfaceArgs {
+    /// Where the mesh has its vertices: where the points have the surface, or where the level set crosses 1/2 [default: points, but with a
+    /// smaller --theta or a larger --delta level-set]
+    #[arg(long, value_name = "WHERE", value_enum)]
+    pub(crate) vertices: Option<VerticesArg>,
 }
 
 /// How fine the grid is, and on which box of it fields are written.

@@ -75,6 +75,7 @@ pub(crate) fn reconstruct_settings(args: &ReconstructArgs) -> Result<Reconstruct
         motion: motion(&args.motion, defaults.motion),
         beta: args.motion.beta,
         noise: args.points.noise,
+        vertices: args.surface.vertices.map(Into::into),
         ..defaults
     };
     settings.check()?;

@@ -24,6 +24,8 @@ pub(crate) struct Settings {
     beta: Option<f64>,
     /// Null when it was told from the points; it is then in the result.
     noise: Option<f64>,
+    /// Where the mesh has its vertices.
+    vertices: &'static str,
     scratch: String,
 }
 
@@ -43,6 +45,7 @@ impl Settings {
             motion: Moves::new(&settings.motion, &found.geometry),
             beta: settings.beta,
             noise: settings.noise,
+            vertices: settings.vertices_on(&found.geometry).name(),
             scratch: scratch.display().to_string(),
         }
     }
@@ -72,6 +75,8 @@ pub(crate) struct Found {
     noise: Option<f64>,
     /// Points that were moved onto the surface around them.
     moved_points: u64,
+    /// How far vertices of the mesh lie, at most, from where the level set has them.
+    moved_vertices: f64,
     hole: Option<Hole>,
     /// Holes that were closed though no points are there, the widest first.
     caps: Vec<CappedHole>,
@@ -99,6 +104,7 @@ impl Found {
             beta: found.beta,
             noise: found.noise.deviation,
             moved_points: found.noise.moved,
+            moved_vertices: found.moved_vertices,
             hole: found.hole.map(Into::into),
             caps: found.caps.iter().map(|cap| CappedHole::new(cap, found.measures.area)).collect(),
             band_voxels: found.band_voxels,

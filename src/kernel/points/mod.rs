@@ -1,5 +1,6 @@
 //! Clouds without a grid: what the points around a place tell of the surface there.
 
 pub mod height_field;
+pub mod local_fit;
 pub mod orientation;
 pub mod smoothing;

@@ -8,6 +8,7 @@ mod caps;
 #[cfg(test)]
 mod ended;
 mod estimate;
+mod fitted;
 mod flat;
 mod grid;
 mod isolated;
@@ -23,5 +24,5 @@ pub use grid::grid_for;
 pub use isolated::without_isolated;
 pub use noise::Noise;
 pub use output::{Reconstruction, reconstruct, reconstruct_shown};
-pub use settings::ReconstructSettings;
+pub use settings::{ReconstructSettings, Vertices};
 pub use spacing::typical_spacing;

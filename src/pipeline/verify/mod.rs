@@ -59,7 +59,11 @@ pub fn verify(engine: &Engine, store: &Path, tell: &mut dyn FnMut(Check)) -> Res
             }
         }
         "reconstruct" => {
-            tell(surface::check(engine, store, "meshes/surface.ply", of("").map(DrawnFrom::LevelSet), result)?);
+            let from = of("").map(|image| match result["moved_vertices"].as_f64() {
+                Some(most) if most > 0.0 => DrawnFrom::Moved(image, most),
+                _ => DrawnFrom::LevelSet(image),
+            });
+            tell(surface::check(engine, store, "meshes/surface.ply", from, result)?);
         }
         "middle" if report["settings"]["surface"] == "walls" => {
             let bounded = report["settings"]["background"] == true;
