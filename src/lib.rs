@@ -149,6 +149,7 @@ pub use pipeline::enclosure::search::Hole;
 pub use pipeline::image::terms::Smoothing;
 pub use pipeline::level_set::time_loop::{Evolution, Stop};
 pub use pipeline::middle::{LabelMode, SurfaceKind};
+pub use pipeline::reconstruct::Vertices;
 pub use pipeline::segment::{
     CrossValidation, FillGaps, ImageModel, NeighboursFound, ObjectReport, Outcome, Overlap, Refused, Start,
 };

@@ -46,7 +46,7 @@ def from_outside(setting, cloud):
     rule = ["--beta", 2, "--stop", "l2", "--tol", 1e-3, "--epsilon", 0.01, "--tau", h / 4, "--max-steps", 150]
     for name, flags in (("default rule", []), ("papers' rule", rule)):
         line = [
-            run(setting, ["reconstruct", cloud], ["--spacing", h, "--delta", d, "--method", "fsm", *flags])
+            run(setting, ["reconstruct", cloud, "--vertices", "level-set"], ["--spacing", h, "--delta", d, "--method", "fsm", *flags])
             for d in FINEST_DELTAS
         ]
         rows.append([name, *("-" if isinstance(r, str) else f"{r['result']['hausdorff']['max']:.4f}" for r in line)])
@@ -68,7 +68,7 @@ def line(setting, cloud, h, method):
         if h == FINEST and delta not in FINEST_DELTAS:
             found.append(None)
             continue
-        report = run(setting, ["reconstruct", cloud], ["--spacing", h, "--delta", delta, "--method", method])
+        report = run(setting, ["reconstruct", cloud, "--vertices", "level-set"], ["--spacing", h, "--delta", delta, "--method", method])
         found.append(None if isinstance(report, str) else report["result"]["hausdorff"])
     return found
 

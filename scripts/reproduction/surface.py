@@ -51,7 +51,7 @@ def sponge(setting):
     np.savetxt(cloud, points, fmt="%.12f")
     h, rows = 0.05, []
     for delta in DELTAS:
-        command = ["reconstruct", cloud]
+        command = ["reconstruct", cloud, "--vertices", "level-set"]
         common = ["--spacing", h, "--delta", delta]
         mesh = setting.scratch / f"sponge-{delta}.ply"
         ours = run(setting, command, [*common, "--mesh", mesh])
@@ -86,7 +86,7 @@ def noise(setting):
     for name, cloud in (("all points", points), ("a tenth removed", fewer), ("and 100 moved", moved)):
         path, mesh = setting.scratch / "noise.xyz", setting.scratch / f"noise-{len(rows)}.ply"
         np.savetxt(path, cloud, fmt="%.7f")
-        report = run(setting, ["reconstruct", path], ["--spacing", spacing, "--mesh", mesh])
+        report = run(setting, ["reconstruct", path, "--vertices", "level-set"], ["--spacing", spacing, "--mesh", mesh])
         told = subprocess.run(
             [setting.program.path, "measure", mesh, "--points", kept, "--json"], capture_output=True, text=True
         )

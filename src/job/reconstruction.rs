@@ -20,7 +20,7 @@ use crate::pipeline::limits::{ABOVE_ZERO, check_given};
 use crate::pipeline::output::viewer_mesh::Segments;
 use crate::pipeline::reconstruct;
 use crate::pipeline::reconstruct::{
-    ReconstructSettings, estimate, grid_for, refuse_too_fine, typical_spacing, without_isolated,
+    ReconstructSettings, Vertices, estimate, grid_for, refuse_too_fine, typical_spacing, without_isolated,
 };
 use crate::store::MeshSink;
 
@@ -113,6 +113,13 @@ impl<'a> Reconstruction<'a> {
     /// Lets the surface end where the points do, with a rim, where it would else be closed: for a scan from one side, or a sheet.
     pub fn open(mut self) -> Self {
         self.settings.open = true;
+        self
+    }
+
+    /// Where the mesh has its vertices; where this is left out, where the points have the surface, unless a surface is asked for that leaves
+    /// them (a smaller `theta`, a larger `delta`).
+    pub fn vertices(mut self, vertices: Vertices) -> Self {
+        self.settings.vertices = Some(vertices);
         self
     }
 

@@ -21,7 +21,7 @@ use crate::pipeline::segment::{
     CheckedMarks, FillGaps, Grids, Guides, ImageModel, Kept, KeptObject, Outcome, Overlap, SegmentSettings, Start,
     check_all_marks, check_lengths, check_seed, check_smoothing, estimate, segment_kept,
 };
-use crate::pipeline::surface::extract;
+use crate::pipeline::surface::{Isosurface, extract};
 use crate::store::{BoxSource, MeshSink, Sample, VolumeSource};
 
 /// Objects in a 3-D image, guided by border points that were marked on it.
@@ -350,7 +350,7 @@ impl SolvedSegmentation {
     pub fn draw(&self, object: u32, mesh: &mut dyn MeshSink) -> Result<()> {
         let KeptObject { geometry, u, .. } = self.object(object)?;
         let stage = self.engine.stage("surface", 0);
-        extract(&stage, u, geometry, mesh)?;
+        extract(&stage, &Isosurface::of(u, geometry), mesh)?;
         stage.finish();
         Ok(())
     }

@@ -40,6 +40,7 @@ mod ranks_jobs;
 mod reconstruct;
 mod reconstruct_cli;
 mod reconstruct_open;
+mod reconstruct_vertices;
 mod surfaces;
 mod travel_times;
 mod triangle_distance;

@@ -11,7 +11,7 @@ use strandline::kernel::surface::PatchIndex;
 use strandline::pipeline::distance::Method;
 use strandline::pipeline::level_set::motion::Motion;
 use strandline::pipeline::level_set::time_loop::Stop;
-use strandline::pipeline::reconstruct::{ReconstructSettings, Reconstruction, grid_for, reconstruct};
+use strandline::pipeline::reconstruct::{ReconstructSettings, Reconstruction, Vertices, grid_for, reconstruct};
 use strandline::store::{BoxSource, NoMesh};
 
 use crate::common::clouds::{grid_around, scan, sphere, sponge};
@@ -35,7 +35,8 @@ fn as_printed(h: f64, delta: f64) -> ReconstructSettings {
         max_steps: 1000,
         ..ReconstructSettings::default().motion
     };
-    ReconstructSettings { motion, beta: Some(0.25), ..ReconstructSettings::default() }
+    let vertices = Some(Vertices::LevelSet);
+    ReconstructSettings { motion, beta: Some(0.25), vertices, ..ReconstructSettings::default() }
 }
 
 /// The places of a cloud, those that differ by rounding alone taken for one.

@@ -253,6 +253,19 @@ fn a_middle_surface_lies_where_labels_change() {
     told(&wrong(&bench, "verify out/x.zarr"), &["meshes/surface.ply", "vertex 0 at [", "lies in the midst of label 1"]);
 }
 
+#[test]
+fn vertices_at_the_points_lie_near_the_level_set() {
+    let bench = bench();
+    bench.succeed("reconstruct cloud.xyz -q -o out/x.zarr");
+    fs::remove_file(bench.path("out/x.zarr/checksums.txt")).unwrap();
+    assert!(bench.succeed("verify out/x.zarr").contains(" of the surface u = 1/2 of "));
+    edit(&bench.path("out/x.zarr/report.json"), |report| report["result"]["moved_vertices"] = 1e-4.into());
+    told(&wrong(&bench, "verify out/x.zarr"), &["meshes/surface.ply", "from where u crosses 1/2, more than 0.0001"]);
+    edit(&bench.path("out/x.zarr/report.json"), |report| report["result"]["moved_vertices"] = 5.0.into());
+    move_first_vertex(&bench.path("out/x.zarr/meshes/surface.ply"), -1.2);
+    told(&wrong(&bench, "verify out/x.zarr"), &["meshes/surface.ply", "vertex 0 at [", "from where u crosses 1/2"]);
+}
+
 fn edit(path: &Path, change: impl Fn(&mut Value)) {
     let mut value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
     change(&mut value);

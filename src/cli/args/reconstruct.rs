@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::common::{DistanceArgs, MotionArgs, OutputArgs, ResourceArgs};
 use super::grid::GridBoxArgs;
-use super::values::parse_spacing;
+use super::values::{VerticesArg, parse_spacing};
 
 /// Reconstruct a closed surface from a point cloud, without normals; with --open one that ends with the points.
 #[derive(Clone, Debug, Args)]
@@ -18,6 +18,8 @@ pub(crate) struct ReconstructArgs {
     pub(crate) grid: CloudGridArgs,
     #[command(flatten)]
     pub(crate) points: PointArgs,
+    #[command(flatten)]
+    pub(crate) surface: SurfaceArgs,
     #[command(flatten)]
     pub(crate) motion: MotionArgs,
     #[command(flatten)]
@@ -44,6 +46,16 @@ pub(crate) struct PointArgs {
     /// Let the surface end where the points do, with a rim: for a scan from one side, or a sheet [default: close it]
     #[arg(long)]
     pub(crate) open: bool,
+}
+
+/// How the surface is drawn.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Surface")]
+pub(crate) struct SurfaceArgs {
+    /// Where the mesh has its vertices: where the points have the surface, or where the level set crosses 1/2 [default: points, but with a
+    /// smaller --theta or a larger --delta level-set]
+    #[arg(long, value_name = "WHERE", value_enum)]
+    pub(crate) vertices: Option<VerticesArg>,
 }
 
 /// How fine the grid is, and on which box of it fields are written.

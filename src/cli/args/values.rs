@@ -9,6 +9,7 @@ use crate::io::ome_zarr::{Compression, OmeVersion};
 use crate::kernel::distance::state::neighbours::Neighbours;
 use crate::pipeline::distance::{Method, SOLVERS};
 use crate::pipeline::marks::Seed;
+use crate::pipeline::reconstruct::Vertices;
 use crate::pipeline::segment::FillGaps;
 
 /// A crop as typed: for each axis where it begins and ends, where that was said.
@@ -153,6 +154,22 @@ pub(crate) enum CompressArg {
     None,
     Fast,
     Small,
+}
+
+/// Where the mesh of a reconstruction has its vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum VerticesArg {
+    Points,
+    LevelSet,
+}
+
+impl From<VerticesArg> for Vertices {
+    fn from(given: VerticesArg) -> Self {
+        match given {
+            VerticesArg::Points => Self::Points,
+            VerticesArg::LevelSet => Self::LevelSet,
+        }
+    }
 }
 
 /// Which version of OME-Zarr is written.

@@ -76,6 +76,7 @@ pub(crate) fn reconstruct_settings(args: &ReconstructArgs) -> Result<Reconstruct
         beta: args.motion.beta,
         noise: args.points.noise,
         open: args.points.open,
+        vertices: args.surface.vertices.map(Into::into),
         ..defaults
     };
     settings.check()?;

@@ -26,6 +26,8 @@ pub(crate) struct Settings {
     noise: Option<f64>,
     /// Whether the surface was to end where the points do.
     open: bool,
+    /// Where the mesh has its vertices.
+    vertices: &'static str,
     scratch: String,
 }
 
@@ -46,6 +48,7 @@ impl Settings {
             beta: settings.beta,
             noise: settings.noise,
             open: settings.open,
+            vertices: settings.vertices_on(&found.geometry).name(),
             scratch: scratch.display().to_string(),
         }
     }
@@ -80,6 +83,8 @@ pub(crate) struct Found {
     noise: Option<f64>,
     /// Points that were moved onto the surface around them.
     moved_points: u64,
+    /// How far vertices of the mesh lie, at most, from where the level set has them.
+    moved_vertices: f64,
     hole: Option<Hole>,
     /// Holes that were closed though no points are there, the widest first.
     caps: Vec<CappedHole>,
@@ -109,6 +114,7 @@ impl Found {
             beta: found.beta,
             noise: found.noise.deviation,
             moved_points: found.noise.moved,
+            moved_vertices: found.moved_vertices,
             hole: found.hole.map(Into::into),
             caps: found.caps.iter().map(|cap| CappedHole::new(cap, found.measures.area)).collect(),
             band_voxels: found.band_voxels,

@@ -17,6 +17,8 @@ pub struct HeightField {
     pub height: f64,
     /// Unit normal of the surface there.
     pub normal: DVec3,
+    /// Its coefficients, of places in units of the radius.
+    pub coefficients: [f64; COEFFICIENTS],
     /// How far each of the points lies above it, along the normal of the plane.
     pub residuals: Vec<f64>,
 }
@@ -50,6 +52,7 @@ impl HeightField {
         Some(Self {
             height: found[0],
             normal: unit(normal - (u * found[1] + v * found[2]) / radius),
+            coefficients: std::array::from_fn(|n| found[n]),
             residuals: points.iter().map(above).collect(),
         })
     }

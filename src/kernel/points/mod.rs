@@ -2,6 +2,7 @@
 
 pub mod facing;
 pub mod height_field;
+pub mod local_fit;
 pub mod orientation;
 pub mod rim;
 pub mod smoothing;

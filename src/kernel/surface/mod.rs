@@ -8,6 +8,7 @@ pub mod mesh;
 pub mod multilabel;
 
 pub use cubes::marching_cubes::{MarchingCubes, cells_of_brick, fraction};
+pub use cubes::surroundings::{Surroundings, outward, surroundings};
 pub use mesh::clustering::{Clustered, Clustering};
 pub use mesh::components::Components;
 pub use mesh::edge_tally::EdgeTally;

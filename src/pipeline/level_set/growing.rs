@@ -10,7 +10,7 @@ use crate::exec::{Engine, Workers};
 use crate::grid::{Box3, BrickGrid, BrickSet, Geometry};
 use crate::io::geometry::write::ply::PlyWriter;
 use crate::io::ome_zarr::{GROWING, StoreWriter};
-use crate::pipeline::surface::extract;
+use crate::pipeline::surface::{Isosurface, extract};
 use crate::store::{BoxSource, BrickArray};
 
 /// Voxels that it is drawn on at most: small enough for any viewer.
@@ -67,7 +67,7 @@ impl<'a> Growing<'a> {
             ..self.geometry.clone()
         };
         let mut mesh = PlyWriter::on_grid(&self.path, &geometry)?;
-        extract(&stage, &sparse, &geometry, &mut mesh)?;
+        extract(&stage, &Isosurface::of(&sparse, &geometry), &mut mesh)?;
         mesh.finish()?;
         Ok(())
     }

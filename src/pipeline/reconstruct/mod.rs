@@ -9,6 +9,7 @@ mod caps;
 #[cfg(test)]
 mod ended;
 mod estimate;
+mod fitted;
 mod flat;
 mod grid;
 mod isolated;
@@ -27,5 +28,5 @@ pub use grid::grid_for;
 pub use isolated::without_isolated;
 pub use noise::Noise;
 pub use output::{Reconstruction, reconstruct, reconstruct_shown};
-pub use settings::ReconstructSettings;
+pub use settings::{ReconstructSettings, Vertices};
 pub use spacing::typical_spacing;

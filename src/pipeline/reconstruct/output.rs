@@ -5,15 +5,16 @@ use std::fmt;
 use super::begun::{Begun, enclosed};
 use super::caps::Cap;
 use super::estimate::{BUFFERS, WRITING, begin, boxes};
+use super::fitted::{BYTES, Fitted};
 use super::noise::{Noise, without_noise};
 use super::on_grid::OnGrid;
-use super::settings::ReconstructSettings;
+use super::settings::{ReconstructSettings, Vertices};
 use super::sided::Sided;
 use crate::error::{Error, Result};
 use crate::exec::{Engine, Hold, SelfComm, Stage};
 use crate::grid::{Box3, Geometry, digits};
 use crate::io::ome_zarr::{Content, ImageSpec, StoreWriter};
-use crate::kernel::surface::{Hausdorff, Measures, Spread};
+use crate::kernel::surface::{Hausdorff, Measures, Patch, Spread};
 use crate::pipeline::enclosure::search::Hole;
 use crate::pipeline::enclosure::sheets::{Company, hold_sheets};
 use crate::pipeline::level_set::band::Band;
@@ -21,7 +22,7 @@ use crate::pipeline::level_set::growing::Growing;
 use crate::pipeline::level_set::ranks::evolve_on_ranks;
 use crate::pipeline::level_set::time_loop::Evolution;
 use crate::pipeline::output::pyramid::{Reduce, write_levels};
-use crate::pipeline::surface::{self, Drawn};
+use crate::pipeline::surface::{self, Drawn, Isosurface, Placement};
 use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 
 /// Points farther from the solved surface than so many largest spacings have been left by it.
@@ -58,6 +59,8 @@ pub struct Reconstruction {
     pub hausdorff: Option<Hausdorff>,
     /// How many points are how far from it.
     pub spread: Option<Spread>,
+    /// How far vertices of the mesh lie, at most, from where the level set has them.
+    pub moved_vertices: f64,
     /// Points farther from the surface than the largest spacing and three times the noise.
     pub lost_points: u64,
     /// The solved fields.
@@ -174,12 +177,13 @@ pub fn reconstruct_shown(
     let is_first = engine.comm().rank() == 0;
     let lost_beyond =
         geometry.max_spacing() + noise.deviation.filter(|_| noise.moved > 0).map_or(0.0, |d| OF_NOISE * d);
+    let fitted_to = Some(points).filter(|_| settings.vertices_on(&geometry) == Vertices::Points);
     let drawn = if is_first {
-        draw(engine, (&band, &geometry), (cloud, lost_beyond), (mesh, sided.as_ref()))?
+        draw(engine, (&band, &geometry), fitted_to, (cloud, lost_beyond), (mesh, sided.as_ref()))?
     } else {
         Drawn::default()
     };
-    let Drawn { measures, trimmed, hausdorff, spread, lost_points } = drawn;
+    let Drawn { measures, moved, trimmed, hausdorff, spread, lost_points } = drawn;
     if is_first && (measures.triangles == 0 || lost_points == cloud.len() as u64) {
         return Err(vanished(settings, grid, larger_beta));
     }
@@ -200,6 +204,7 @@ pub fn reconstruct_shown(
         measures,
         hausdorff,
         spread,
+        moved_vertices: moved,
         lost_points,
         band,
         window: settings.keeps_grid.then_some(window),
@@ -207,22 +212,23 @@ pub fn reconstruct_shown(
     })
 }
 
-/// Draws and measures the surface.
+/// Draws the surface, its vertices where `points` have it if there are any, and measures it.
 fn draw(
     engine: &Engine,
     (band, geometry): (&Band, &Geometry),
+    points: Option<&[[f64; 3]]>,
     cloud: (&[[f64; 3]], f64),
     (mesh, sided): (&mut dyn MeshSink, Option<&Sided>),
 ) -> Result<Drawn> {
+    let _held = engine.hold(points.map_or(0, |points| points.len() as u64 * BYTES))?;
     let stage = engine.stage("surface", 0);
     stage.voxels(band.voxels);
-    let drawn = match sided {
-        Some(sided) => {
-            let trimming = sided.trimming(geometry);
-            surface::draw_trimmed(&stage, &band.u, geometry, cloud, mesh, &|patch| trimming.trim(patch))?
-        }
-        None => surface::draw(&stage, &band.u, geometry, cloud, mesh)?,
-    };
+    let fitted = points.map(|points| Fitted::to(&stage, &band.u, geometry, points)).transpose()?;
+    let placement = fitted.as_ref().map(|fitted| fitted as &dyn Placement);
+    let surface = Isosurface { placement, ..Isosurface::of(&band.u, geometry) };
+    let trimming = sided.map(|sided| sided.trimming(geometry));
+    let trim = |patch: &mut Patch| trimming.as_ref().map_or(0.0, |trimming| trimming.trim(patch));
+    let drawn = surface::draw_trimmed(&stage, &surface, cloud, mesh, &trim)?;
     stage.finish();
     Ok(drawn)
 }
@@ -263,7 +269,7 @@ fn solve(
 
 /// Holds what the surface has left; returns these points.
 fn hold_what_was_lost(stage: &Stage<'_>, geometry: &Geometry, cloud: &[[f64; 3]], band: &Band) -> Result<Vec<u32>> {
-    let off = surface::distances_to(stage, &band.u, geometry, cloud)?;
+    let off = surface::distances_to(stage, &Isosurface::of(&band.u, geometry), cloud)?;
     let is_lost = |(_, off): &(u32, &Option<f64>)| off.is_some_and(|off| off > LEFT_VOXELS * geometry.max_spacing());
     let lost: Vec<u32> = (0..).zip(&off).filter(is_lost).map(|(point, _)| point).collect();
     hold_sheets(&SelfComm, geometry, cloud, &lost, Company::AT_THE_END, band)

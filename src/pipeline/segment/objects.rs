@@ -24,7 +24,7 @@ use crate::pipeline::enclosure::region::voxel_bounds;
 use crate::pipeline::marks::ObjectMarks;
 use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::output::viewer_mesh::{Segments, for_viewers};
-use crate::pipeline::surface::{self, Drawn};
+use crate::pipeline::surface::{self, Drawn, Isosurface};
 use crate::store::{Element, ElementType};
 
 /// What was solved, in order of the labels, and what was not.
@@ -218,7 +218,7 @@ fn draw(
     };
     let points = marks.contours.concat();
     let Drawn { measures, hausdorff, spread, lost_points, .. } =
-        surface::draw(&stage, u, geometry, (&points, geometry.max_spacing()), &mut mesh)?;
+        surface::draw(&stage, &Isosurface::of(u, geometry), (&points, geometry.max_spacing()), &mut mesh)?;
     stage.voxels(solution.band_voxels);
     stage.finish();
     check_left(marks, solution, measures.triangles, settings)?;

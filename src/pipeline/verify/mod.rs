@@ -60,8 +60,12 @@ pub fn verify(engine: &Engine, store: &Path, tell: &mut dyn FnMut(Check)) -> Res
         }
         "reconstruct" => {
             // The rim of an open surface lies where the points end.
-            let level_set = of("").filter(|_| report["settings"]["open"] != true).map(DrawnFrom::LevelSet);
-            tell(surface::check(engine, store, "meshes/surface.ply", level_set, result)?);
+            let image = of("").filter(|_| report["settings"]["open"] != true);
+            let from = image.map(|image| match result["moved_vertices"].as_f64() {
+                Some(most) if most > 0.0 => DrawnFrom::Moved(image, most),
+                _ => DrawnFrom::LevelSet(image),
+            });
+            tell(surface::check(engine, store, "meshes/surface.ply", from, result)?);
         }
         "middle" if report["settings"]["surface"] == "walls" => {
             let bounded = report["settings"]["background"] == true;

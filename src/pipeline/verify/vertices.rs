@@ -25,6 +25,8 @@ type Off = ([i64; 3], String);
 pub(super) enum DrawnFrom<'a> {
     /// A level set: vertices lie on u = 1/2.
     LevelSet(&'a Image),
+    /// The same with vertices that were moved from there, so far at most: no farther than from a voxel to the next.
+    Moved(&'a Image, f64),
     /// Labels: each vertex has two of them in its cell of voxels, or one voxel beside it.
     Labels(&'a Image),
     /// The same where what has no label, and what lies around the image, counts as one.
@@ -34,7 +36,7 @@ pub(super) enum DrawnFrom<'a> {
 impl<'a> DrawnFrom<'a> {
     fn image(self) -> &'a Image {
         match self {
-            Self::LevelSet(image) | Self::Labels(image) | Self::Bounded(image) => image,
+            Self::LevelSet(image) | Self::Moved(image, _) | Self::Labels(image) | Self::Bounded(image) => image,
         }
     }
 
@@ -42,6 +44,7 @@ impl<'a> DrawnFrom<'a> {
     pub(super) fn told(self) -> String {
         match self {
             Self::LevelSet(image) => format!("on the surface u = 1/2 of {}", image.name()),
+            Self::Moved(image, most) => format!("within {most} of the surface u = 1/2 of {}", image.name()),
             Self::Labels(image) | Self::Bounded(image) => format!("where {} changes", image.name()),
         }
     }
@@ -54,6 +57,10 @@ impl<'a> DrawnFrom<'a> {
             Self::LevelSet(image) => {
                 let Some(values) = padded::<f32>(image, part, &mut found) else { return found };
                 Box::new(move |position| off(geometry, position, eps, (&values, part)))
+            }
+            Self::Moved(image, most) => {
+                let Some(values) = padded::<f32>(image, part, &mut found) else { return found };
+                Box::new(move |position| far(geometry, position, (most, eps), (&values, part)))
             }
             Self::Labels(image) | Self::Bounded(image) => {
                 let is_bounded = matches!(self, Self::Bounded(_));
@@ -147,6 +154,39 @@ fn off(geometry: &Geometry, position: [f64; 3], eps: f64, (values, part): (&[f32
     let at = place[axis] - lower[axis] as f64;
     ((at - expected).abs() > slack[axis])
         .then(|| (lower, format!("lies {at} of the way from u = {below} to {above}; 1/2 is at {expected}")))
+}
+
+/// What is wrong with the place of a vertex that was moved so far at most, and the voxel below it.
+fn far(
+    geometry: &Geometry,
+    position: [f64; 3],
+    (most, eps): (f64, f64),
+    (values, part): (&[f32], &Box3),
+) -> Option<Off> {
+    let place = geometry.to_voxels(position);
+    let lower: [i64; 3] = place.map(|v| v.floor() as i64);
+    // Where u crosses 1/2 on the lines between the voxels around and those beside them.
+    let around = Box3::new(lower, lower.map(|v| v + 2)).grow(MARGIN).intersect(part);
+    let mut nearest = f64::INFINITY;
+    let voxels = around.rows().flat_map(|(y, z)| (around.lo[0]..around.hi[0]).map(move |x| [x, y, z]));
+    for (voxel, axis) in voxels.flat_map(|voxel| (0..3).map(move |axis| (voxel, axis))) {
+        let mut upper = voxel;
+        upper[axis] += 1;
+        if !around.contains(upper) {
+            continue;
+        }
+        let [below, above] = [voxel, upper].map(|voxel| values[part.offset_of(voxel)]);
+        if (below >= 0.5) != (above >= 0.5) {
+            let mut crossing = voxel.map(|v| v as f64);
+            crossing[axis] += fraction(below, above, 0.5);
+            let away = (0..3).map(|a| ((crossing[a] - place[a]) * geometry.spacing[a]).powi(2)).sum::<f64>();
+            nearest = nearest.min(away.sqrt());
+        }
+    }
+    let reach = position.iter().chain(&geometry.origin).fold(0.0_f64, |most, v| most.max(v.abs()));
+    let slack = 2.0 * eps * reach + 1e-9 * geometry.max_spacing();
+    (nearest > most.min(geometry.min_spacing()) + slack)
+        .then(|| (lower, format!("lies {nearest} from where u crosses 1/2, more than {most}")))
 }
 
 /// What is wrong with the place of a vertex between labels, and the voxel below it.
