@@ -22,6 +22,7 @@ use crate::pipeline::reconstruct;
 use crate::pipeline::reconstruct::{
     ReconstructSettings, estimate, grid_for, refuse_too_fine, typical_spacing, without_isolated,
 };
+use crate::pipeline::topology::Removed;
 use crate::store::MeshSink;
 
 /// A closed surface from a point cloud without normals.
@@ -107,6 +108,12 @@ impl<'a> Reconstruction<'a> {
     /// out.
     pub fn noise(mut self, deviation: f64) -> Self {
         self.settings.noise = Some(deviation);
+        self
+    }
+
+    /// Leaves handles, tunnels and pieces of a few spacings as they are; else they are taken away.
+    pub fn keep_topology(mut self) -> Self {
+        self.settings.keeps_topology = true;
         self
     }
 
@@ -236,6 +243,12 @@ impl SolvedReconstruction {
     #[must_use]
     pub fn noise(&self) -> Option<f64> {
         self.found.noise.deviation
+    }
+
+    /// Handles and pieces of a few spacings that were taken away; none where they were to stay.
+    #[must_use]
+    pub fn removed(&self) -> Option<Removed> {
+        self.found.removed
     }
 
     /// How the time loop ended.

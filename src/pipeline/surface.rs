@@ -91,7 +91,7 @@ fn holds_surface(u: &BrickArray<f32>, id: BrickId) -> bool {
 }
 
 /// Reads a box that may reach out of the domain, where it is 0.
-fn read_padded(u: &BrickArray<f32>, part: &Box3, values: &mut Vec<f32>) -> Result<()> {
+pub(crate) fn read_padded(u: &BrickArray<f32>, part: &Box3, values: &mut Vec<f32>) -> Result<()> {
     values.clear();
     values.resize(part.len(), 0.0);
     let inside = part.intersect(&Box3::from_shape(u.set().grid().shape()));

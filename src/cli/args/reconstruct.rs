@@ -41,6 +41,9 @@ pub(crate) struct PointArgs {
     /// Standard deviation of the points from the surface, a length; 0 takes every point as it is [default: told from the points]
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     pub(crate) noise: Option<f64>,
+    /// Leave handles, tunnels and pieces of a few spacings of the points, which no points speak for, as they are
+    #[arg(long)]
+    pub(crate) keep_topology: bool,
 }
 
 /// How fine the grid is, and on which box of it fields are written.

@@ -75,6 +75,7 @@ pub(crate) fn reconstruct_settings(args: &ReconstructArgs) -> Result<Reconstruct
         motion: motion(&args.motion, defaults.motion),
         beta: args.motion.beta,
         noise: args.points.noise,
+        keeps_topology: args.points.keep_topology,
         ..defaults
     };
     settings.check()?;

@@ -9,6 +9,7 @@ use super::settings::{Moved, Moves};
 use crate::cli::args::reconstruct::ReconstructArgs;
 use crate::pipeline::output::viewer_mesh::Simplified;
 use crate::pipeline::reconstruct::{Cap, ReconstructSettings, Reconstruction};
+use crate::pipeline::topology::Removed;
 
 /// Every setting, also those that nobody gave; lengths physical.
 #[derive(Debug, Serialize)]
@@ -24,6 +25,7 @@ pub(crate) struct Settings {
     beta: Option<f64>,
     /// Null when it was told from the points; it is then in the result.
     noise: Option<f64>,
+    keep_topology: bool,
     scratch: String,
 }
 
@@ -43,6 +45,7 @@ impl Settings {
             motion: Moves::new(&settings.motion, &found.geometry),
             beta: settings.beta,
             noise: settings.noise,
+            keep_topology: settings.keeps_topology,
             scratch: scratch.display().to_string(),
         }
     }
@@ -75,6 +78,8 @@ pub(crate) struct Found {
     hole: Option<Hole>,
     /// Holes that were closed though no points are there, the widest first.
     caps: Vec<CappedHole>,
+    /// Handles and pieces that were taken away; null where they were to stay.
+    removed: Option<RemovedParts>,
     band_voxels: u64,
     #[serde(flatten)]
     moved: Moved,
@@ -101,6 +106,7 @@ impl Found {
             moved_points: found.noise.moved,
             hole: found.hole.map(Into::into),
             caps: found.caps.iter().map(|cap| CappedHole::new(cap, found.measures.area)).collect(),
+            removed: found.removed.map(Into::into),
             band_voxels: found.band_voxels,
             moved: Moved::from(&found.evolution),
         }
@@ -120,5 +126,24 @@ pub(crate) struct CappedHole {
 impl CappedHole {
     fn new(cap: &Cap, surface: f64) -> Self {
         Self { width: cap.width, place_xyz: cap.place, area: cap.area, share: cap.area / surface }
+    }
+}
+
+/// What was taken away of the surface, being no more than a few spacings wide.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct RemovedParts {
+    /// Handles that were cut.
+    handles: u64,
+    /// Tunnels that were filled.
+    tunnels: u64,
+    /// The widest of the cuts and fillings, a length.
+    widest: f64,
+    /// Pieces and hollows that were dropped.
+    crumbs: u64,
+}
+
+impl From<Removed> for RemovedParts {
+    fn from(Removed { handles, tunnels, widest, crumbs }: Removed) -> Self {
+        Self { handles, tunnels, widest, crumbs }
     }
 }

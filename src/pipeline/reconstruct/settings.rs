@@ -17,6 +17,8 @@ pub struct ReconstructSettings {
     pub beta: Option<f64>,
     /// The standard deviation of the points from the surface, 0 to take all as they are; found when none.
     pub noise: Option<f64>,
+    /// Whether handles, tunnels and pieces of a few spacings are left as they are.
+    pub keeps_topology: bool,
     /// Whether fields are written on the grid as it was given; else on a box of it around what is found.
     pub keeps_grid: bool,
 }
@@ -31,6 +33,7 @@ impl Default for ReconstructSettings {
             motion: Motion { rho: 0.0, stop: REST, ..Motion::default() },
             beta: None,
             noise: None,
+            keeps_topology: false,
             keeps_grid: false,
         }
     }
