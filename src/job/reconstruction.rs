@@ -22,6 +22,7 @@ use crate::pipeline::reconstruct;
 use crate::pipeline::reconstruct::{
     ReconstructSettings, Vertices, estimate, grid_for, refuse_too_fine, typical_spacing, without_isolated,
 };
+use crate::pipeline::topology::Removed;
 use crate::store::MeshSink;
 
 /// A closed surface from a point cloud without normals.
@@ -120,6 +121,12 @@ impl<'a> Reconstruction<'a> {
     /// them (a smaller `theta`, a larger `delta`).
     pub fn vertices(mut self, vertices: Vertices) -> Self {
         self.settings.vertices = Some(vertices);
+        self
+    }
+
+    /// Leaves handles, tunnels and pieces of a few spacings as they are; else they are taken away.
+    pub fn keep_topology(mut self) -> Self {
+        self.settings.keeps_topology = true;
         self
     }
 
@@ -255,6 +262,12 @@ impl SolvedReconstruction {
     #[must_use]
     pub fn trimmed_area(&self) -> Option<f64> {
         self.found.trimmed
+    }
+
+    /// Handles and pieces of a few spacings that were taken away; none where they were to stay.
+    #[must_use]
+    pub fn removed(&self) -> Option<Removed> {
+        self.found.removed
     }
 
     /// How the time loop ended.

@@ -13,4 +13,5 @@ pub mod output;
 pub mod reconstruct;
 pub mod segment;
 pub mod surface;
+pub mod topology;
 pub mod verify;

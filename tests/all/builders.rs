@@ -169,6 +169,9 @@ fn a_reconstruction_is_that_of_the_command_line() {
     let stray = [&cloud[..], &[[30.0; 3]]].concat();
     let kept = Reconstruction::of(stray).drop_isolated(4.0).solve().unwrap();
     assert!(kept.mesh == found.mesh && kept.notes() == ["1 of 701 points stand alone and are left out"]);
+    let as_it_is = Reconstruction::of(&cloud[..]).keep_topology().solve().unwrap();
+    assert!(as_it_is.mesh == found.mesh && as_it_is.removed().is_none());
+    assert_eq!(found.removed().map(|removed| removed.handles + removed.tunnels + removed.crumbs), Some(0));
 }
 
 /// The marks of a ball by slice.

@@ -69,6 +69,19 @@ fn points_that_stand_alone_are_left_out() {
     assert!(text.contains("--drop-isolated is 0; it must be a number, more than 0"), "{text}");
 }
 
+/// Of a clean ball nothing is taken away, so the flag changes no bit of it; that it was given is told.
+#[test]
+fn what_is_taken_away_is_told_unless_the_flag_keeps_it() {
+    let bench = bench();
+    bench.succeed("reconstruct ball.xyz -q -o none --mesh out/a.ply --report out/a.json");
+    bench.succeed("reconstruct ball.xyz -q -o none --mesh out/b.ply --report out/b.json --keep-topology");
+    let [taken, kept] = ["out/a.json", "out/b.json"].map(|path| bench.json(path));
+    let nothing = serde_json::json!({ "handles": 0, "tunnels": 0, "widest": 0.0, "crumbs": 0 });
+    assert_eq!((&taken["result"]["removed"], &taken["settings"]["keep_topology"]), (&nothing, &false.into()));
+    assert!(kept["result"]["removed"].is_null() && kept["settings"]["keep_topology"] == true, "{kept}");
+    assert_eq!(fs::read(bench.path("out/a.ply")).unwrap(), fs::read(bench.path("out/b.ply")).unwrap());
+}
+
 /// Every format holds the same surface; the readers of other programs' files read ours.
 #[test]
 fn meshes_come_in_the_format_of_their_name() {

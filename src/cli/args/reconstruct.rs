@@ -56,6 +56,9 @@ pub(crate) struct SurfaceArgs {
     /// smaller --theta or a larger --delta level-set]
     #[arg(long, value_name = "WHERE", value_enum)]
     pub(crate) vertices: Option<VerticesArg>,
+    /// Leave handles, tunnels and pieces of a few spacings of the points, which no points speak for, as they are
+    #[arg(long)]
+    pub(crate) keep_topology: bool,
 }
 
 /// How fine the grid is, and on which box of it fields are written.

@@ -39,6 +39,7 @@ use crate::pipeline::reconstruct::{
     Estimate, ReconstructSettings, Reconstruction, estimate, grid_for, plan, reconstruct_shown, refuse_too_fine,
     spacing_memory, typical_spacing, without_isolated,
 };
+use crate::pipeline::topology::Removed;
 
 /// Points without three others within so many spacings stand alone, where nothing else is said.
 const ISOLATED_SPACINGS: f64 = 4.0;
@@ -396,6 +397,7 @@ fn describe_found(found: &Reconstruction) -> String {
             place(cap.place, 0.1 * cap.width)
         ));
     }
+    lines.extend(found.removed.and_then(removed));
     lines.push(match found.evolution.steps {
         0 => "no time steps: the surface is told by the tangent planes of the points".into(),
         steps => {
@@ -407,4 +409,18 @@ fn describe_found(found: &Reconstruction) -> String {
         }
     });
     lines.join("\n") + "\n"
+}
+
+/// What was taken away of the surface; none where nothing was.
+fn removed(Removed { handles, tunnels, widest, crumbs }: Removed) -> Option<String> {
+    let count = |count: u64, one: &str, more: &str| {
+        (count > 0).then(|| format!("{} {}", grouped(count), if count == 1 { one } else { more }))
+    };
+    let counts = [count(handles, "handle cut", "handles cut"), count(tunnels, "tunnel filled", "tunnels filled")];
+    let mut said: Vec<String> = counts.into_iter().flatten().collect();
+    if let Some(last) = said.last_mut() {
+        *last += &format!(" (at most {} wide)", number(widest));
+    }
+    said.extend(count(crumbs, "crumb dropped", "crumbs dropped"));
+    (!said.is_empty()).then(|| format!("taken away, for no points speak for it: {}", said.join(", ")))
 }

@@ -77,6 +77,7 @@ pub(crate) fn reconstruct_settings(args: &ReconstructArgs) -> Result<Reconstruct
         noise: args.points.noise,
         open: args.points.open,
         vertices: args.surface.vertices.map(Into::into),
+        keeps_topology: args.surface.keep_topology,
         ..defaults
     };
     settings.check()?;

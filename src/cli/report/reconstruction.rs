@@ -9,6 +9,7 @@ use super::settings::{Moved, Moves};
 use crate::cli::args::reconstruct::ReconstructArgs;
 use crate::pipeline::output::viewer_mesh::Simplified;
 use crate::pipeline::reconstruct::{Cap, ReconstructSettings, Reconstruction};
+use crate::pipeline::topology::Removed;
 
 /// Every setting, also those that nobody gave; lengths physical.
 #[derive(Debug, Serialize)]
@@ -28,6 +29,7 @@ pub(crate) struct Settings {
     open: bool,
     /// Where the mesh has its vertices.
     vertices: &'static str,
+    keep_topology: bool,
     scratch: String,
 }
 
@@ -49,6 +51,7 @@ impl Settings {
             noise: settings.noise,
             open: settings.open,
             vertices: settings.vertices_on(&found.geometry).name(),
+            keep_topology: settings.keeps_topology,
             scratch: scratch.display().to_string(),
         }
     }
@@ -88,6 +91,8 @@ pub(crate) struct Found {
     hole: Option<Hole>,
     /// Holes that were closed though no points are there, the widest first.
     caps: Vec<CappedHole>,
+    /// Handles and pieces that were taken away; null where they were to stay.
+    removed: Option<RemovedParts>,
     band_voxels: u64,
     #[serde(flatten)]
     moved: Moved,
@@ -117,6 +122,7 @@ impl Found {
             moved_vertices: found.moved_vertices,
             hole: found.hole.map(Into::into),
             caps: found.caps.iter().map(|cap| CappedHole::new(cap, found.measures.area)).collect(),
+            removed: found.removed.map(Into::into),
             band_voxels: found.band_voxels,
             moved: Moved::from(&found.evolution),
         }
@@ -136,5 +142,24 @@ pub(crate) struct CappedHole {
 impl CappedHole {
     fn new(cap: &Cap, surface: f64) -> Self {
         Self { width: cap.width, place_xyz: cap.place, area: cap.area, share: cap.area / surface }
+    }
+}
+
+/// What was taken away of the surface, being no more than a few spacings wide.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct RemovedParts {
+    /// Handles that were cut.
+    handles: u64,
+    /// Tunnels that were filled.
+    tunnels: u64,
+    /// The widest of the cuts and fillings, a length.
+    widest: f64,
+    /// Pieces and hollows that were dropped.
+    crumbs: u64,
+}
+
+impl From<Removed> for RemovedParts {
+    fn from(Removed { handles, tunnels, widest, crumbs }: Removed) -> Self {
+        Self { handles, tunnels, widest, crumbs }
     }
 }

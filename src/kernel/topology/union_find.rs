@@ -16,6 +16,13 @@ impl Forest {
         Self { above: (0..len as u32).collect() }
     }
 
+    /// One more tree of one thing; returns its number.
+    pub fn push(&mut self) -> u32 {
+        let thing = self.above.len() as u32;
+        self.above.push(thing);
+        thing
+    }
+
     /// The root of a thing.
     pub fn root(&mut self, mut thing: u32) -> u32 {
         loop {

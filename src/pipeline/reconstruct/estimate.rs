@@ -11,6 +11,7 @@ use crate::pipeline::enclosure::region::RegionOfInterest;
 use crate::pipeline::enclosure::search::first_reach_for;
 use crate::pipeline::laying::check_counts;
 use crate::pipeline::output::viewer_mesh;
+use crate::pipeline::topology::topology_bytes;
 
 /// What a run is expected to take; of a cloud whose holes are wider than the search's first reach it takes more.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -85,8 +86,15 @@ pub(super) fn boxes(region: &RegionOfInterest, cloud: &[[f64; 3]]) -> Footprint 
 /// The stages of a reconstruction that is thought to take so many seconds, and what each will probably take.
 #[must_use]
 pub fn plan(seconds: f64, writes: bool) -> Plan {
-    let stages =
-        [("noise", 0.01), ("distance", 0.14), ("tagging", 0.2), ("band", 0.1), ("level set", 0.5), ("surface", 0.05)];
+    let stages = [
+        ("noise", 0.01),
+        ("distance", 0.14),
+        ("tagging", 0.2),
+        ("band", 0.1),
+        ("level set", 0.45),
+        ("topology", 0.05),
+        ("surface", 0.05),
+    ];
     let written = [(viewer_mesh::STAGE, 0.05), ("write levelset", 0.02), ("write distance", 0.02)];
     let written = written.into_iter().filter(|_| writes);
     stages.into_iter().chain(written).map(|(name, share)| (name.into(), share * seconds)).collect()
@@ -104,6 +112,8 @@ pub fn estimate(
     let region = begin(grid, cloud, settings);
     let near_voxels = (region.cells.len() * CELL_LEN) as u64;
     let working = if writes { BUFFERS.or(WRITING, threads) } else { BUFFERS };
+    let sides = if settings.keeps_topology { 0 } else { topology_bytes(region.cells.len() as u64, cloud.len() as u64) };
+    let working = working.and(Footprint::of_all(sides));
     Estimate {
         held: boxes(&region, cloud).and(working).bytes(threads),
         scratch: SIDES_BYTES * near_voxels,

@@ -23,6 +23,7 @@ use crate::pipeline::level_set::ranks::evolve_on_ranks;
 use crate::pipeline::level_set::time_loop::Evolution;
 use crate::pipeline::output::pyramid::{Reduce, write_levels};
 use crate::pipeline::surface::{self, Drawn, Isosurface, Placement};
+use crate::pipeline::topology::{Removed, remove_small};
 use crate::store::{BoxSource, BrickArray, ElementType, MeshSink};
 
 /// Points farther from the solved surface than so many largest spacings have been left by it.
@@ -47,6 +48,8 @@ pub struct Reconstruction {
     pub spaces: usize,
     /// Points held as thin shells, or as slits inside a body, since the surface would close over them.
     pub sheet_points: u64,
+    /// Handles and pieces that were taken away; none where they were to stay.
+    pub removed: Option<Removed>,
     /// Number of voxels that were solved.
     pub band_voxels: u64,
     /// How the time loop ended.
@@ -172,6 +175,7 @@ pub fn reconstruct_shown(
     let mut growing = Growing::of(shown_in, "surface", &geometry)?;
     let evolution = solve(engine, &geometry, points, settings, (&mut band, &mut sheet), growing.as_mut())?;
     drop(growing);
+    let removed = (!settings.keeps_topology).then(|| remove_small(engine, &band.u, &geometry, cloud)).transpose()?;
     let told = if settings.keeps_grid { grid.clone() } else { geometry.clone() };
     mesh.on_grid(&told)?;
     let is_first = engine.comm().rank() == 0;
@@ -198,6 +202,7 @@ pub fn reconstruct_shown(
         hole,
         spaces,
         sheet_points: sheet.len() as u64,
+        removed,
         band_voxels: band.voxels,
         evolution,
         trimmed: settings.open.then_some(trimmed),

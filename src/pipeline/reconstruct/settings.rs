@@ -42,6 +42,8 @@ pub struct ReconstructSettings {
     pub open: bool,
     /// Where the mesh has its vertices; where none, at the points unless a surface is asked for that leaves these.
     pub vertices: Option<Vertices>,
+    /// Whether handles, tunnels and pieces of a few spacings are left as they are.
+    pub keeps_topology: bool,
     /// Whether fields are written on the grid as it was given; else on a box of it around what is found.
     pub keeps_grid: bool,
 }
@@ -58,6 +60,7 @@ impl Default for ReconstructSettings {
             noise: None,
             open: false,
             vertices: None,
+            keeps_topology: false,
             keeps_grid: false,
         }
     }

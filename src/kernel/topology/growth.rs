@@ -1,0 +1,188 @@
+//! One side of a surface grown from its depths, without loops that are not there far from the surface: where two fronts of one piece meet a
+//! voxel is left out, and what is left out in the end are *seams*, discs that close the loops.
+//!
+//! Voxels come by how much of their side is around them (`sides`), those with most first. One is added where the pieces of the grown set that touch it
+//! (`neighbourhood`) are different pieces of the whole grown set: then no loop closes through it. The others wait, and are looked at again when
+//! something beside them was added (Aktouf, Bertrand and Perroton 2002, "A three-dimensional holes closing algorithm", grown on the other
+//! side, with pieces joined as by Kruskal). Order: level, then place; so the seams depend on nothing else.
+
+use std::collections::BTreeMap;
+
+use super::blocks::{Blocks, FAR, INSIDE, PARTS, Where};
+use super::neighbourhood::{Joined, MIDDLE};
+use super::union_find::Forest;
+
+/// A voxel that is not in the grown set.
+const OUT: u32 = 0;
+/// A voxel that waits.
+const WAITS: u32 = u32::MAX;
+
+/// In which order a side is grown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// By distance from the other side.
+    Distance,
+    /// Of those as far, the ones with more of their side around them first.
+    Level,
+}
+
+/// One side, grown.
+pub struct Grown {
+    /// For each voxel the name of its piece and one; see [`OUT`], [`WAITS`].
+    names: Vec<u32>,
+    /// The pieces' names.
+    pieces: Forest,
+    /// For each name how many voxels were given it; those of rooms have as many as there can be.
+    voxels: Vec<u64>,
+}
+
+impl Grown {
+    /// Grows the inside, or the outside; `check` is asked now and then whether to go on.
+    ///
+    /// # Errors
+    /// Those of `check`.
+    pub fn new<E>(
+        blocks: &Blocks,
+        inside: bool,
+        order: Order,
+        mut check: impl FnMut() -> Result<(), E>,
+    ) -> Result<Self, E> {
+        let rooms = blocks.rooms.len();
+        let mut grown = Self {
+            names: vec![OUT; blocks.states.len()],
+            pieces: Forest::of_singles(rooms),
+            voxels: vec![u64::MAX / 2; rooms],
+        };
+        grown.name_far(blocks, inside);
+        let side = if inside { INSIDE } else { 0 };
+        let level_of = |state: u8| match order {
+            Order::Distance if state & FAR != FAR => ((state & FAR) - 1) / PARTS,
+            _ => state & FAR,
+        };
+        let mut levels = [false; 128];
+        let of_side = |state: u8| state & INSIDE == side;
+        blocks.states.iter().filter(|&&s| of_side(s)).for_each(|&state| levels[usize::from(level_of(state))] = true);
+        let joined = if inside { Joined::Faces } else { Joined::Edges };
+        let mut again = Vec::new();
+        for level in (0..FAR).rev().filter(|&level| levels[usize::from(level)]) {
+            check()?;
+            for place in 0..blocks.states.len() {
+                let state = blocks.states[place];
+                if !of_side(state) || level_of(state) != level {
+                    continue;
+                }
+                again.push(place);
+                while let Some(place) = again.pop() {
+                    if matches!(grown.names[place], OUT | WAITS) {
+                        grown.add(blocks, joined, inside, place, &mut again);
+                    }
+                }
+            }
+        }
+        Ok(grown)
+    }
+
+    /// Voxels that were left out, in order.
+    pub fn left_out(&self) -> impl Iterator<Item = usize> + '_ {
+        self.names.iter().enumerate().filter(|(_, name)| **name == WAITS).map(|(place, _)| place)
+    }
+
+    /// Whether a voxel is in the grown set.
+    #[must_use]
+    pub fn holds(&self, place: usize) -> bool {
+        !matches!(self.names[place], OUT | WAITS)
+    }
+
+    /// The pieces of at most so many voxels, each by its places in order, if there are larger ones; what fills a room is no such piece.
+    pub fn small_pieces(&mut self, most: u64) -> Vec<Vec<usize>> {
+        let mut sizes = vec![0_u64; self.voxels.len()];
+        for name in 0..self.voxels.len() as u32 {
+            let root = self.pieces.root(name) as usize;
+            sizes[root] = sizes[root].saturating_add(self.voxels[name as usize]);
+        }
+        let mut small: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        let is_small = |size: &u64| (1..=most).contains(size);
+        if !sizes.iter().any(is_small) || !sizes.iter().any(|&size| size > most) {
+            return Vec::new();
+        }
+        for place in 0..self.names.len() {
+            if self.holds(place) {
+                let root = self.pieces.root(self.names[place] - 1);
+                if sizes[root as usize] <= most {
+                    small.entry(root).or_default().push(place);
+                }
+            }
+        }
+        small.into_values().collect()
+    }
+
+    fn new_name(&mut self) -> u32 {
+        self.voxels.push(0);
+        self.pieces.push()
+    }
+
+    /// Voxels far from the other side have the pieces that they have.
+    fn name_far(&mut self, blocks: &Blocks, inside: bool) {
+        // Those above are known where a block comes before the one below it, or are rooms.
+        const ACROSS_FACES: [usize; 6] = [MIDDLE - 9, MIDDLE - 3, MIDDLE - 1, MIDDLE + 1, MIDDLE + 3, MIDDLE + 9];
+        let far = FAR | if inside { INSIDE } else { 0 };
+        for place in 0..blocks.states.len() {
+            if blocks.states[place] != far {
+                continue;
+            }
+            let mut known = None;
+            for bit in ACROSS_FACES {
+                let other = match blocks.neighbour(place, bit) {
+                    Where::Voxel(other) if self.names[other] != OUT => self.names[other] - 1,
+                    Where::Room(room) if blocks.rooms[room as usize] == inside => room,
+                    _ => continue,
+                };
+                let name = *known.get_or_insert(other);
+                self.pieces.join(name, other);
+            }
+            let name = known.unwrap_or_else(|| self.new_name());
+            self.names[place] = name + 1;
+            self.voxels[name as usize] += 1;
+        }
+    }
+
+    /// Adds a voxel if no loop closes through it; those that wait beside it are to be looked at again.
+    fn add(&mut self, blocks: &Blocks, joined: Joined, inside: bool, place: usize, again: &mut Vec<usize>) {
+        let (mut set, mut waiting) = (0_u32, 0_u32);
+        let mut names = [0_u32; 27];
+        for (bit, name) in names.iter_mut().enumerate().filter(|(bit, _)| *bit != MIDDLE) {
+            *name = match blocks.neighbour(place, bit) {
+                Where::Voxel(other) => self.names[other],
+                Where::Room(room) if blocks.rooms[room as usize] == inside => room + 1,
+                Where::Room(_) => OUT,
+            };
+            match *name {
+                OUT => {}
+                WAITS => waiting |= 1 << bit,
+                _ => set |= 1 << bit,
+            }
+        }
+        let mut pieces = [0; 8];
+        let count = joined.pieces(set, &mut pieces);
+        let mut roots = [0; 8];
+        for (n, piece) in pieces[..count].iter().enumerate() {
+            roots[n] = self.pieces.root(names[piece.trailing_zeros() as usize] - 1);
+            if roots[..n].contains(&roots[n]) {
+                self.names[place] = WAITS;
+                return;
+            }
+        }
+        let name = if count == 0 { self.new_name() } else { roots[0] };
+        roots[..count].iter().for_each(|&root| {
+            self.pieces.join(name, root);
+        });
+        self.names[place] = name + 1;
+        self.voxels[name as usize] += 1;
+        while waiting != 0 {
+            if let Where::Voxel(other) = blocks.neighbour(place, waiting.trailing_zeros() as usize) {
+                again.push(other);
+            }
+            waiting &= waiting - 1;
+        }
+    }
+}
