@@ -419,7 +419,7 @@ fn removed(Removed { handles, tunnels, widest, crumbs }: Removed) -> Option<Stri
     let counts = [count(handles, "handle cut", "handles cut"), count(tunnels, "tunnel filled", "tunnels filled")];
     let mut said: Vec<String> = counts.into_iter().flatten().collect();
     if let Some(last) = said.last_mut() {
-        *last += &format!(" (at most {} wide)", number(widest));
+        *last = format!("{last} (at most {} wide)", number(widest));
     }
     said.extend(count(crumbs, "crumb dropped", "crumbs dropped"));
     (!said.is_empty()).then(|| format!("taken away, for no points speak for it: {}", said.join(", ")))

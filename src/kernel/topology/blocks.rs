@@ -103,7 +103,9 @@ impl Blocks {
 
     /// Puts voxels on a side, at its border.
     pub fn put(&mut self, places: &[usize], inside: bool) {
-        places.iter().for_each(|&place| self.states[place] = 1 | if inside { INSIDE } else { 0 });
+        for &place in places {
+            self.states[place] = 1 | if inside { INSIDE } else { 0 };
+        }
     }
 
     /// Whether any of some voxels must stay as it is.

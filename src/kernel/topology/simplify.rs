@@ -72,10 +72,11 @@ pub fn simplify<E>(
                 blocks.put(&seam.places, !inside);
             }
             for piece in pieces {
-                if !blocks.holds_fixed(&piece) && !(inside && is_body(blocks, &piece, small)) {
-                    taken.pieces += 1;
-                    blocks.put(&piece, !inside);
+                if blocks.holds_fixed(&piece) || inside && is_body(blocks, &piece, small) {
+                    continue;
                 }
+                taken.pieces += 1;
+                blocks.put(&piece, !inside);
             }
         }
         if !left {
