@@ -81,7 +81,8 @@ fn vertices_at_the_points_have_a_smooth_surface() {
     assert_eq!(plain.triangles, moved.triangles);
     let way = |n: usize| DVec3::from(plain.vertices[n]).distance(DVec3::from(moved.vertices[n]));
     let farthest = (0..plain.vertices.len()).map(way).fold(0.0, f64::max);
-    assert!((farthest - found.moved_vertices).abs() < 1e-5 * farthest, "{farthest} {}", found.moved_vertices);
+    // Places of the mesh are those of f32.
+    assert!((farthest - found.moved_vertices).abs() < 1e-6, "{farthest} {}", found.moved_vertices);
     assert!(farthest <= 0.3001 * found.geometry.spacing[0], "{farthest}");
     let area = 4.0 * PI * PI * RADIUS * TUBE;
     assert!((found.measures.area / area - 1.0).abs() < 0.01, "{} {area}", found.measures.area);
