@@ -98,7 +98,7 @@ fn a_closed_body_stays_closed() {
 #[test]
 fn a_sheet_is_refused_with_the_flag_that_takes_it() {
     let bench = Bench::bare();
-    let point = |n: u32| [0.1 * f64::from(n % 50), 0.1 * f64::from(n / 50), 0.3 * (0.2 * f64::from(n % 50)).sin()];
+    let point = |n: u32| [0.1 * f64::from(n % 50), 0.1 * f64::from(n / 50), 0.05 * f64::from(n % 50)];
     let lines: Vec<String> = (0..2500).map(point).map(|[x, y, z]| format!("{x} {y} {z}")).collect();
     bench.write("sheet.xyz", &lines.join("\n"));
     let complaint = bench.fail("reconstruct sheet.xyz -o out/x.zarr", 2);

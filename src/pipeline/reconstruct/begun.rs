@@ -103,7 +103,8 @@ fn as_it_is(settings: &ReconstructSettings, search: &Search<'_>, found: Found) -
 }
 
 /// The cloud with caps over its holes, if it is a body that is open there: as a search near both finds it where that leaves half as many
-/// points without two sides, else, for one that nothing was found of, with the sides that the points and the caps have.
+/// points without two sides, else, for one that nothing was found of and whose box is too large to be searched, with the sides that the
+/// points and the caps have.
 fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32])) -> Result<Option<Begun>> {
     let cloud = search.cloud;
     let alone = &*engine.by_itself();
@@ -124,7 +125,7 @@ fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32]))
     {
         return Ok(Some(Begun { enclosure, closed: Some(closed), caps }));
     }
-    if !matches!(found, Found::Open) {
+    if !matches!(found, Found::Open) || voxels_of_box(search.grid, cloud) <= FARTHER_VOXELS {
         return Ok(None);
     }
     let surfels = [&sided.surfels[..], &surfels].concat();
