@@ -1,6 +1,7 @@
 //! The surface around each point of a cloud, and vertices put where these lie (docs/algorithms.md, "Vertices on the points' surface").
 //!
-//! Which side of a point is out is told by u, which is solved: so the points of two sheets are told apart however near they lie.
+//! Which side of a point is out is told by u, which is solved: so the points of two sheets are told apart however near they lie. Places are
+//! relative to the grid's origin, so that fits are the same bits wherever a cloud lies.
 
 use std::collections::BTreeMap;
 
@@ -56,6 +57,7 @@ impl<'a> Fitted<'a> {
         points: &[[f64; 3]],
     ) -> Result<Self> {
         let looking = outward_of(stage, u, geometry, points)?;
+        let points: Vec<[f64; 3]> = looking.iter().map(|point| point.at.to_array()).collect();
         let tree = RTree::bulk_load(points.iter().zip(0..).map(|(&p, n)| GeomWithData::new(p, n)).collect());
         let numbers: Vec<u32> = (0..points.len() as u32).collect();
         let parts: Vec<&[u32]> = numbers.chunks(AT_ONCE).collect();
@@ -77,7 +79,7 @@ impl<'a> Fitted<'a> {
         Ok(Self { geometry, tree, fits, reach })
     }
 
-    /// The fits that reach into a box of the world, in order of their points.
+    /// The fits that reach into a box, in order of their points.
     fn reaching(&self, low: [f64; 3], high: [f64; 3]) -> Vec<&LocalFit> {
         let around = AABB::from_corners(low.map(|v| v - self.reach), high.map(|v| v + self.reach));
         let mut numbers: Vec<u32> = self.tree.locate_in_envelope(around).map(|point| point.data).collect();
@@ -96,7 +98,8 @@ impl Placement for Fitted<'_> {
             return 0.0;
         }
         let (geometry, cells) = (self.geometry, patch.cells);
-        let (low, high) = (geometry.position(cells.lo), geometry.position(cells.hi));
+        let corner = |voxel: [i64; 3]| std::array::from_fn(|a| voxel[a] as f64 * geometry.spacing[a]);
+        let (low, high): ([f64; 3], [f64; 3]) = (corner(cells.lo), corner(cells.hi));
         let fits = self.reaching(low, high);
         let counts = cells.shape().map(|n| (n + CUBE - 1) / CUBE);
         let cubes = Box3::from_shape(counts);
@@ -114,7 +117,7 @@ impl Placement for Fitted<'_> {
         }
         let (most, mut moved) = (self.farthest(), 0.0_f64);
         for (position, around) in patch.positions.iter_mut().zip(around) {
-            let place: [f64; 3] = std::array::from_fn(|a| geometry.origin[a] + position[a] * geometry.spacing[a]);
+            let place: [f64; 3] = std::array::from_fn(|a| position[a] * geometry.spacing[a]);
             let mut blend = Blend::at(place.into(), around.outward);
             for &n in &lists[cubes.offset_of(cube(place))] {
                 blend.add(fits[n as usize]);
@@ -127,7 +130,7 @@ impl Placement for Fitted<'_> {
     }
 }
 
-/// The points, with the side of each that u has outside.
+/// The points, relative to the grid's origin, with the side of each that u has outside.
 fn outward_of(
     stage: &Stage<'_>,
     u: &BrickArray<f32>,
@@ -150,7 +153,9 @@ fn outward_of(
         let way = |&n: &usize| outward(values, &part, geometry.to_voxels(points[n]), geometry.spacing);
         Ok(members.iter().map(way).collect::<Vec<_>>())
     })?;
-    let mut looking: Vec<Looking> = points.iter().map(|&p| Looking { at: p.into(), outward: DVec3::ZERO }).collect();
+    let origin = DVec3::from(geometry.origin);
+    let mut looking: Vec<Looking> =
+        points.iter().map(|&p| Looking { at: DVec3::from(p) - origin, outward: DVec3::ZERO }).collect();
     for ((_, members), ways) in groups.iter().zip(found) {
         members.iter().zip(ways).for_each(|(&n, way)| looking[n].outward = way);
     }
