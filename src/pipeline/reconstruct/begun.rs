@@ -3,8 +3,8 @@
 
 use super::caps::{Cap, Closing, Holes};
 use super::flat::{IN_ONE_PLANE, flat};
+use super::normals::sided::Sided;
 use super::settings::ReconstructSettings;
-use super::sided::Sided;
 use crate::error::{Error, Result};
 use crate::exec::Engine;
 use crate::grid::{Geometry, digits};

@@ -11,8 +11,8 @@ use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::oriented::{AT_ONCE, Numbered, OrientedCloud};
-use super::sided::Sided;
+use super::normals::oriented::{AT_ONCE, Numbered, OrientedCloud};
+use super::normals::sided::Sided;
 use crate::error::Result;
 use crate::exec::{Engine, Hold, Stage, Workers};
 use crate::grid::{Box3, TriangleMesh};

@@ -14,13 +14,11 @@ mod flat;
 mod grid;
 mod isolated;
 mod noise;
+mod normals;
 mod on_grid;
-mod oriented;
 mod output;
 mod settings;
-mod sided;
 mod spacing;
-mod trimming;
 
 pub use caps::Cap;
 pub use estimate::{Estimate, estimate, plan, refuse_too_fine, spacing_memory};

@@ -13,24 +13,24 @@ use crate::kernel::points::surfel::Surfel;
 use crate::kernel::surface::Patch;
 
 /// The radius of the disc that rolls along the rim, and how far beyond the outermost points it lies, in spacings of the points.
-pub(super) const RADIUS: f64 = 3.0;
+pub(in crate::pipeline::reconstruct) const RADIUS: f64 = 3.0;
 const BEYOND: f64 = 0.3;
 
 /// The points that support a surface.
-pub(super) struct Trimming<'a> {
+pub(in crate::pipeline::reconstruct) struct Trimming<'a> {
     /// Where they are.
-    pub(super) tree: &'a RTree<Numbered>,
+    pub(in crate::pipeline::reconstruct) tree: &'a RTree<Numbered>,
     /// By number.
-    pub(super) surfels: &'a [Surfel],
+    pub(in crate::pipeline::reconstruct) surfels: &'a [Surfel],
     /// Their spacing.
-    pub(super) spacing: f64,
+    pub(in crate::pipeline::reconstruct) spacing: f64,
     /// The grid of the patches.
-    pub(super) geometry: &'a Geometry,
+    pub(in crate::pipeline::reconstruct) geometry: &'a Geometry,
 }
 
 impl Trimming<'_> {
     /// Cuts off what is beyond the rim; returns its area.
-    pub(super) fn trim(&self, patch: &mut Patch) -> f64 {
+    pub(in crate::pipeline::reconstruct) fn trim(&self, patch: &mut Patch) -> f64 {
         let before = self.area(patch);
         let rim = Rim { radius: RADIUS * self.spacing, beyond: BEYOND * self.spacing };
         let places: Vec<DVec3> = patch.positions.iter().map(|&position| self.world(position)).collect();

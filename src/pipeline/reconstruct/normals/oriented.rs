@@ -15,29 +15,29 @@ use crate::kernel::points::surfel::Surfel;
 /// Neighbours that tell a normal, and those that are linked.
 const NEIGHBOURS: usize = 12;
 /// Points that one thread takes at a time.
-pub(super) const AT_ONCE: usize = 256;
+pub(in crate::pipeline::reconstruct) const AT_ONCE: usize = 256;
 
 /// A point and its number.
-pub(super) type Numbered = GeomWithData<[f64; 3], u32>;
+pub(in crate::pipeline::reconstruct) type Numbered = GeomWithData<[f64; 3], u32>;
 
 /// The points of a cloud in a tree.
-pub(super) fn numbered(points: &[[f64; 3]]) -> RTree<Numbered> {
+pub(in crate::pipeline::reconstruct) fn numbered(points: &[[f64; 3]]) -> RTree<Numbered> {
     RTree::bulk_load(points.iter().zip(0..).map(|(&p, n)| GeomWithData::new(p, n)).collect())
 }
 
 /// Normals of the points, turned to one side, and what part of the surface each has.
-pub(super) struct OrientedCloud {
-    pub(super) normals: Vec<DVec3>,
-    pub(super) areas: Vec<f64>,
+pub(in crate::pipeline::reconstruct) struct OrientedCloud {
+    pub(in crate::pipeline::reconstruct) normals: Vec<DVec3>,
+    pub(in crate::pipeline::reconstruct) areas: Vec<f64>,
     /// Towards where each point has no neighbours, along the surface; unit length.
-    pub(super) beyond: Vec<DVec3>,
+    pub(in crate::pipeline::reconstruct) beyond: Vec<DVec3>,
     /// The edge of the square that a point has of the surface, the median.
-    pub(super) apart: f64,
+    pub(in crate::pipeline::reconstruct) apart: f64,
 }
 
 impl OrientedCloud {
     /// The points with their normals.
-    pub(super) fn surfels(&self, points: &[[f64; 3]]) -> Vec<Surfel> {
+    pub(in crate::pipeline::reconstruct) fn surfels(&self, points: &[[f64; 3]]) -> Vec<Surfel> {
         let surfel = |(&place, &normal): (&[f64; 3], &DVec3)| Surfel { place: DVec3::from(place), normal };
         points.iter().zip(&self.normals).map(surfel).collect()
     }
@@ -46,7 +46,11 @@ impl OrientedCloud {
     ///
     /// # Errors
     /// When the run is interrupted.
-    pub(super) fn new(stage: &Stage<'_>, points: &[[f64; 3]], tree: &RTree<Numbered>) -> Result<Self> {
+    pub(in crate::pipeline::reconstruct) fn new(
+        stage: &Stage<'_>,
+        points: &[[f64; 3]],
+        tree: &RTree<Numbered>,
+    ) -> Result<Self> {
         let parts: Vec<&[[f64; 3]]> = points.chunks(AT_ONCE).collect();
         let found = stage.run(&parts, &Workers::none(), |(), part| {
             let told = |p: &[f64; 3]| {

@@ -2,24 +2,24 @@
 
 use rstar::RTree;
 
-use super::estimate::spacing_memory;
 use super::oriented::{Numbered, OrientedCloud, numbered};
-use super::spacing::typical_spacing;
 use super::trimming::Trimming;
 use crate::error::Result;
 use crate::exec::{Engine, Hold};
 use crate::grid::Geometry;
 use crate::kernel::points::surfel::Surfel;
+use crate::pipeline::reconstruct::estimate::spacing_memory;
+use crate::pipeline::reconstruct::spacing::typical_spacing;
 
 /// Bytes a point takes: its place and number in two trees, its normal, and its links until all normals are turned.
 const BYTES: u64 = 1000;
 
 /// A cloud with its normals.
-pub(super) struct Sided {
-    pub(super) tree: RTree<Numbered>,
-    pub(super) cloud: OrientedCloud,
+pub(in crate::pipeline::reconstruct) struct Sided {
+    pub(in crate::pipeline::reconstruct) tree: RTree<Numbered>,
+    pub(in crate::pipeline::reconstruct) cloud: OrientedCloud,
     /// By number.
-    pub(super) surfels: Vec<Surfel>,
+    pub(in crate::pipeline::reconstruct) surfels: Vec<Surfel>,
     spacing: f64,
     _held: Hold,
 }
@@ -29,7 +29,7 @@ impl Sided {
     ///
     /// # Errors
     /// When the memory is too little, or the run is interrupted.
-    pub(super) fn new(engine: &Engine, points: &[[f64; 3]]) -> Result<Self> {
+    pub(in crate::pipeline::reconstruct) fn new(engine: &Engine, points: &[[f64; 3]]) -> Result<Self> {
         let held = engine.hold(points.len() as u64 * BYTES.max(spacing_memory(1)))?;
         let stage = engine.stage("normals", points.len() as u64);
         let tree = numbered(points);
@@ -45,7 +45,7 @@ impl Sided {
     }
 
     /// What trims a surface on a grid.
-    pub(super) fn trimming<'a>(&'a self, geometry: &'a Geometry) -> Trimming<'a> {
+    pub(in crate::pipeline::reconstruct) fn trimming<'a>(&'a self, geometry: &'a Geometry) -> Trimming<'a> {
         Trimming { tree: &self.tree, surfels: &self.surfels, spacing: self.spacing, geometry }
     }
 }
