@@ -159,7 +159,7 @@ fn turned(profile: impl Fn(f64) -> f64, heights: [f64; 2], step: f64) -> Vec<[f6
 }
 
 /// A ball on a foot that widens towards its open end, as scans of busts have it: narrowest is the neck, and still most
-/// of the foot is inside; a ball closes it that touches the rim.
+/// of the foot is inside; what closes it touches the rim.
 #[test]
 #[ignore = "long; .ci/run has it"]
 fn an_open_foot_is_closed_near_its_rim() {
@@ -172,7 +172,9 @@ fn an_open_foot_is_closed_near_its_rim() {
     let foot_volume: f64 = (0..1400).map(|n| PI * foot(f64::from(n) * 1e-3).powi(2) * 1e-3).sum();
     let part = (found.measures.volume - 4.0 / 3.0 * PI) / foot_volume;
     println!("h {h}: {part} of the foot, {:?}, {:?}, {} lost", found.measures, found.hausdorff, found.lost_points);
-    assert!(part > 0.4 && part < 1.0, "{part} of the foot");
+    // A flat cap gives all of the foot; a cap's points lie about a voxel beyond the outermost ring.
+    let beyond = PI * foot(1.4).powi(2) * 1.5 * h / foot_volume;
+    assert!(part > 0.4 && part < 1.0 + beyond, "{part} of the foot, a cap {beyond}");
     assert!(found.lost_points < 5 * cloud.len() as u64 / 100);
 }
 
