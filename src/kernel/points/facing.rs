@@ -5,6 +5,7 @@
 use glam::DVec3;
 
 use super::surfel::Surfel;
+use crate::grid::{Box3, Geometry};
 
 /// How far above the surface a place lies, below it less than 0: the mean of its heights over the points' tangent planes, weighed
 /// by `1 / (r^2 + smooth^2)^2`. None without points.
@@ -18,6 +19,23 @@ pub fn height(at: DVec3, near: &[Surfel], smooth: f64) -> Option<f64> {
         all += weight;
     }
     (all > 0.0).then(|| sum / all)
+}
+
+/// The level set in some voxels of a brick, which is dense `[z][y][x]` with row length and plane height `edge`: 1/2 on the surface of the
+/// points `near` them, from 1 below it to 0 above it over `width`, a physical length; 0 without points.
+pub fn level_of_block(
+    geometry: &Geometry,
+    (brick, edge): (&Box3, i64),
+    block: &Box3,
+    (near, smooth, width): (&[Surfel], f64, f64),
+    u: &mut [f32],
+) {
+    for voxel in (0..block.len()).map(|n| block.voxel_at(n)) {
+        let height = height(DVec3::from(geometry.position(voxel)), near, smooth);
+        let [x, y, z] = [0, 1, 2].map(|a| voxel[a] - brick.lo[a]);
+        u[((z * edge + y) * edge + x) as usize] =
+            height.map_or(0.0, |height| (0.5 - height / width).clamp(0.0, 1.0) as f32);
+    }
 }
 
 #[cfg(test)]

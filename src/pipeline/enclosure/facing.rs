@@ -1,7 +1,6 @@
 //! The surface of a cloud with normals as a level set, where no inside is told by the points' distance alone (docs/algorithms.md,
 //! "Open surfaces").
 
-use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
@@ -9,7 +8,7 @@ use super::near::Near;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers, one_wave};
 use crate::grid::{Box3, Geometry};
-use crate::kernel::points::facing::height;
+use crate::kernel::points::facing::level_of_block;
 use crate::kernel::points::surfel::Surfel;
 use crate::store::BrickArray;
 
@@ -22,11 +21,8 @@ const SMOOTH_VOXELS: f64 = 0.5;
 /// From 1 to 0 it is so many.
 const WIDTH_VOXELS: f64 = 4.0;
 
-/// Whether a place far from the points is inside; world coordinates.
-pub(crate) type IsInside<'a> = &'a (dyn Fn([f64; 3]) -> bool + Sync);
-
-/// The surface of the points as a level set over this rank's cells `near` them: 1/2 on it, more below, and 1 or 0 where no points are near, as
-/// `is_inside` says.
+/// The surface of the points as a level set over this rank's cells `near` them: 1/2 on it, more below, and 0 where no points
+/// are near.
 ///
 /// # Errors
 /// When scratch runs out or the run is interrupted.
@@ -34,20 +30,11 @@ pub(super) fn level_set(
     stage: &Stage<'_>,
     engine: &Engine,
     geometry: &Geometry,
-    (surfels, is_inside): (&[Surfel], IsInside<'_>),
+    surfels: &[Surfel],
     near: Near<'_>,
 ) -> Result<BrickArray<f32>> {
     let set = near.distance.set();
-    let mut u = BrickArray::with_faces(engine.scratch(), set)?;
-    let side = |at| f32::from(u8::from(is_inside(at)));
-    let far = near.far_regions();
-    for (bricks, level) in far.bricks.iter().zip(&far.level) {
-        let middle = middle_of(geometry, &set.grid().brick_box(bricks[0]));
-        let value = if *level < far.farthest { side(middle) } else { 0.0 };
-        for &id in bricks {
-            u.set_absent(id, value);
-        }
-    }
+    let u = BrickArray::with_faces(engine.scratch(), set)?;
     let numbered = surfels.iter().zip(0..).map(|(surfel, n)| GeomWithData::new(surfel.place.to_array(), n));
     let tree: RTree<GeomWithData<[f64; 3], u32>> = RTree::bulk_load(numbered.collect());
     let [reach, smooth, width] =
@@ -62,13 +49,7 @@ pub(super) fn level_set(
                     tree.locate_within_distance(middle, reach * reach).map(|point| point.data).collect();
                 near.sort_unstable();
                 let near: Vec<Surfel> = near.into_iter().map(|n| surfels[n as usize]).collect();
-                let beyond = if near.is_empty() { side(middle) } else { 0.0 };
-                for voxel in (0..block.len()).map(|n| block.voxel_at(n)) {
-                    let height = height(DVec3::from(geometry.position(voxel)), &near, smooth);
-                    let [x, y, z] = [0, 1, 2].map(|a| voxel[a] - part.lo[a]);
-                    u[((z * edge + y) * edge + x) as usize] =
-                        height.map_or(beyond, |height| (0.5 - height / width).clamp(0.0, 1.0) as f32);
-                }
+                level_of_block(geometry, (&part, edge), &block, (&near, smooth, width), u);
             }
         });
         u.refresh_faces(slot);

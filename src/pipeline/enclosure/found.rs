@@ -128,6 +128,7 @@ impl Enclosure {
             let set = &Arc::new(self.cells);
             let solved = BrickArray::blank(engine.scratch(), set, 0)?;
             let (u, distance) = (whole_field(&stage, u, set)?, whole_field(&stage, self.distance, set)?);
+            stage.finish();
             return Ok((Band { u, distance, solved, voxels: 0 }, self.held));
         }
         let sides = SidesNear { distance: &self.distance, inside: &self.inside, cells: &self.cells };

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::facing::{IsInside, level_set};
+use super::facing::level_set;
 pub use super::found::{Deepest, Enclosure, Found, Hole};
 use super::near::Near;
 use super::needs::box_bytes;
@@ -62,8 +62,8 @@ pub struct Search<'a> {
     pub start: Start,
     /// The distance from the cloud within which the search begins.
     pub first_reach: f64,
-    /// The search ends as open where that finds too little; else it grows.
-    pub only_near: bool,
+    /// The search ends as open where too little is found within this; as long as it is less, it grows.
+    pub most_reach: f64,
     /// What is added to the names of stages.
     pub suffix: &'a str,
 }
@@ -124,7 +124,7 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     loop {
         let around = Around::new(engine, search, farthest, &mut progress)?;
         let mut sides = around.sides_found(engine, search, &mut progress)?;
-        if search.only_near && (sides.basins.is_empty() || !enough(&sides)) {
+        if farthest >= search.most_reach && (sides.basins.is_empty() || !enough(&sides)) {
             return Ok(Found::Open);
         }
         // No ball fits the box around the cloud that is larger.
@@ -157,22 +157,17 @@ fn enclose_by_sides(engine: &Engine, search: &Search<'_>) -> Result<Found> {
     }
 }
 
-/// The surface of points with normals, for what encloses nothing: told near them, by `is_inside` farther off. Nothing of it is to be solved.
+/// The surface of points with normals, for what encloses nothing: told near them. Nothing of it is to be solved.
 ///
 /// # Errors
 /// When the box does not fit the memory, scratch runs out or the run is interrupted.
-pub(crate) fn face(
-    engine: &Engine,
-    search: &Search<'_>,
-    surfels: &[Surfel],
-    is_inside: IsInside<'_>,
-) -> Result<Box<Enclosure>> {
+pub(crate) fn face(engine: &Engine, search: &Search<'_>, surfels: &[Surfel]) -> Result<Box<Enclosure>> {
     let mut progress = Progress::begin(engine, search.suffix)?;
     let farthest = progress.farthest_or(search.first_reach);
     let around = Around::new(engine, search, farthest, &mut progress)?;
     let stage = around.tagging(engine, search);
     let geometry = &around.region.geometry;
-    let u = level_set(&stage, engine, geometry, (surfels, is_inside), around.near())?;
+    let u = level_set(&stage, engine, geometry, surfels, around.near())?;
     stage.finish();
     let inside = BrickArray::blank(engine.scratch(), around.distance.set(), 0u8)?;
     let reaches = Reaches { inner: 0.0, outer: 0.0 };

@@ -19,8 +19,11 @@ const MOST_SHEET: f64 = 0.02;
 /// Caps are put over the holes of a cloud of which so many of the points in doubt have an inside.
 const LEAST_BODY: f64 = 0.5;
 
-/// Far from the points an inside is looked for in boxes of so many voxels at most: it takes all of the box.
+/// As far from the points as the box is wide an inside is looked for in boxes of so many voxels at most.
 const FARTHER_VOXELS: u64 = 4 << 20;
+
+/// In larger ones that of a body is looked for so many times as far as at first.
+const BODY_REACH: f64 = 4.0;
 
 /// A cloud that is no thicker than this part of a spacing, root mean square, is flat.
 const FLAT_VOXELS: f64 = 0.1;
@@ -50,14 +53,15 @@ pub(super) fn enclosed(
     settings: &ReconstructSettings,
     sided: Option<&Sided>,
 ) -> Result<Begun> {
+    let first_reach = first_reach_for(grid, settings.beta);
     let search = Search {
         grid,
         cloud,
         method: settings.method,
         beta: settings.beta,
         start: Start::Watershed,
-        first_reach: first_reach_for(grid, settings.beta),
-        only_near: true,
+        first_reach,
+        most_reach: first_reach,
         suffix: "",
     };
     let found = enclose(engine, &search)?;
@@ -72,18 +76,26 @@ pub(super) fn enclosed(
     }
     if let Some(sided) = sided {
         let search = Search { suffix: " of sides", ..search };
-        return Ok(Begun::of(face(engine, &search, &sided.surfels, &|_| false)?));
+        return Ok(Begun::of(face(engine, &search, &sided.surfels)?));
     }
     let lost: Vec<u32> = match &found {
         Found::Enclosed(enclosure) => enclosure.sheet().to_vec(),
         _ => (0..cloud.len() as u32).collect(),
     };
-    if let Some(begun) = closed(engine, &search, (&found, &lost))? {
-        return Ok(begun);
-    }
+    let is_body = match closed(engine, &search, (&found, &lost))? {
+        Capped::Closed(begun) => return Ok(begun),
+        Capped::Body => true,
+        Capped::NoBody => false,
+    };
+    // Far from the points a search takes all of the box.
+    let most_reach = match voxel_bounds(cloud, grid).volume() {
+        ..=FARTHER_VOXELS => f64::INFINITY,
+        _ if is_body => BODY_REACH * first_reach,
+        _ => first_reach,
+    };
     let found = match found {
-        Found::Open if voxels_of_box(grid, cloud) <= FARTHER_VOXELS => {
-            enclose(engine, &Search { only_near: false, suffix: " farther", ..search })?
+        Found::Open if most_reach > first_reach => {
+            enclose(engine, &Search { most_reach, suffix: " farther", ..search })?
         }
         found => found,
     };
@@ -102,41 +114,38 @@ fn as_it_is(settings: &ReconstructSettings, search: &Search<'_>, found: Found) -
     })
 }
 
-/// The cloud with caps over its holes, if it is a body that is open there: as a search near both finds it where that leaves half as many
-/// points without two sides, else, for one that nothing was found of and whose box is too large to be searched, with the sides that the
-/// points and the caps have.
-fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32])) -> Result<Option<Begun>> {
+/// What caps make of a cloud.
+enum Capped {
+    /// They close it.
+    Closed(Begun),
+    /// It is a body, but they do not close it.
+    Body,
+    /// Most of the points in doubt have no inside.
+    NoBody,
+}
+
+/// The cloud with caps over its holes, if it is a body that is open there: as a search near both finds it, where that leaves half as many
+/// points without two sides.
+fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32])) -> Result<Capped> {
     let cloud = search.cloud;
     let alone = &*engine.by_itself();
     let sided = Sided::new(alone, cloud)?;
     let holes = Holes::new(alone, cloud, &sided)?;
     if holes.share_of_body(lost) < LEAST_BODY {
-        return Ok(None);
+        return Ok(Capped::NoBody);
     }
-    let Closing { surfels, caps } = holes.close(alone)?;
-    if surfels.is_empty() && !matches!(found, Found::Open) {
-        return Ok(None);
+    let Closing { points, caps } = holes.close(alone)?;
+    if points.is_empty() && !matches!(found, Found::Open) {
+        return Ok(Capped::Body);
     }
-    let new = surfels.iter().map(|surfel| surfel.place.to_array());
-    let closed: Vec<[f64; 3]> = cloud.iter().copied().chain(new).collect();
+    let closed = [cloud, &points].concat();
     let with_caps = Search { cloud: &closed, suffix: " with caps", ..*search };
     if let Found::Enclosed(enclosure) = enclose(engine, &with_caps)?
         && 2 * enclosure.sheet().len() < lost.len()
     {
-        return Ok(Some(Begun { enclosure, closed: Some(closed), caps }));
+        return Ok(Capped::Closed(Begun { enclosure, closed: Some(closed), caps }));
     }
-    if !matches!(found, Found::Open) || voxels_of_box(search.grid, cloud) <= FARTHER_VOXELS {
-        return Ok(None);
-    }
-    let surfels = [&sided.surfels[..], &surfels].concat();
-    let search = Search { suffix: " of sides", ..with_caps };
-    let enclosure = face(engine, &search, &surfels, &|at| holes.is_inside(at, 0.5))?;
-    Ok(Some(Begun { enclosure, closed: Some(closed), caps }))
-}
-
-/// The voxels of the box around a cloud.
-fn voxels_of_box(grid: &Geometry, cloud: &[[f64; 3]]) -> u64 {
-    voxel_bounds(cloud, grid).volume()
+    Ok(Capped::Body)
 }
 
 /// What is said of a cloud that no setting gives an inside.

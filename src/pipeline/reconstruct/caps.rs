@@ -17,7 +17,6 @@ use crate::error::Result;
 use crate::exec::{Engine, Hold, Stage, Workers};
 use crate::grid::{Box3, TriangleMesh};
 use crate::kernel::geometry::winding_number::WindingTree;
-use crate::kernel::points::surfel::Surfel;
 use crate::kernel::topology::union_find::Forest;
 
 /// A cap is farther than so many edges of the square that a point has of the surface from all points.
@@ -49,7 +48,7 @@ pub struct Cap {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Closing {
     /// New points.
-    pub(super) surfels: Vec<Surfel>,
+    pub(super) points: Vec<[f64; 3]>,
     /// The holes they close, the widest first.
     pub(super) caps: Vec<Cap>,
 }
@@ -61,8 +60,6 @@ struct Place {
     /// From the nearest point.
     away: f64,
     area: f64,
-    /// Out of the body.
-    normal: DVec3,
 }
 
 /// The winding number of a cloud, and what it says of its holes.
@@ -95,7 +92,7 @@ impl<'a> Holes<'a> {
     }
 
     /// Whether the winding number is more than that.
-    pub(super) fn is_inside(&self, at: [f64; 3], most: f64) -> bool {
+    fn is_inside(&self, at: [f64; 3], most: f64) -> bool {
         self.winding.winding_number(at) > most
     }
 
@@ -111,8 +108,8 @@ impl<'a> Holes<'a> {
         let rims = lattice.rims(&stage, self.points, cloud)?;
         let places = lattice.places(&stage, rims, MOST_NEW * self.points.len())?;
         stage.finish();
-        let surfels = places.iter().map(|place| Surfel { place: place.at, normal: place.normal }).collect();
-        Ok(Closing { surfels, caps: caps(&places, step) })
+        let points = places.iter().map(|place| place.at.to_array()).collect();
+        Ok(Closing { points, caps: caps(&places, step) })
     }
 }
 
@@ -224,8 +221,8 @@ impl Lattice<'_> {
                     let at = a + (b - a) * (from / (from - to));
                     let away = self.away(at);
                     if away > BESIDE * self.step {
-                        let (area, normal) = self.facet(at);
-                        found.push(((node, axis), Place { at, away, area, normal }));
+                        let area = self.area(at);
+                        found.push(((node, axis), Place { at, away, area }));
                     }
                 }
             }
@@ -234,12 +231,12 @@ impl Lattice<'_> {
     }
 
     /// The area that one crossing of the border with the lattice's lines stands for: a border with the unit normal n has
-    /// |n| of each axis over the step squared of them. And n.
-    fn facet(&self, at: DVec3) -> (f64, DVec3) {
+    /// |n| of each axis over the step squared of them.
+    fn area(&self, at: DVec3) -> f64 {
         let step = 0.5 * self.step;
         let slope = DVec3::AXES.map(|axis| self.side(at + axis * step) - self.side(at - axis * step));
-        let normal = -DVec3::from(slope).normalize_or(DVec3::ONE.normalize());
-        (self.step.powi(2) / normal.abs().element_sum(), normal)
+        let normal = DVec3::from(slope).normalize_or(DVec3::ONE.normalize());
+        self.step.powi(2) / normal.abs().element_sum()
     }
 }
 

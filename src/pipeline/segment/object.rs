@@ -47,7 +47,7 @@ pub(super) fn solve<T: Element>(
         beta: settings.beta,
         start: if loose { search::Start::Watershed } else { search::Start::Tube },
         first_reach: first_reach(marks, picture.geometry, settings),
-        only_near: false,
+        most_reach: f64::INFINITY,
         suffix: &suffix,
     };
     let enclosure = match enclose(engine, &search)? {

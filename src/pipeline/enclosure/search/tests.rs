@@ -47,8 +47,8 @@ fn a_search_that_is_ended_anywhere_goes_on_with_the_same_bits() {
         let run = |engine: &Engine| {
             let first_reach = first_reach_for(&grid, beta);
             let method = Method::FSM;
-            let (only_near, suffix) = (false, "");
-            let search = Search { grid: &grid, cloud: &cloud, method, beta, start, first_reach, only_near, suffix };
+            let (most_reach, suffix) = (f64::INFINITY, "");
+            let search = Search { grid: &grid, cloud: &cloud, method, beta, start, first_reach, most_reach, suffix };
             let found = found(engine, &search);
             most.fetch_max(engine.reports().len(), Relaxed);
             found
@@ -116,8 +116,8 @@ fn a_search_on_ranks_finds_what_one_does() {
     assert_eq!(CELL, 16, "the hollow is larger than the reach and a cell");
     for (n, (cloud, start, beta)) in runs.into_iter().enumerate() {
         let first_reach = first_reach_for(&grid, beta);
-        let (method, only_near, suffix) = (Method::VDT, false, "");
-        let search = Search { grid: &grid, cloud: &cloud, method, beta, start, first_reach, only_near, suffix };
+        let (method, most_reach, suffix) = (Method::VDT, f64::INFINITY, "");
+        let search = Search { grid: &grid, cloud: &cloud, method, beta, start, first_reach, most_reach, suffix };
         let one = band_on(Arc::new(SelfComm), &search).unwrap();
         for ranks in if n == 0 { vec![2, 3, 5] } else { vec![3] } {
             for (rank, found) in as_threads(ranks, |comm| band_on(comm, &search)).unwrap().into_iter().enumerate() {
