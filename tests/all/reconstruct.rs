@@ -172,9 +172,13 @@ fn an_open_foot_is_closed_near_its_rim() {
     let foot_volume: f64 = (0..1400).map(|n| PI * foot(f64::from(n) * 1e-3).powi(2) * 1e-3).sum();
     let part = (found.measures.volume - 4.0 / 3.0 * PI) / foot_volume;
     println!("h {h}: {part} of the foot, {:?}, {:?}, {} lost", found.measures, found.hausdorff, found.lost_points);
-    // A flat cap gives all of the foot; a cap's points lie about a voxel beyond the outermost ring.
-    let beyond = PI * foot(1.4).powi(2) * 1.5 * h / foot_volume;
-    assert!(part > 0.4 && part < 1.0 + beyond, "{part} of the foot, a cap {beyond}");
+    // A flat cap over the rim gives all of the foot but what the ball has of it; the surface lies within a voxel of that.
+    let of_ball = {
+        let height = 1.0 + neck;
+        PI * height * height * (3.0 - height) / 3.0 / foot_volume
+    };
+    let layer = PI * foot(1.4).powi(2) * h / foot_volume;
+    assert!((part - (1.0 - of_ball)).abs() < layer, "{part} of the foot, a flat cap {}", 1.0 - of_ball);
     assert!(found.lost_points < 5 * cloud.len() as u64 / 100);
 }
 

@@ -117,13 +117,10 @@ impl Tile {
 fn level(squared: f32, same: u32, all: u32) -> u8 {
     let distance = (squared.sqrt().round() as u32).max(1);
     if distance > DISTANCES {
-        FAR
-    } else {
-        {
-            let parts = u32::from(PARTS);
-            ((distance - 1) * parts + 1 + same * (parts - 1) / all) as u8
-        }
+        return FAR;
     }
+    let parts = u32::from(PARTS);
+    ((distance - 1) * parts + 1 + same * (parts - 1) / all) as u8
 }
 
 #[cfg(test)]

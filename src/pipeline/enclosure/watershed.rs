@@ -58,13 +58,12 @@ pub fn watershed(
     near: Near<'_>,
     pockets: Option<&BrickArray<f32>>,
 ) -> Result<Sides> {
-    let (distance, set) = (near.distance, near.distance.set());
+    let set = near.distance.set();
     let edge = set.grid().edge() as usize;
     let make = move || Worker { ascent: Ascent::default(), d: HaloTile::new(edge), regions: HaloTile::new(edge) };
     let flood = Watershed {
         stage,
         near,
-        distance,
         pockets,
         spacing: sources.geometry.spacing,
         plan: HaloPlan::new(*set.grid(), Reach::Faces),
@@ -96,7 +95,6 @@ struct Meetings {
 struct Watershed<'a> {
     stage: &'a Stage<'a>,
     near: Near<'a>,
-    distance: &'a BrickArray<f32>,
     pockets: Option<&'a BrickArray<f32>>,
     spacing: [f64; 3],
     plan: HaloPlan,
@@ -105,11 +103,11 @@ struct Watershed<'a> {
 
 impl Watershed<'_> {
     fn set(&self) -> &Arc<BrickSet> {
-        self.distance.set()
+        self.near.distance.set()
     }
 
     fn gather_distance(&self, slot: Slot, tile: &mut HaloTile<f32>) {
-        self.plan.gather(self.distance, slot, Boundary::Constant(f32::INFINITY), tile);
+        self.plan.gather(self.near.distance, slot, Boundary::Constant(f32::INFINITY), tile);
     }
 
     /// Numbers the maxima of all bricks, in grid order after the far regions; the others' voxels are unknown yet.
