@@ -1,5 +1,6 @@
 //! Clouds without a grid: what the points around a place tell of the surface there.
 
+pub mod bridge;
 pub mod facing;
 pub mod height_field;
 pub mod local_fit;

@@ -8,7 +8,8 @@
 
 use std::collections::BTreeMap;
 
-use super::blocks::{Blocks, FAR, INSIDE, PARTS, Where};
+use super::blocks::{Blocks, FAR, INSIDE, PARTS, STRIDES, Where, is_deep};
+use super::levels::Levels;
 use super::neighbourhood::{Joined, MIDDLE};
 use super::union_find::Forest;
 
@@ -54,23 +55,15 @@ impl Grown {
             voxels: vec![u64::MAX / 2; rooms],
         };
         grown.name_far(blocks, inside);
-        let side = if inside { INSIDE } else { 0 };
-        let level_of = |state: u8| match order {
-            Order::Distance if state & FAR != FAR => ((state & FAR) - 1) / PARTS,
-            _ => state & FAR,
-        };
-        let mut levels = [false; 128];
-        let of_side = |state: u8| state & INSIDE == side;
-        blocks.states.iter().filter(|&&s| of_side(s)).for_each(|&state| levels[usize::from(level_of(state))] = true);
+        let levels = Levels::new(blocks, inside, |state| match order {
+            Order::Distance => ((state & FAR) - 1) / PARTS,
+            Order::Level => state & FAR,
+        });
         let joined = if inside { Joined::Faces } else { Joined::Edges };
         let mut again = Vec::new();
-        for level in (0..FAR).rev().filter(|&level| levels[usize::from(level)]) {
+        for level in (0..FAR).rev() {
             check()?;
-            for place in 0..blocks.states.len() {
-                let state = blocks.states[place];
-                if !of_side(state) || level_of(state) != level {
-                    continue;
-                }
+            for place in levels.places(level) {
                 again.push(place);
                 while let Some(place) = again.pop() {
                     if matches!(grown.names[place], OUT | WAITS) {
@@ -146,21 +139,28 @@ impl Grown {
         }
     }
 
-    /// Adds a voxel if no loop closes through it; those that wait beside it are to be looked at again.
-    fn add(&mut self, blocks: &Blocks, joined: Joined, inside: bool, place: usize, again: &mut Vec<usize>) {
-        let (mut set, mut waiting) = (0_u32, 0_u32);
-        let mut names = [0_u32; 27];
-        for (bit, name) in names.iter_mut().enumerate().filter(|(bit, _)| *bit != MIDDLE) {
-            *name = match blocks.neighbour(place, bit) {
+    /// The names of the voxels around one.
+    fn names_around(&self, blocks: &Blocks, inside: bool, place: usize) -> [u32; 27] {
+        let mut names = if is_deep(place) {
+            STRIDES.map(|by| self.names[place.wrapping_add_signed(by)])
+        } else {
+            std::array::from_fn(|bit| match blocks.neighbour(place, bit) {
                 Where::Voxel(other) => self.names[other],
                 Where::Room(room) if blocks.rooms[room as usize] == inside => room + 1,
                 Where::Room(_) => OUT,
-            };
-            match *name {
-                OUT => {}
-                WAITS => waiting |= 1 << bit,
-                _ => set |= 1 << bit,
-            }
+            })
+        };
+        names[MIDDLE] = OUT;
+        names
+    }
+
+    /// Adds a voxel if no loop closes through it; those that wait beside it are to be looked at again.
+    fn add(&mut self, blocks: &Blocks, joined: Joined, inside: bool, place: usize, again: &mut Vec<usize>) {
+        let names = self.names_around(blocks, inside, place);
+        let (mut set, mut waiting) = (0_u32, 0_u32);
+        for (bit, &name) in names.iter().enumerate() {
+            set |= u32::from(!matches!(name, OUT | WAITS)) << bit;
+            waiting |= u32::from(name == WAITS) << bit;
         }
         let mut pieces = [0; 8];
         let count = joined.pieces(set, &mut pieces);

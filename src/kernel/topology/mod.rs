@@ -2,6 +2,7 @@
 
 pub mod blocks;
 pub mod growth;
+pub mod levels;
 pub mod neighbourhood;
 pub mod seams;
 pub mod sides;

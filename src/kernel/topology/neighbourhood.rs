@@ -65,19 +65,18 @@ impl Joined {
     /// The pieces of a set that touch the middle, each by its voxels joined to it; the set is given by its bits. Returns how many there are.
     #[must_use]
     pub fn pieces(self, set: u32, pieces: &mut [u32; 8]) -> usize {
-        let beside = self.beside();
         let set = set & !(1 << MIDDLE);
-        let touching = set & beside[MIDDLE];
+        let touching = set & self.beside()[MIDDLE];
         let steps = match self {
             Self::Faces => 2,
             Self::Edges => 1,
         };
-        let near = (0..steps).fold(touching, |near, _| near | grown(near, beside) & set);
+        let near = (0..steps).fold(touching, |near, _| self.grown(near) & set);
         let (mut left, mut count) = (touching, 0);
         while left != 0 && count < pieces.len() {
             let mut piece = left & left.wrapping_neg();
             loop {
-                let more = piece | grown(piece, beside) & near;
+                let more = self.grown(piece) & near;
                 if more == piece {
                     break;
                 }
@@ -89,15 +88,41 @@ impl Joined {
         }
         count
     }
+
+    /// A set with all that is joined to it.
+    #[inline]
+    fn grown(self, set: u32) -> u32 {
+        let rows = [0, 1, 2].map(|axis| along(axis, set));
+        match self {
+            Self::Faces => rows[0] | rows[1] | rows[2],
+            Self::Edges => along(1, rows[0]) | along(2, rows[1]) | along(0, rows[2]),
+        }
+    }
 }
 
-fn grown(set: u32, beside: &[u32; 27]) -> u32 {
-    let (mut left, mut all) = (set, 0);
-    while left != 0 {
-        all |= beside[left.trailing_zeros() as usize];
-        left &= left - 1;
+/// For each axis the bits that are the last along it, and the first.
+const ENDS: [[u32; 2]; 3] = [ends(0), ends(1), ends(2)];
+
+const fn ends(axis: usize) -> [u32; 2] {
+    let mut all = [0; 2];
+    let mut bit = 0;
+    while bit < 27 {
+        match offset(bit)[axis] {
+            1 => all[0] |= 1 << bit,
+            -1 => all[1] |= 1 << bit,
+            _ => {}
+        }
+        bit += 1;
     }
     all
+}
+
+/// A set with what is beside it along an axis.
+#[inline]
+fn along(axis: usize, set: u32) -> u32 {
+    const STEPS: [u32; 3] = [1, 3, 9];
+    let [last, first] = ENDS[axis];
+    set | (set & !last) << STEPS[axis] | (set & !first) >> STEPS[axis]
 }
 
 #[cfg(test)]

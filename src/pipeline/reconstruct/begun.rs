@@ -1,6 +1,7 @@
 //! What a reconstruction begins with: the search for what the cloud encloses, as it is, with caps, farther from it; and what is said
 //! where there is nothing.
 
+use super::bridges::bridges;
 use super::caps::{Cap, Closing, Holes};
 use super::flat::{IN_ONE_PLANE, flat};
 use super::normals::sided::Sided;
@@ -82,10 +83,10 @@ pub(super) fn enclosed(
         Found::Enclosed(enclosure) => enclosure.sheet().to_vec(),
         _ => (0..cloud.len() as u32).collect(),
     };
-    let is_body = match closed(engine, &search, (&found, &lost))? {
+    let (is_body, closing) = match closed(engine, &search, (&found, &lost))? {
         Capped::Closed(begun) => return Ok(begun),
-        Capped::Body => true,
-        Capped::NoBody => false,
+        Capped::Body(closing) => (true, closing),
+        Capped::NoBody => (false, Closing::default()),
     };
     // Far from the points a search takes all of the box.
     let most_reach = match voxel_bounds(cloud, grid).volume() {
@@ -93,13 +94,20 @@ pub(super) fn enclosed(
         _ if is_body => BODY_REACH * first_reach,
         _ => first_reach,
     };
-    let found = match found {
-        Found::Open if most_reach > first_reach => {
-            enclose(engine, &Search { most_reach, suffix: " farther", ..search })?
-        }
-        found => found,
-    };
-    as_it_is(settings, &search, found)
+    if !matches!(found, Found::Open) || most_reach == first_reach {
+        return as_it_is(settings, &search, found);
+    }
+    let farther = Search { most_reach, suffix: " farther", ..search };
+    let found = enclose(engine, &farther)?;
+    if matches!(found, Found::Enclosed(_)) || closing.points.is_empty() {
+        return as_it_is(settings, &search, found);
+    }
+    // Holes wider than the points are apart, and the points so uneven that a search near them is lost too.
+    let closed = [cloud, &closing.points].concat();
+    match enclose(engine, &Search { cloud: &closed, suffix: " farther with caps", ..farther })? {
+        Found::Enclosed(enclosure) => Ok(Begun { enclosure, closed: Some(closed), caps: closing.caps }),
+        _ => as_it_is(settings, &search, found),
+    }
 }
 
 /// What a search gave, as it is.
@@ -118,8 +126,8 @@ fn as_it_is(settings: &ReconstructSettings, search: &Search<'_>, found: Found) -
 enum Capped {
     /// They close it.
     Closed(Begun),
-    /// It is a body, but they do not close it.
-    Body,
+    /// It is a body, but near the points these do not close it.
+    Body(Closing),
     /// Most of the points in doubt have no inside.
     NoBody,
 }
@@ -134,18 +142,23 @@ fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32]))
     if holes.share_of_body(lost) < LEAST_BODY {
         return Ok(Capped::NoBody);
     }
-    let Closing { points, caps } = holes.close(alone)?;
-    if points.is_empty() && !matches!(found, Found::Open) {
-        return Ok(Capped::Body);
+    let bridges = bridges(alone, cloud, &sided)?;
+    let mut open = Closing::default();
+    for bridges in [&bridges, &Vec::new()].into_iter().skip(usize::from(bridges.is_empty())) {
+        let Closing { points, caps } = Closing::of(alone, (&holes, bridges))?;
+        if points.is_empty() && !matches!(found, Found::Open) {
+            return Ok(Capped::Body(Closing::default()));
+        }
+        let closed = [cloud, &points].concat();
+        let with_caps = Search { cloud: &closed, suffix: " with caps", ..*search };
+        if let Found::Enclosed(enclosure) = enclose(engine, &with_caps)?
+            && 2 * enclosure.sheet().len() < lost.len()
+        {
+            return Ok(Capped::Closed(Begun { enclosure, closed: Some(closed), caps }));
+        }
+        open = Closing { points, caps };
     }
-    let closed = [cloud, &points].concat();
-    let with_caps = Search { cloud: &closed, suffix: " with caps", ..*search };
-    if let Found::Enclosed(enclosure) = enclose(engine, &with_caps)?
-        && 2 * enclosure.sheet().len() < lost.len()
-    {
-        return Ok(Capped::Closed(Begun { enclosure, closed: Some(closed), caps }));
-    }
-    Ok(Capped::Body)
+    Ok(Capped::Body(open))
 }
 
 /// What is said of a cloud that no setting gives an inside.

@@ -11,6 +11,7 @@ use glam::DVec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use super::bridges::{BESIDE, rims};
 use super::normals::oriented::{AT_ONCE, Numbered, OrientedCloud};
 use super::normals::sided::Sided;
 use crate::error::Result;
@@ -19,10 +20,8 @@ use crate::grid::{Box3, TriangleMesh};
 use crate::kernel::geometry::winding_number::WindingTree;
 use crate::kernel::topology::union_find::Forest;
 
-/// A cap is farther than so many edges of the square that a point has of the surface from all points.
-const BESIDE: f64 = 1.6;
-/// Beside a rim that far beyond a point, where no other point is as near as that, the surface would go on.
-const BEYOND: f64 = 2.2;
+/// Between bridges a cap is farther than so many from all points and theirs.
+const BETWEEN: f64 = 0.9;
 /// Caps of more than so many new points for each of the cloud's are no caps.
 const MOST_NEW: usize = 3;
 /// The border between inside and outside.
@@ -67,6 +66,8 @@ pub(super) struct Holes<'a> {
     points: &'a [[f64; 3]],
     sided: &'a Sided,
     winding: WindingTree,
+    /// The cloud without bridges, if the last of the points are such.
+    before: Option<&'a Sided>,
     _held: Hold,
 }
 
@@ -77,7 +78,7 @@ impl<'a> Holes<'a> {
     /// When the memory is too little.
     pub(super) fn new(engine: &Engine, points: &'a [[f64; 3]], sided: &'a Sided) -> Result<Self> {
         let held = engine.hold(points.len() as u64 * BYTES)?;
-        Ok(Self { points, sided, winding: WindingTree::new(&facets(points, &sided.cloud)), _held: held })
+        Ok(Self { points, sided, winding: WindingTree::new(&facets(points, &sided.cloud)), before: None, _held: held })
     }
 
     /// What part of some points have an inside on one side of them alone, as those of a body with holes have and those of a sheet, or
@@ -96,20 +97,43 @@ impl<'a> Holes<'a> {
         self.winding.winding_number(at) > most
     }
 
-    /// Puts points over the holes; none where there are none.
+    /// Places over the holes; none where there are none.
+    fn places(&self, engine: &Engine) -> Result<Vec<Place>> {
+        let stage = engine.stage("holes", self.points.len() as u64);
+        let (first, step) = (DVec3::from(self.points.first().copied().unwrap_or_default()), self.sided.cloud.apart);
+        let mut lattice = Lattice { holes: self, first, step, known: HashMap::new() };
+        let rims = rims(&stage, self.points, self.sided)?;
+        let bridges = self.before.map_or(&[][..], |before| &self.points[before.surfels.len()..]);
+        let from = rims.into_iter().map(|(_, at)| at).chain(bridges.iter().map(|&at| at.into()));
+        let cubes = from.flat_map(|at| corners(lattice.cube_of(at).map(|v| v - 1), 3)).collect();
+        let places = lattice.places(&stage, cubes, MOST_NEW * self.points.len())?;
+        stage.finish();
+        Ok(places)
+    }
+}
+
+impl Closing {
+    /// Puts points over the holes of a cloud, some of which have been bridged by others; none where there are none.
     ///
     /// # Errors
-    /// When the run is interrupted.
-    pub(super) fn close(&self, engine: &Engine) -> Result<Closing> {
-        let stage = engine.stage("holes", self.points.len() as u64);
-        let Sided { tree, cloud, .. } = self.sided;
-        let (first, step) = (DVec3::from(self.points.first().copied().unwrap_or_default()), cloud.apart);
-        let mut lattice = Lattice { tree, winding: &self.winding, first, step, known: HashMap::new() };
-        let rims = lattice.rims(&stage, self.points, cloud)?;
-        let places = lattice.places(&stage, rims, MOST_NEW * self.points.len())?;
-        stage.finish();
-        let points = places.iter().map(|place| place.at.to_array()).collect();
-        Ok(Closing { points, caps: caps(&places, step) })
+    /// When the memory is too little, or the run is interrupted.
+    pub(super) fn of(engine: &Engine, (holes, bridges): (&Holes<'_>, &[[f64; 3]])) -> Result<Self> {
+        let (cloud, step) = (holes.sided, holes.sided.cloud.apart);
+        let places = if bridges.is_empty() {
+            holes.places(engine)?
+        } else {
+            let points = [holes.points, bridges].concat();
+            let sided = Sided::new(engine, &points)?;
+            let bridged = |n: usize| Place { at: points[n].into(), away: 0.0, area: sided.cloud.areas[n] };
+            let mut places: Vec<Place> = (holes.points.len()..points.len()).map(bridged).collect();
+            let between = Holes { before: Some(cloud), ..Holes::new(engine, &points, &sided)? };
+            places.extend(between.places(engine)?);
+            for place in &mut places {
+                place.away = cloud.away(place.at);
+            }
+            places
+        };
+        Ok(Self { points: places.iter().map(|place| place.at.to_array()).collect(), caps: caps(&places, step) })
     }
 }
 
@@ -135,8 +159,7 @@ fn facets(points: &[[f64; 3]], around: &OrientedCloud) -> TriangleMesh {
 
 /// Where the winding number is asked: at the nodes of a lattice, from rims on along the border between the sides.
 struct Lattice<'a> {
-    tree: &'a RTree<Numbered>,
-    winding: &'a WindingTree,
+    holes: &'a Holes<'a>,
     first: DVec3,
     step: f64,
     /// How far from 1/2 it is where it was asked.
@@ -148,26 +171,12 @@ impl Lattice<'_> {
         self.first + DVec3::from(node.map(|n| n as f64)) * self.step
     }
 
-    fn away(&self, at: DVec3) -> f64 {
-        let nearest = self.tree.nearest_neighbor(at.to_array());
-        nearest.map_or(f64::INFINITY, |point| DVec3::from(*point.geom()).distance(at))
+    fn cube_of(&self, at: DVec3) -> [i64; 3] {
+        ((at - self.first) / self.step).to_array().map(|v| v.floor() as i64)
     }
 
     fn side(&self, at: DVec3) -> f64 {
-        self.winding.winding_number(at.to_array()) - HALF
-    }
-
-    /// The cubes around places beside rims: where no points are though the surface would go on.
-    fn rims(&self, stage: &Stage<'_>, points: &[[f64; 3]], around: &OrientedCloud) -> Result<Vec<[i64; 3]>> {
-        let numbers: Vec<usize> = (0..points.len()).collect();
-        let parts: Vec<&[usize]> = numbers.chunks(AT_ONCE).collect();
-        let found = stage.run(&parts, &Workers::none(), |(), part| {
-            let beyond = |&n: &usize| DVec3::from(points[n]) + around.beyond[n] * (BEYOND * self.step);
-            let rims = part.iter().map(beyond).filter(|&at| self.away(at) > BESIDE * self.step);
-            let cube = |at: DVec3| ((at - self.first) / self.step).to_array().map(|v| v.floor() as i64);
-            Ok(rims.flat_map(|at| corners(cube(at).map(|v| v - 1), 3)).collect::<Vec<_>>())
-        })?;
-        Ok(found.concat())
+        self.holes.winding.winding_number(at.to_array()) - HALF
     }
 
     /// Asks at those nodes of cubes that are not known yet.
@@ -219,8 +228,8 @@ impl Lattice<'_> {
                 if from * to < 0.0 {
                     let (a, b) = (self.place(node), self.place(beside));
                     let at = a + (b - a) * (from / (from - to));
-                    let away = self.away(at);
-                    if away > BESIDE * self.step {
+                    let away = self.holes.sided.away(at);
+                    if self.is_in_hole(at, away) {
                         let area = self.area(at);
                         found.push(((node, axis), Place { at, away, area }));
                     }
@@ -228,6 +237,13 @@ impl Lattice<'_> {
             }
         }
         found
+    }
+
+    /// Whether a place is so far from the points, and from bridges, that it is one of a cap.
+    fn is_in_hole(&self, at: DVec3, away: f64) -> bool {
+        self.holes.before.map_or(away > BESIDE * self.step, |before| {
+            away > BETWEEN * self.step && before.away(at) > BESIDE * self.step
+        })
     }
 
     /// The area that one crossing of the border with the lattice's lines stands for: a border with the unit normal n has

@@ -5,6 +5,7 @@
 //! ```
 
 mod begun;
+mod bridges;
 mod caps;
 #[cfg(test)]
 mod ended;

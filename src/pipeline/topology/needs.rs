@@ -2,8 +2,8 @@
 
 use crate::kernel::topology::blocks::LEN;
 
-/// Bytes of a voxel in a block near the surface: its state, and the name of its piece.
-const VOXEL_BYTES: u64 = 5;
+/// Bytes of a voxel in a block near the surface: its state, the name of its piece, and its place among those of its level.
+const VOXEL_BYTES: u64 = 7;
 
 /// Bytes of a point: its place.
 const POINT_BYTES: u64 = 8;

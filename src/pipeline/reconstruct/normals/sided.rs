@@ -1,5 +1,6 @@
 //! The points of a cloud with their normals, found again by their place: what an open surface is made of and trimmed by.
 
+use glam::DVec3;
 use rstar::RTree;
 
 use super::oriented::{Numbered, OrientedCloud, numbered};
@@ -42,6 +43,12 @@ impl Sided {
             spacing: typical_spacing(points).unwrap_or(0.0),
             _held: held,
         })
+    }
+
+    /// How far a place is from the nearest point.
+    pub(in crate::pipeline::reconstruct) fn away(&self, at: DVec3) -> f64 {
+        let nearest = self.tree.nearest_neighbor(at.to_array());
+        nearest.map_or(f64::INFINITY, |point| DVec3::from(*point.geom()).distance(at))
     }
 
     /// What trims a surface on a grid.
