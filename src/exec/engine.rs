@@ -128,6 +128,11 @@ impl Engine {
         self.reports.count_rank(done);
     }
 
+    /// The threads.
+    pub(super) fn pool(&self) -> &rayon::ThreadPool {
+        &self.pool
+    }
+
     /// Number of threads.
     #[must_use]
     pub fn threads(&self) -> usize {

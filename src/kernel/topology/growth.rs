@@ -7,8 +7,9 @@
 //! side, with pieces joined as by Kruskal). Order: level, then place; so the seams depend on nothing else.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use super::blocks::{Blocks, FAR, INSIDE, PARTS, STRIDES, Where, is_deep};
+use super::blocks::{Beside, Blocks, EDGE, FAR, INSIDE, LEN, PARTS, STRIDES, Where, is_deep};
 use super::levels::Levels;
 use super::neighbourhood::{Joined, MIDDLE};
 use super::union_find::Forest;
@@ -114,29 +115,51 @@ impl Grown {
         self.pieces.push()
     }
 
-    /// Voxels far from the other side have the pieces that they have.
+    /// Voxels far from the other side have the pieces that they have: run by run of each row.
     fn name_far(&mut self, blocks: &Blocks, inside: bool) {
-        // Those above are known where a block comes before the one below it, or are rooms.
-        const ACROSS_FACES: [usize; 6] = [MIDDLE - 9, MIDDLE - 3, MIDDLE - 1, MIDDLE + 1, MIDDLE + 3, MIDDLE + 9];
         let far = FAR | if inside { INSIDE } else { 0 };
-        for place in 0..blocks.states.len() {
-            if blocks.states[place] != far {
-                continue;
+        for (row, states) in blocks.states.chunks_exact(EDGE).enumerate() {
+            let mut left = (0..EDGE).fold(0_u32, |mask, x| mask | u32::from(states[x] == far) << x);
+            while left != 0 {
+                let from = left.trailing_zeros() as usize;
+                let len = (!(left >> from)).trailing_zeros() as usize;
+                left &= !(((1 << len) - 1) << from);
+                let name = self.name_of_run(blocks, inside, (row * EDGE, from..from + len));
+                self.names[row * EDGE + from..][..len].fill(name + 1);
+                self.voxels[name as usize] += len as u64;
             }
-            let mut known = None;
-            for bit in ACROSS_FACES {
-                let other = match blocks.neighbour(place, bit) {
-                    Where::Voxel(other) if self.names[other] != OUT => self.names[other] - 1,
-                    Where::Room(room) if blocks.rooms[room as usize] == inside => room,
-                    _ => continue,
-                };
-                let name = *known.get_or_insert(other);
-                self.pieces.join(name, other);
-            }
-            let name = known.unwrap_or_else(|| self.new_name());
-            self.names[place] = name + 1;
-            self.voxels[name as usize] += 1;
         }
+    }
+
+    /// The name of the pieces beside a run of voxels that is named next, which are one by it, or a new one.
+    fn name_of_run(&mut self, blocks: &Blocks, inside: bool, (row, run): (usize, Range<usize>)) -> u32 {
+        const BESIDE: [usize; 4] = [MIDDLE - 9, MIDDLE - 3, MIDDLE + 3, MIDDLE + 9];
+        let mut known = None;
+        let mut join = |pieces: &mut Forest, other: u32| pieces.join(*known.get_or_insert(other), other);
+        for bit in BESIDE {
+            match blocks.neighbour(row, bit) {
+                Where::Voxel(beside) => {
+                    let mut last = OUT;
+                    for &name in &self.names[beside + run.start..beside + run.end] {
+                        if name != last && name != OUT {
+                            join(&mut self.pieces, name - 1);
+                        }
+                        last = name;
+                    }
+                }
+                Where::Room(room) if blocks.rooms[room as usize] == inside => _ = join(&mut self.pieces, room),
+                Where::Room(_) => {}
+            }
+        }
+        let ends = [(run.start == 0, row, MIDDLE - 1), (run.end == EDGE, row + EDGE - 1, MIDDLE + 1)];
+        for (_, place, bit) in ends.into_iter().filter(|(is_end, ..)| *is_end) {
+            match blocks.neighbour(place, bit) {
+                Where::Voxel(other) if self.names[other] != OUT => _ = join(&mut self.pieces, self.names[other] - 1),
+                Where::Room(room) if blocks.rooms[room as usize] == inside => _ = join(&mut self.pieces, room),
+                _ => {}
+            }
+        }
+        known.unwrap_or_else(|| self.new_name())
     }
 
     /// The names of the voxels around one.
@@ -144,14 +167,26 @@ impl Grown {
         let mut names = if is_deep(place) {
             STRIDES.map(|by| self.names[place.wrapping_add_signed(by)])
         } else {
-            std::array::from_fn(|bit| match blocks.neighbour(place, bit) {
-                Where::Voxel(other) => self.names[other],
-                Where::Room(room) if blocks.rooms[room as usize] == inside => room + 1,
-                Where::Room(_) => OUT,
-            })
+            self.names_across(blocks, inside, place)
         };
         names[MIDDLE] = OUT;
         names
+    }
+
+    /// The same at the border of a block.
+    fn names_across(&self, blocks: &Blocks, inside: bool, place: usize) -> [u32; 27] {
+        let at = [place % EDGE, place / EDGE % EDGE, place / (EDGE * EDGE) % EDGE];
+        // For each step along an axis the block beside and the voxel's place in it.
+        let steps = at.map(|at| [EDGE - 1, EDGE, EDGE + 1].map(|step| ((at + step) / EDGE, (at + step) % EDGE)));
+        let around = &blocks.around[place / LEN];
+        std::array::from_fn(|bit| {
+            let [x, y, z] = [steps[0][bit % 3], steps[1][bit / 3 % 3], steps[2][bit / 9]];
+            match around[(z.0 * 3 + y.0) * 3 + x.0] {
+                Beside::Block(block) => self.names[block as usize * LEN + (z.1 * EDGE + y.1) * EDGE + x.1],
+                Beside::Room(room) if blocks.rooms[room as usize] == inside => room + 1,
+                Beside::Room(_) => OUT,
+            }
+        })
     }
 
     /// Adds a voxel if no loop closes through it; those that wait beside it are to be looked at again.

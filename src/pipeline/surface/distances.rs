@@ -23,8 +23,6 @@ pub(super) struct Beside<'a> {
     /// For each brick the points to which a triangle in its cells may be as near as `within`.
     near: BTreeMap<BrickId, Vec<usize>>,
     within: f64,
-    /// Squared distances; that of `within` where nothing is nearer.
-    squared: Vec<f64>,
 }
 
 impl<'a> Beside<'a> {
@@ -46,7 +44,12 @@ impl<'a> Beside<'a> {
                 }
             }
         }
-        Self { surface, points, near, within, squared: vec![within * within; points.len()] }
+        Self { surface, points, near, within }
+    }
+
+    /// Squared distances of the points before any patch has passed: as far as is looked at.
+    pub(super) fn none_yet(&self) -> Vec<f64> {
+        vec![self.within * self.within; self.points.len()]
     }
 
     /// How near a patch comes to the points near its brick.
@@ -59,18 +62,18 @@ impl<'a> Beside<'a> {
         squared
     }
 
-    /// Takes what [`Beside::nearest_in`] found.
-    pub(super) fn take(&mut self, id: BrickId, found: &[f64]) {
+    /// Takes what [`Beside::nearest_in`] found into the squared distances of all points.
+    pub(super) fn take(&self, id: BrickId, found: &[f64], squared: &mut [f64]) {
         let members = self.near.get(&id).into_iter().flatten();
-        members.zip(found).for_each(|(&n, &squared)| self.squared[n] = self.squared[n].min(squared));
+        members.zip(found).for_each(|(&n, &found)| squared[n] = squared[n].min(found));
     }
 
     /// The distances, when all patches have passed: also of the points that lie farther away.
-    pub(super) fn distances(self, stage: &Stage<'_>) -> Result<Vec<Option<f64>>> {
+    pub(super) fn distances(&self, stage: &Stage<'_>, squared: &[f64]) -> Result<Vec<Option<f64>>> {
         let is_near = |&squared: &f64| squared < self.within * self.within;
         let mut distances: Vec<Option<f64>> =
-            self.squared.iter().map(|squared| Some(squared.sqrt()).filter(|_| is_near(squared))).collect();
-        let rest: Vec<usize> = (0..self.points.len()).filter(|&n| !is_near(&self.squared[n])).collect();
+            squared.iter().map(|squared| Some(squared.sqrt()).filter(|_| is_near(squared))).collect();
+        let rest: Vec<usize> = (0..self.points.len()).filter(|&n| !is_near(&squared[n])).collect();
         let targets: Vec<[f64; 3]> = rest.iter().map(|&n| self.points[n]).collect();
         let found = distances_anywhere(stage, self.surface, &targets)?;
         rest.iter().zip(found).for_each(|(&n, distance)| distances[n] = distance);
@@ -83,7 +86,8 @@ impl<'a> Beside<'a> {
 /// # Errors
 /// When the run is interrupted.
 pub fn distances_to(stage: &Stage<'_>, surface: &Isosurface<'_>, points: &[[f64; 3]]) -> Result<Vec<Option<f64>>> {
-    let mut beside = Beside::new(surface, points);
+    let beside = Beside::new(surface, points);
+    let mut squared = beside.none_yet();
     let workers = Workers::new(|| (Pencil::new(), Patch::default()));
     let bricks: Vec<BrickId> = beside.near.keys().copied().filter(|&id| surface.is_in(id)).collect();
     for batch in bricks.chunks(BATCH) {
@@ -91,7 +95,7 @@ pub fn distances_to(stage: &Stage<'_>, surface: &Isosurface<'_>, points: &[[f64;
             surface.patch_of(id, pencil, patch)?;
             Ok(beside.nearest_in(id, patch))
         })?;
-        batch.iter().zip(&found).for_each(|(&id, found)| beside.take(id, found));
+        batch.iter().zip(&found).for_each(|(&id, found)| beside.take(id, found, &mut squared));
     }
-    beside.distances(stage)
+    beside.distances(stage, &squared)
 }

@@ -3,7 +3,7 @@
 use super::distances::Beside;
 use super::isosurface::{Isosurface, Pencil};
 use crate::error::Result;
-use crate::exec::{Stage, Workers};
+use crate::exec::{Stage, Workers, run_in_order};
 use crate::grid::BrickId;
 use crate::kernel::surface::{Hausdorff, Measures, Patch, Spread, SurfaceMeasure, Welder};
 use crate::store::MeshSink;
@@ -57,9 +57,11 @@ pub fn draw_trimmed(
     mesh: &mut dyn MeshSink,
     trim: &Trim<'_>,
 ) -> Result<Drawn> {
-    let mut beside = Beside::new(surface, points);
-    let Extracted { measures, moved, trimmed } = extract_beside(stage, surface, mesh, Some(&mut beside), trim)?;
-    let distances = beside.distances(stage)?;
+    let beside = Beside::new(surface, points);
+    let mut squared = beside.none_yet();
+    let near = Some((&beside, squared.as_mut_slice()));
+    let Extracted { measures, moved, trimmed } = extract_beside(stage, surface, mesh, near, trim)?;
+    let distances = beside.distances(stage, &squared)?;
     let lost_points = distances.iter().flatten().filter(|&&d| d > lost_beyond).count() as u64;
     let known = || distances.iter().copied().flatten();
     Ok(Drawn { measures, moved, trimmed, hausdorff: Hausdorff::of(known()), spread: Spread::of(known()), lost_points })
@@ -88,7 +90,7 @@ fn extract_beside(
     stage: &Stage<'_>,
     surface: &Isosurface<'_>,
     sink: &mut dyn MeshSink,
-    mut beside: Option<&mut Beside<'_>>,
+    near: Option<(&Beside<'_>, &mut [f64])>,
     trim: &Trim<'_>,
 ) -> Result<Extracted> {
     let (grid, geometry) = (*surface.u.set().grid(), surface.geometry);
@@ -101,26 +103,26 @@ fn extract_beside(
     // A surface may pass between a brick that is not stored and the one above it, so the bricks below stored ones
     // count.
     let bricks: Vec<BrickId> = (0..grid.len()).filter(|&id| surface.is_in(id)).collect();
-    for batch in bricks.chunks(BATCH) {
-        let patches = stage.run(batch, &workers, |pencil, &id| {
-            let mut patch = Patch::default();
-            let moved = surface.patch_of(id, pencil, &mut patch)?;
-            let near = beside.as_ref().map_or_else(Vec::new, |beside| beside.nearest_in(id, &patch));
-            let cut = trim(&mut patch);
-            Ok((patch, moved, near, cut))
-        })?;
-        for (&id, (patch, moved, near, cut)) in batch.iter().zip(&patches) {
-            trimmed += cut;
-            if let Some(beside) = &mut beside {
-                beside.take(id, near);
-            }
-            farthest = farthest.max(*moved);
-            if let Some(kept) = welder.enter_layer(patch) {
-                measure.forget_but(&kept);
-            }
-            welder.add(patch, sink)?;
-            welder.triangles_of(patch).for_each(|(corners, positions)| measure.add(corners, positions));
+    let (beside, mut squared) = near.unzip();
+    let make = |pencil: &mut Pencil, &id: &BrickId| {
+        let mut patch = Patch::default();
+        let moved = surface.patch_of(id, pencil, &mut patch)?;
+        let near = beside.map_or_else(Vec::new, |beside| beside.nearest_in(id, &patch));
+        let cut = trim(&mut patch);
+        Ok((patch, moved, near, cut))
+    };
+    run_in_order(stage, (&bricks, BATCH), &workers, make, |&id, (patch, moved, near, cut)| {
+        trimmed += cut;
+        if let (Some(beside), Some(squared)) = (beside, &mut squared) {
+            beside.take(id, &near, squared);
         }
-    }
+        farthest = farthest.max(moved);
+        if let Some(kept) = welder.enter_layer(&patch) {
+            measure.forget_but(&kept);
+        }
+        welder.add(&patch, sink)?;
+        welder.triangles_of(&patch).for_each(|(corners, positions)| measure.add(corners, positions));
+        Ok(())
+    })?;
     Ok(Extracted { measures: measure.measures(), moved: farthest, trimmed })
 }

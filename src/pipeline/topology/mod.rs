@@ -2,6 +2,7 @@
 
 mod gather;
 mod needs;
+mod pieces;
 mod removal;
 
 pub(crate) use needs::topology_bytes;

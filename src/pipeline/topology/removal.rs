@@ -2,10 +2,12 @@
 
 use super::gather::{Gathered, gather, near_surface};
 use super::needs::topology_bytes;
+use super::pieces::PieceSizes;
 use crate::error::Result;
 use crate::exec::{Engine, Stage, Workers};
 use crate::grid::{BrickId, Geometry};
 use crate::kernel::level_set::initial::start::{HELD, value};
+use crate::kernel::surface::Measures;
 use crate::kernel::topology::blocks::{Blocks, LEN};
 use crate::kernel::topology::growth::Order;
 use crate::kernel::topology::simplify::{Small, Taken, simplify};
@@ -48,22 +50,38 @@ pub struct Removed {
 pub fn remove_small(engine: &Engine, u: &BrickArray<f32>, geometry: &Geometry, cloud: &[[f64; 3]]) -> Result<Removed> {
     let engine = &*engine.by_itself();
     let stage = engine.stage("topology", 0);
-    let is_simple = is_one_ball(&stage, u, geometry)?;
-    let removed = if is_simple { Removed::default() } else { removed(&stage, u, geometry, cloud)? };
+    let removed =
+        if is_simple(&stage, u, geometry)? { Removed::default() } else { removed(&stage, u, geometry, cloud)? };
     stage.finish();
     Ok(removed)
 }
 
-/// True for a surface of one piece without handles.
-fn is_one_ball(stage: &Stage<'_>, u: &BrickArray<f32>, geometry: &Geometry) -> Result<bool> {
-    let measures = extract(stage, &Isosurface::of(u, geometry), &mut NoMesh)?.0;
-    Ok(measures.components <= 1 && 2 * measures.vertices == measures.triangles + 4 * measures.components)
+/// True for a surface without handles and of no small pieces.
+fn is_simple(stage: &Stage<'_>, u: &BrickArray<f32>, geometry: &Geometry) -> Result<bool> {
+    let surface = Isosurface::of(u, geometry);
+    let Measures { components, vertices, triangles, .. } = extract(stage, &surface, &mut NoMesh)?.0;
+    if 2 * vertices != triangles + 4 * components {
+        return Ok(false);
+    }
+    if components <= 1 {
+        return Ok(true);
+    }
+    let _held = stage.hold(vertices * PieceSizes::VERTEX_BYTES)?;
+    let mut sizes = PieceSizes::default();
+    extract(stage, &surface, &mut sizes)?;
+    // A voxel has six faces, and each vertex lies between two voxels.
+    Ok(sizes.smallest() > 6 * small_voxels(geometry))
+}
+
+/// Voxels of a piece that is small.
+fn small_voxels(geometry: &Geometry) -> u64 {
+    let ball = 4.0 / 3.0 * std::f64::consts::PI * (PIECE_RADIUS * geometry.max_spacing()).powi(3);
+    (ball / geometry.voxel_volume()) as u64
 }
 
 fn removed(stage: &Stage<'_>, u: &BrickArray<f32>, geometry: &Geometry, cloud: &[[f64; 3]]) -> Result<Removed> {
     let largest = geometry.max_spacing();
     let rounds = ROUNDS.map(|(voxels, order)| (voxels * largest, order));
-    let ball = 4.0 / 3.0 * std::f64::consts::PI * (PIECE_RADIUS * largest).powi(3);
     // As far as half the widest tunnel.
     let halo = geometry.spacing.map(|h| ((0.5 * (WIDEST - 1.0) * largest / h) as usize).clamp(1, MOST_HALO));
     let near = near_surface(u, geometry, halo);
@@ -74,7 +92,7 @@ fn removed(stage: &Stage<'_>, u: &BrickArray<f32>, geometry: &Geometry, cloud: &
         thin: (THIN * largest * largest / libm::cbrt(geometry.voxel_volume()).powi(2)) as usize,
         around: AROUND,
         along: ALONG,
-        voxels: (ball / geometry.voxel_volume()) as u64,
+        voxels: small_voxels(geometry),
         points: gathered.places(u.set().grid(), geometry, cloud),
         body_points: BODY_POINTS,
     };
