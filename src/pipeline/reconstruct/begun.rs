@@ -26,6 +26,9 @@ const FARTHER_VOXELS: u64 = 4 << 20;
 /// In larger ones that of a body is looked for so many times as far as at first.
 const BODY_REACH: f64 = 4.0;
 
+/// Caps are wide that have one new point for so many of the cloud's, or more.
+const WIDE_CAPS: usize = 20;
+
 /// A cloud that is no thicker than this part of a spacing, root mean square, is flat.
 const FLAT_VOXELS: f64 = 0.1;
 
@@ -98,16 +101,19 @@ pub(super) fn enclosed(
         return as_it_is(settings, &search, found);
     }
     let farther = Search { most_reach, suffix: " farther", ..search };
+    // Where the points are so uneven that a search near them is lost, holes wider than they are apart stay open far from them too.
+    if closing.points.len() > cloud.len() / WIDE_CAPS {
+        let closed = [cloud, &closing.points].concat();
+        let with_caps = Search { cloud: &closed, suffix: " farther with caps", ..farther };
+        match enclose(engine, &with_caps)? {
+            Found::Enclosed(enclosure) if enclosure.sheet().len() as f64 <= most => {
+                return Ok(Begun { enclosure, closed: Some(closed), caps: closing.caps });
+            }
+            _ => {}
+        }
+    }
     let found = enclose(engine, &farther)?;
-    if matches!(found, Found::Enclosed(_)) || closing.points.is_empty() {
-        return as_it_is(settings, &search, found);
-    }
-    // Holes wider than the points are apart, and the points so uneven that a search near them is lost too.
-    let closed = [cloud, &closing.points].concat();
-    match enclose(engine, &Search { cloud: &closed, suffix: " farther with caps", ..farther })? {
-        Found::Enclosed(enclosure) => Ok(Begun { enclosure, closed: Some(closed), caps: closing.caps }),
-        _ => as_it_is(settings, &search, found),
-    }
+    as_it_is(settings, &search, found)
 }
 
 /// What a search gave, as it is.
@@ -139,15 +145,15 @@ fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32]))
     let alone = &*engine.by_itself();
     let sided = Sided::new(alone, cloud)?;
     let holes = Holes::new(alone, cloud, &sided)?;
-    if holes.share_of_body(lost) < LEAST_BODY {
+    if holes.share_of_body(lost.iter().map(|&n| n as usize)) < LEAST_BODY {
         return Ok(Capped::NoBody);
     }
     let bridges = bridges(alone, cloud, &sided)?;
     let mut open = Closing::default();
     for bridges in [&bridges, &Vec::new()].into_iter().skip(usize::from(bridges.is_empty())) {
         let Closing { points, caps } = Closing::of(alone, (&holes, bridges))?;
-        if points.is_empty() && !matches!(found, Found::Open) {
-            return Ok(Capped::Body(Closing::default()));
+        if points.is_empty() && (!bridges.is_empty() || !matches!(found, Found::Open)) {
+            continue;
         }
         let closed = [cloud, &points].concat();
         let with_caps = Search { cloud: &closed, suffix: " with caps", ..*search };

@@ -43,11 +43,10 @@ pub(super) fn bridges(engine: &Engine, points: &[[f64; 3]], sided: &Sided) -> Re
     let rim = |(n, _): &(usize, DVec3)| Rim { surfel: sided.surfels[*n], beyond: sided.cloud.beyond[*n] };
     let rims: Vec<Rim> = rims(&stage, points, sided)?.iter().map(rim).collect();
     let known = Rims::new(&rims, step);
-    let opposite = |rims: &&[Rim]| rims.iter().map(|rim| known.opposite(rim)).collect::<Vec<_>>();
-    let parts: Vec<&[Rim]> = rims.chunks(AT_ONCE).collect();
-    let opposite = stage.run(&parts, &Workers::none(), |(), part| Ok(opposite(part)))?.concat();
     let numbers: Vec<usize> = (0..rims.len()).collect();
     let parts: Vec<&[usize]> = numbers.chunks(AT_ONCE).collect();
+    let opposite = |part: &[usize]| part.iter().map(|&rim| known.opposite(rim)).collect::<Vec<_>>();
+    let opposite = stage.run(&parts, &Workers::none(), |(), part| Ok(opposite(part)))?.concat();
     let found = stage.run(&parts, &Workers::none(), |(), part| {
         let from = |&rim: &usize| known.bridge(rim, &opposite, |at| sided.away(at) > FREE * step);
         Ok(part.iter().filter_map(from).flatten().collect::<Vec<_>>())

@@ -32,6 +32,9 @@ const BYTES: u64 = 800;
 const SAMPLE: usize = 400;
 const INSIDE: f64 = 0.55;
 
+/// Bridges are of use where so many of their points have an inside.
+const BRIDGED: f64 = 0.9;
+
 /// A hole that was closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cap {
@@ -83,8 +86,9 @@ impl<'a> Holes<'a> {
 
     /// What part of some points have an inside on one side of them alone, as those of a body with holes have and those of a sheet, or
     /// of thin parts whose normals do not tell their sides, have not. Told from a sample of them.
-    pub(super) fn share_of_body(&self, of: &[u32]) -> f64 {
-        let sample: Vec<usize> = of.iter().step_by(of.len().div_ceil(SAMPLE).max(1)).map(|&n| n as usize).collect();
+    pub(super) fn share_of_body(&self, of: impl ExactSizeIterator<Item = usize>) -> f64 {
+        let every = of.len().div_ceil(SAMPLE).max(1);
+        let sample: Vec<usize> = of.step_by(every).collect();
         let is_body = |&&n: &&usize| {
             let (at, step) = (DVec3::from(self.points[n]), self.sided.cloud.normals[n] * self.sided.cloud.apart);
             self.is_inside((at - step).to_array(), INSIDE) && !self.is_inside((at + step).to_array(), HALF)
@@ -113,7 +117,8 @@ impl<'a> Holes<'a> {
 }
 
 impl Closing {
-    /// Puts points over the holes of a cloud, some of which have been bridged by others; none where there are none.
+    /// Puts points over the holes of a cloud, some of which have been bridged by others; none where there are none, or where bridges have no
+    /// inside.
     ///
     /// # Errors
     /// When the memory is too little, or the run is interrupted.
@@ -127,6 +132,9 @@ impl Closing {
             let bridged = |n: usize| Place { at: points[n].into(), away: 0.0, area: sided.cloud.areas[n] };
             let mut places: Vec<Place> = (holes.points.len()..points.len()).map(bridged).collect();
             let between = Holes { before: Some(cloud), ..Holes::new(engine, &points, &sided)? };
+            if between.share_of_body(holes.points.len()..points.len()) < BRIDGED {
+                return Ok(Self::default());
+            }
             places.extend(between.places(engine)?);
             for place in &mut places {
                 place.away = cloud.away(place.at);
