@@ -81,7 +81,7 @@ def _bones():
 
 
 # With the Euler number and the pieces that the surface has.
-BODIES = {"hammer": (hammer, 2, 1), "statue": (statue, 2, 1), "rings": (rings, 2, 3), "foot": (foot, 52, 26)}
+BODIES = {"hammer": (hammer, 2, 1), "statue": (statue, 0, 1), "rings": (rings, 2, 3), "foot": (foot, 52, 26)}
 EXTENT = 1.8
 
 

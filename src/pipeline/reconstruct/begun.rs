@@ -15,7 +15,7 @@ use crate::pipeline::enclosure::search::{
 };
 
 /// Where more of the points than this part have one side all around them, holes are looked for that let it in.
-const MOST_SHEET: f64 = 0.02;
+const MOST_SHEET: f64 = 0.01;
 
 /// Caps are put over the holes of a cloud of which so many of the points in doubt have an inside.
 const LEAST_BODY: f64 = 0.5;
