@@ -86,7 +86,7 @@ pub(super) fn enclosed(
         Found::Enclosed(enclosure) => enclosure.sheet().to_vec(),
         _ => (0..cloud.len() as u32).collect(),
     };
-    let (is_body, closing) = match closed(engine, &search, (&found, &lost))? {
+    let (is_body, closing) = match closed(engine, &search, &lost)? {
         Capped::Closed(begun) => return Ok(begun),
         Capped::Body(closing) => (true, closing),
         Capped::NoBody => (false, Closing::default()),
@@ -101,19 +101,28 @@ pub(super) fn enclosed(
         return as_it_is(settings, &search, found);
     }
     let farther = Search { most_reach, suffix: " farther", ..search };
-    // Where the points are so uneven that a search near them is lost, holes wider than they are apart stay open far from them too.
-    if closing.points.len() > cloud.len() / WIDE_CAPS {
-        let closed = [cloud, &closing.points].concat();
-        let with_caps = Search { cloud: &closed, suffix: " farther with caps", ..farther };
-        match enclose(engine, &with_caps)? {
-            Found::Enclosed(enclosure) if enclosure.sheet().len() as f64 <= most => {
-                return Ok(Begun { enclosure, closed: Some(closed), caps: closing.caps });
-            }
-            _ => {}
-        }
-    }
-    let found = enclose(engine, &farther)?;
+    let found = match with_wide_caps(engine, &farther, closing)? {
+        Some(begun) => return Ok(begun),
+        None => enclose(engine, &farther)?,
+    };
     as_it_is(settings, &search, found)
+}
+
+/// The cloud with caps as a search farther from it finds it, where these are wide: where the points are so uneven that a search near them is
+/// lost, holes wider than they are apart stay open far from them too.
+fn with_wide_caps(engine: &Engine, farther: &Search<'_>, closing: Closing) -> Result<Option<Begun>> {
+    let (cloud, Closing { points, caps }) = (farther.cloud, closing);
+    if points.len() <= cloud.len() / WIDE_CAPS {
+        return Ok(None);
+    }
+    let closed = [cloud, &points].concat();
+    let search = Search { cloud: &closed, suffix: " farther with caps", ..*farther };
+    Ok(match enclose(engine, &search)? {
+        Found::Enclosed(enclosure) if enclosure.sheet().len() as f64 <= MOST_SHEET * cloud.len() as f64 => {
+            Some(Begun { enclosure, closed: Some(closed), caps })
+        }
+        _ => None,
+    })
 }
 
 /// What a search gave, as it is.
@@ -140,7 +149,7 @@ enum Capped {
 
 /// The cloud with caps over its holes, if it is a body that is open there: as a search near both finds it, where that leaves half as many
 /// points without two sides.
-fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32])) -> Result<Capped> {
+fn closed(engine: &Engine, search: &Search<'_>, lost: &[u32]) -> Result<Capped> {
     let cloud = search.cloud;
     let alone = &*engine.by_itself();
     let sided = Sided::new(alone, cloud)?;
@@ -150,9 +159,10 @@ fn closed(engine: &Engine, search: &Search<'_>, (found, lost): (&Found, &[u32]))
     }
     let bridges = bridges(alone, cloud, &sided)?;
     let mut open = Closing::default();
-    for bridges in [&bridges, &Vec::new()].into_iter().skip(usize::from(bridges.is_empty())) {
+    let attempts: &[&[[f64; 3]]] = if bridges.is_empty() { &[&[]] } else { &[&bridges, &[]] };
+    for bridges in attempts {
         let Closing { points, caps } = Closing::of(alone, (&holes, bridges))?;
-        if points.is_empty() && (!bridges.is_empty() || !matches!(found, Found::Open)) {
+        if points.is_empty() {
             continue;
         }
         let closed = [cloud, &points].concat();

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rstar::RTree;
 
+use super::estimate::spacing_memory;
 use super::normals::oriented::AT_ONCE;
 use super::normals::sided::Sided;
 use crate::error::Result;
@@ -52,6 +53,7 @@ pub(super) fn bridges(engine: &Engine, points: &[[f64; 3]], sided: &Sided) -> Re
         Ok(part.iter().filter_map(from).flatten().collect::<Vec<_>>())
     })?;
     let mut found = found.concat();
+    let _held = engine.hold(spacing_memory(points.len() + found.len()))?;
     for _ in 0..TIMES {
         found = evened(&stage, points, &found, step)?;
     }
