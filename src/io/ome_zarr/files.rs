@@ -3,8 +3,9 @@
 //! Errors name no file: the store lies under a hidden name while it is made, and callers know what it will be called.
 
 use std::fs::{self, File};
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{BufWriter, ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -30,11 +31,18 @@ pub(super) fn create_parent(path: &Path) -> Result<()> {
     fs::create_dir_all(parent).map_err(|error| io_error("a folder cannot be created", &error))
 }
 
-/// Writes a file through `write`, which says how many bytes it wrote; none leaves no file.
+/// A name beside a file that nobody else writes under: several ranks may describe the group that what they write lies in.
+fn partial_of(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let unique = RandomState::new().build_hasher().finish();
+    path.with_file_name(format!(".{name}.{unique:x}.partial"))
+}
+
+/// Writes a file through `write`, which says how many bytes it wrote; none leaves no file. Of several who write the same one at once the last
+/// one's stands.
 pub(super) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<u64>) -> Result<u64> {
     create_parent(path)?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let partial = path.with_file_name(format!(".{name}.partial"));
+    let partial = partial_of(path);
     let written = write_file(&partial, write).and_then(|bytes| {
         let place =
             |target: &Path| if bytes == 0 { remove_both(&partial, target) } else { fs::rename(&partial, target) };
@@ -122,5 +130,18 @@ mod tests {
         let error = io_error("the shard cannot be written", &ErrorKind::StorageFull.into());
         assert_eq!(error.exit_code(), 1);
         assert!(error.to_string().contains("free some space"), "{error}");
+    }
+
+    #[test]
+    fn many_may_write_the_same_file_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("group").join("zarr.json");
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| (0..100).for_each(|_| write_json(&path, &serde_json::json!({ "a": 1 })).unwrap()));
+            }
+        });
+        let left: Vec<_> = fs::read_dir(folder.path().join("group")).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(left, ["zarr.json"]);
     }
 }
