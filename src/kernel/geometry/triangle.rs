@@ -35,6 +35,12 @@ impl Triangle {
         Self { a, ab, ac, gram, determinant, is_thin: determinant <= THIN * longest * longest }
     }
 
+    /// How far the farthest of its points is from the first corner.
+    #[must_use]
+    pub fn longest_from_corner(&self) -> f64 {
+        self.gram[0].max(self.gram[2]).sqrt()
+    }
+
     /// Its first corner.
     #[must_use]
     pub fn corner(&self) -> [f64; 3] {

@@ -8,6 +8,7 @@
 
 use super::labelled_shapes::LabelledShapes;
 use crate::grid::{Box3, Geometry};
+use crate::kernel::distance::state::source::squared_distance;
 
 /// A source that may be the nearest, and its label.
 pub type Candidate = (u32, u32);
@@ -51,6 +52,14 @@ impl Around {
         nearest_squared.sqrt() * (1.0 - ROUNDING) - reach
     }
 
+    /// How far, squared, a source can be from the middle that is nearest to some place in the box, by how far its point lies from that of
+    /// another source, along each axis, which is `known` away.
+    fn most(&self, known: f64, shapes: &LabelledShapes<'_>, source: u32, along: impl Fn(usize) -> f64) -> f64 {
+        let gain = 2.0 * (0..3).map(|a| along(a) * self.half[a]).sum::<f64>();
+        let bend = if shapes.is_point(source) { 0.0 } else { self.half.iter().map(|h| h * h).sum() };
+        known + gain + bend
+    }
+
     /// How far from the middle a source can be that is nearest to some place in the box, squared, when the one nearest to
     /// the middle is at that squared distance.
     #[must_use]
@@ -58,6 +67,91 @@ impl Around {
         let reach = self.half.iter().map(|h| h * h).sum::<f64>().sqrt();
         (nearest_squared.sqrt() + 2.0 * reach).powi(2) * (1.0 + ROUNDING)
     }
+}
+
+/// Triangles are told by balls around them, before their closest points are, from so many on.
+const BALLS: usize = 12;
+/// By these alone if their radius is no more than this part of half the box's diagonal.
+const SMALL: f64 = 0.25;
+
+/// What balls around triangles tell of them: one in a ball around m of radius r is |c - m| - r away at least, and |q - p| is |m - p| + r at
+/// most along each axis. Of triangles that are small beside the box that is nearly all there is to tell.
+struct Balls<'a> {
+    shapes: &'a LabelledShapes<'a>,
+    around: &'a Around,
+    /// Half the box's diagonal.
+    reach: f64,
+    /// A point of a source that is near the middle, and its squared distance.
+    known: ([f64; 3], f64),
+}
+
+impl<'a> Balls<'a> {
+    /// None where asking is as fast.
+    fn of(shapes: &'a LabelledShapes<'a>, around: &'a Around, candidates: &[Candidate]) -> Option<Self> {
+        if candidates.len() < BALLS || shapes.is_point(candidates[0].0) {
+            return None;
+        }
+        let point = shapes.closest(around.middle, about_nearest(shapes, around.middle, candidates)?);
+        let reach = around.half.iter().map(|h| h * h).sum::<f64>().sqrt();
+        Some(Self { shapes, around, reach, known: (point, squared_distance(around.middle, point)) })
+    }
+
+    /// Appends those of the candidates from `first` on that can be the nearest of them to a place in the box. Returns how far the nearest is from
+    /// its middle at least, squared.
+    fn keep(&self, candidates: &mut Vec<Candidate>, first: usize) -> f64 {
+        let Self { shapes, around, reach, known: (known, known_squared) } = *self;
+        let mut least = known_squared;
+        for n in first..candidates.len() {
+            let candidate = candidates[n];
+            let (ball, radius) = shapes.ball(candidate.0);
+            let away = away_at_least(around.middle, (ball, radius));
+            least = least.min(away * away);
+            let gain = |a: usize| (ball[a] - known[a]).abs() + radius;
+            if away * away > around.most(known_squared, shapes, candidate.0, gain) {
+                continue;
+            }
+            let is_kept = radius <= SMALL * reach || {
+                let point = shapes.closest(around.middle, candidate.0);
+                let gain = |a: usize| (point[a] - known[a]).abs();
+                let squared = squared_distance(around.middle, point) * (1.0 - ROUNDING);
+                squared <= around.most(known_squared, shapes, candidate.0, gain)
+            };
+            if is_kept {
+                candidates.push(candidate);
+            }
+        }
+        least
+    }
+}
+
+/// How far a place is from what a ball holds, at least.
+fn away_at_least(here: [f64; 3], (ball, radius): ([f64; 3], f64)) -> f64 {
+    (squared_distance(here, ball).sqrt() * (1.0 - ROUNDING) - radius * (1.0 + ROUNDING)).max(0.0)
+}
+
+/// The source whose ball has the nearest middle.
+fn about_nearest(shapes: &LabelledShapes<'_>, here: [f64; 3], candidates: &[Candidate]) -> Option<u32> {
+    let away = |&(source, _): &Candidate| (source, squared_distance(here, shapes.ball(source).0));
+    candidates.iter().map(away).reduce(|best, next| if next.1 < best.1 { next } else { best }).map(|(source, _)| source)
+}
+
+/// The squared distance, the label and the number of the nearest of some sources to a place; of equal ones the lower label, then the lower number.
+#[must_use]
+pub fn nearest_of(shapes: &LabelledShapes<'_>, here: [f64; 3], among: &[Candidate]) -> Option<(f64, u32, u32)> {
+    let rank = |&(source, label): &Candidate| (shapes.distance_squared(here, source), label, source);
+    let lower = |best: (f64, u32, u32), next: (f64, u32, u32)| if next < best { next } else { best };
+    if among.len() < BALLS || shapes.is_point(among[0].0) {
+        return among.iter().map(rank).reduce(lower);
+    }
+    let first = shapes.distance_squared(here, about_nearest(shapes, here, among)?);
+    let mut best = (first, u32::MAX, u32::MAX);
+    for candidate in among {
+        let away = away_at_least(here, shapes.ball(candidate.0));
+        if away * away * (1.0 - ROUNDING) <= best.0 {
+            best = lower(best, rank(candidate));
+        }
+    }
+    Some(best)
 }
 
 /// Work buffer: the closest point of each candidate and its squared distance.
@@ -82,22 +176,22 @@ impl Culling {
         candidates: &mut Vec<Candidate>,
         first: usize,
     ) -> f64 {
-        let Around { middle, half } = *around;
-        let squared = |point: [f64; 3]| (0..3).map(|a| (middle[a] - point[a]).powi(2)).sum::<f64>();
+        if let Some(balls) = Balls::of(shapes, around, &candidates[first..]) {
+            return balls.keep(candidates, first);
+        }
+        let middle = around.middle;
         self.closest.clear();
         self.closest.extend(candidates[first..].iter().map(|&(source, _)| {
             let point = shapes.closest(middle, source);
-            (point, squared(point))
+            (point, squared_distance(middle, point))
         }));
         let Some(&(nearest, least)) = self.closest.iter().min_by(|a, b| a.1.total_cmp(&b.1)) else {
             return f64::INFINITY;
         };
-        let reach_squared = half.iter().map(|h| h * h).sum::<f64>();
         for (n, (point, squared)) in self.closest.iter().enumerate() {
             let candidate = candidates[first + n];
-            let gain = 2.0 * (0..3).map(|a| (point[a] - nearest[a]).abs() * half[a]).sum::<f64>();
-            let bend = if shapes.is_point(candidate.0) { 0.0 } else { reach_squared };
-            if squared * (1.0 - ROUNDING) <= least + gain + bend {
+            if squared * (1.0 - ROUNDING) <= around.most(least, shapes, candidate.0, |a| (point[a] - nearest[a]).abs())
+            {
                 candidates.push(candidate);
             }
         }

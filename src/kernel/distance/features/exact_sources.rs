@@ -3,7 +3,7 @@
 //! Boxes are halved, and each half is left the sources that can be nearest to one of its voxels (`culling`), until these are so
 //! few, or the voxels, that each voxel asks all of them.
 
-use super::culling::{Around, Candidate, Culling};
+use super::culling::{Around, Candidate, Culling, nearest_of};
 use super::halves::halves;
 use super::labelled_shapes::LabelledShapes;
 use super::source_trees::SourceTrees;
@@ -82,9 +82,7 @@ impl ExactSources<'_> {
 
     /// The nearest of some sources to a voxel.
     pub(super) fn nearest_of(&self, voxel: [i64; 3], among: &[Candidate]) -> Option<Nearest> {
-        let here = self.geometry.position(voxel);
-        let rank = |&(source, label): &Candidate| (self.shapes.distance_squared(here, source), label, source);
-        let nearest = among.iter().map(rank).reduce(|best, next| if next < best { next } else { best });
+        let nearest = nearest_of(self.shapes, self.geometry.position(voxel), among);
         nearest.map(|(squared, label, source)| Nearest { source, label, squared })
     }
 }
@@ -100,12 +98,18 @@ mod tests {
         fn every_voxel_has_the_nearest_of_all_sources(
             points in prop::collection::vec([-2.0..14.0, -2.0..14.0, -2.0..14.0_f64], 1..40),
             corners in prop::collection::vec([-2.0..14.0, -2.0..14.0, -2.0..14.0_f64], 3..30),
+            small in prop::collection::vec([4.0..7.0, 4.0..7.0, 4.0..7.0_f64], 0..120),
             shape in [1_i64..14, 1_i64..14, 1_i64..14],
         ) {
             let mut sets = DataSets::default();
             sets.add_cloud(&points);
-            let triangles = (0..corners.len() as u32 / 3).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-            sets.add_mesh(&TriangleMesh { vertices: corners.clone(), triangles });
+            // Many triangles that are small beside boxes of voxels.
+            let around = |p: &[f64; 3]| [[p[0] + 0.2, p[1], p[2]], [p[0], p[1] - 0.1, p[2] + 0.1], *p];
+            let vertices: Vec<[f64; 3]> = corners.iter().copied().chain(small.iter().flat_map(around)).collect();
+            let triangles = (0..corners.len() as u32 / 3).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]);
+            let first = corners.len() as u32;
+            let small = (0..small.len() as u32).map(|n| [first + 3 * n, first + 3 * n + 1, first + 3 * n + 2]);
+            sets.add_mesh(&TriangleMesh { vertices, triangles: triangles.chain(small).collect() });
             let geometry = Geometry { shape, spacing: [1.0, 0.7, 1.3], origin: [0.3, -0.2, 0.1], unit: None };
             let (shapes, trees) = (LabelledShapes::new(&sets), SourceTrees::new(&sets));
             let exact = ExactSources { geometry: &geometry, shapes: &shapes, trees: &trees, farthest: f64::INFINITY };

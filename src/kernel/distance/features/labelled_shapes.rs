@@ -48,6 +48,17 @@ impl<'a> LabelledShapes<'a> {
         triangle.map_or(here, |triangle| triangle.closest_point(here))
     }
 
+    /// A ball that holds a source: its middle and radius.
+    #[must_use]
+    pub fn ball(&self, source: u32) -> ([f64; 3], f64) {
+        let source = source as usize;
+        if let Some(&point) = self.sets.positions.get(source) {
+            return (point, 0.0);
+        }
+        let triangle = self.triangles.get(source - self.sets.positions.len());
+        triangle.map_or(([0.0; 3], f64::INFINITY), |triangle| (triangle.corner(), triangle.longest_from_corner()))
+    }
+
     /// The distance of a world position to a source, physical; infinite to none.
     #[must_use]
     pub fn distance(&self, here: [f64; 3], source: u32) -> f64 {

@@ -102,7 +102,7 @@ impl SourceTrees {
     pub fn near_all(&self, around: &Around) -> Vec<Candidate> {
         let nearest = self.trees.iter().filter_map(|tree| tree.nearest(around.middle));
         let limit = around.limit(nearest.map(|(_, squared)| squared).fold(f64::INFINITY, f64::min));
-        let of_label = |(tree, &label): (&Tree, &u32)| tree.within(around.middle, limit, label, usize::MAX);
+        let of_label = |(tree, &label): (&Tree, &u32)| tree.about(around.middle, limit, label);
         self.trees.iter().zip(&self.labels).flat_map(of_label).collect()
     }
 }
@@ -120,6 +120,15 @@ impl Tree {
             Self::Points(tree) => tree.nearest_neighbor_iter(here).take(count).map(|p| p.data).collect(),
             Self::Triangles(tree) => tree.nearest_neighbor_iter(here).take(count).map(|t| t.data).collect(),
         }
+    }
+
+    /// The sources within a distance, and of triangles those whose boxes are: these are told sooner.
+    fn about(&self, here: [f64; 3], squared: f64, label: u32) -> Vec<Candidate> {
+        let Self::Triangles(tree) = self else { return self.within(here, squared, label, usize::MAX) };
+        let reach = squared.sqrt();
+        let cube = AABB::from_corners(here.map(|v| v - reach), here.map(|v| v + reach));
+        let near = tree.locate_in_envelope_intersecting(cube);
+        near.filter(|t| t.geom().extent.distance_2(&here) <= squared).map(|t| (t.data, label)).collect()
     }
 
     fn within(&self, here: [f64; 3], squared: f64, label: u32, most: usize) -> Vec<Candidate> {
