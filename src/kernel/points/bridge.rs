@@ -22,14 +22,23 @@ pub struct Rim {
 /// Two places are so many spacings of the points apart at least, and at most.
 const SHORTEST: f64 = 4.0;
 const LONGEST: f64 = 60.0;
-/// Places of a rim are one stretch where they are so many spacings from the next at most; a bridge is no longer than so many spacings for each
-/// place of either stretch: a hole is about a third as wide as its rim is long, and a thin part goes on that far.
+/// Places of a rim are one stretch where they are so many spacings from the next at most.
 const STRETCH: f64 = 3.5;
-const LONGER: f64 = 1.5;
-/// The cosine of the angle between the way to the other side and that away from the points, at least.
-const AHEAD: f64 = 0.6;
-/// The sine of the angle between the way and the tangent plane, at most.
-const ALONG: f64 = 0.65;
+
+/// How two places go together.
+struct Limits {
+    /// Spacings between them for each place of either stretch, at most.
+    longer: f64,
+    /// The cosine of the angle between the way to the other side and that away from the points, at least.
+    ahead: f64,
+    /// The sine of the angle between the way and the tangent plane, at most.
+    along: f64,
+}
+
+/// Of one stretch, across its hole, which is about a third as wide as its rim is long.
+const WITHIN: Limits = Limits { longer: 1.5, ahead: 0.6, along: 0.65 };
+/// Of two, which may be those of two bodies: a part goes on over three of its widths, straight on, and does not close in.
+const BETWEEN: Limits = Limits { longer: 1.0, ahead: 0.9, along: 0.35 };
 /// The way back from the other side ends this part of the distance from where it began, at most, and two spacings.
 const RETURNS: f64 = 0.5;
 /// Points between are so many spacings from each other at least.
@@ -40,8 +49,8 @@ type Numbered = GeomWithData<[f64; 3], u32>;
 /// The places of rims, to be looked up.
 pub struct Rims<'a> {
     all: &'a [Rim],
-    /// How many places the stretch of rim has that each is one of.
-    stretches: Vec<u32>,
+    /// The stretch of rim that each is one of, by its first place, and how many places that has.
+    stretches: Vec<(u32, u32)>,
     tree: RTree<Numbered>,
     /// The spacing of the points.
     step: f64,
@@ -64,20 +73,22 @@ impl<'a> Rims<'a> {
         for &root in &roots {
             sizes[root as usize] += 1;
         }
-        let stretches = roots.into_iter().map(|root| sizes[root as usize]).collect();
+        let stretches = roots.into_iter().map(|root| (root, sizes[root as usize])).collect();
         Self { all: rims, stretches, tree, step }
     }
 
     /// The place on the other side of a hole that one leads to best, if there is such a one.
     #[must_use]
     pub fn opposite(&self, rim: usize) -> Option<u32> {
-        let (from, stretch) = (&self.all[rim], self.stretches[rim]);
-        let longest = |stretch: u32| (LONGER * f64::from(stretch)).min(LONGEST) * self.step;
-        let near = self.tree.locate_within_distance(from.surfel.place.to_array(), longest(stretch).powi(2));
+        let (from, (stretch, places)) = (&self.all[rim], self.stretches[rim]);
+        let longest = |places: u32, most: f64| (most * f64::from(places)).min(LONGEST) * self.step;
+        let near =
+            self.tree.locate_within_distance(from.surfel.place.to_array(), longest(places, WITHIN.longer).powi(2));
         near.filter_map(|other| {
             let n = other.data as usize;
-            let most = longest(self.stretches[n]);
-            Some((cost(from, &self.all[n], [SHORTEST * self.step, most])?, other.data))
+            let limits = if self.stretches[n].0 == stretch { &WITHIN } else { &BETWEEN };
+            let most = longest(places.min(self.stretches[n].1), limits.longer);
+            Some((cost(from, &self.all[n], limits, [SHORTEST * self.step, most])?, other.data))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
         .map(|(_, other)| other)
@@ -98,13 +109,17 @@ impl<'a> Rims<'a> {
 }
 
 /// How far two places are apart, more where they lead past each other; none where they do not go together.
-fn cost(from: &Rim, to: &Rim, [least, most]: [f64; 2]) -> Option<f64> {
+fn cost(from: &Rim, to: &Rim, limits: &Limits, [least, most]: [f64; 2]) -> Option<f64> {
     let way = to.surfel.place - from.surfel.place;
     let length = way.length();
     let way = way / length;
     let (ahead, behind) = (from.beyond.dot(way), -to.beyond.dot(way));
-    let is_along = |rim: &Rim| rim.surfel.normal.dot(way).abs() <= ALONG;
-    let goes = (least..=most).contains(&length) && ahead >= AHEAD && behind >= AHEAD && is_along(from) && is_along(to);
+    let is_along = |rim: &Rim| rim.surfel.normal.dot(way).abs() <= limits.along;
+    let goes = (least..=most).contains(&length)
+        && ahead >= limits.ahead
+        && behind >= limits.ahead
+        && is_along(from)
+        && is_along(to);
     (goes && from.surfel.normal.dot(to.surfel.normal) > 0.0).then(|| length / (ahead * behind))
 }
 
@@ -200,6 +215,26 @@ mod tests {
         let end = |height: f64, beyond: DVec3| end_of_tube(height, beyond).into_iter().step_by(5).take(4).collect();
         let few: [Vec<Rim>; 2] = [end(0.0, DVec3::Z), end(20.0, -DVec3::Z)];
         assert!(bridged(&few.concat(), |_| true).is_empty());
+    }
+
+    /// Two balls that look at each other through their holes close in; so do tubes beside each other's axis.
+    #[test]
+    fn rims_of_two_bodies_stay_apart() {
+        let ball = |side: f64| {
+            (0..60).map(move |n| {
+                let around = f64::from(n) * TAU / 60.0;
+                let out = DVec3::new(around.cos(), around.sin(), 0.0);
+                let normal = out * 0.8 + DVec3::Z * (0.6 * side);
+                let place = normal * 12.0 - DVec3::Z * (20.0 * side);
+                Rim { surfel: Surfel { place, normal }, beyond: DVec3::Z * (0.8 * side) - out * 0.6 }
+            })
+        };
+        assert!(bridged(&ball(1.0).chain(ball(-1.0)).collect::<Vec<_>>(), |_| true).is_empty());
+        let mut shifted = end_of_tube(10.0, -DVec3::Z);
+        for rim in &mut shifted {
+            rim.surfel.place.x += 2.0 * RADIUS;
+        }
+        assert!(bridged(&[end_of_tube(0.0, DVec3::Z), shifted].concat(), |_| true).is_empty());
     }
 
     #[test]
